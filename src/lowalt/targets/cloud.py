@@ -1,0 +1,140 @@
+"""The calibration point cloud (CPC): the one file that passes from targets to motion, and its validator.
+
+A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape in one
+file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres, body-centred, front +y,
+up +z. Every point belongs to one part; every part but the body moves.
+
+    points      (L, 3)  float64  m
+    normals     (L, 3)  float64  outward unit vectors, NaN where the source has none
+    rcs_m2      (L,)    float64  radar cross section of each point
+    part        (L,)    int64    index of the point's part
+    kinds       (P,)    str      body | rotor | wing | wheel | node
+    names       (P,)    str      one name a part, unique in the cloud
+    parents     (P,)    int64    the part this one's hinge rides on (an outer wing on its inner), -1 for none
+    hinges      (P, 3)  float64  m, a point on the part's axis (NaN for body and node)
+    axes        (P, 3)  float64  unit vector of the axis; a rotor's sense is its sign (NaN for body and node)
+    track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0 unless the parts are nodes)
+    record      str     JSON: subtype, category, source, checksum, track_rate_hz, sizes, ...
+"""
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+
+KINDS = ("body", "rotor", "wing", "wheel", "node")
+CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
+"""The four classes; their order is the label order everywhere."""
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """A calibration point cloud; shapes and units in the module's docstring."""
+
+    points: np.ndarray
+    part: np.ndarray
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    parents: np.ndarray
+    hinges: np.ndarray
+    axes: np.ndarray
+    normals: np.ndarray
+    rcs_m2: np.ndarray
+    record: dict
+    track: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 3)))
+
+    @property
+    def subtype(self) -> str:
+        """The subtype's published name."""
+        return self.record["subtype"]
+
+    @property
+    def category(self) -> str:
+        """One of CATEGORIES."""
+        return self.record["category"]
+
+    def parts_of(self, kind: str) -> list[int]:
+        """Indices of the parts of one kind, in the cloud's order."""
+        return [index for index, name in enumerate(self.kinds) if name == kind]
+
+
+def check(cloud: Cloud, where: str) -> Cloud:
+    """Return the cloud if it keeps the contract.
+
+    Raises: InputError naming `where`, the array and what was expected.
+    """
+
+    def need(good: bool, what: str) -> None:
+        if not good:
+            raise InputError(f"{where}: {what}")
+
+    count, parts = len(cloud.points), len(cloud.kinds)
+    need(count > 0, "points is empty, expected at least one point")
+    for name, shape in {
+        "points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
+        "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3),
+    }.items():  # fmt: skip
+        found = np.shape(getattr(cloud, name))
+        need(found == shape, f"{name} has shape {found}, expected {shape}")
+    need(bool(np.isfinite(cloud.points).all()), "points has a NaN or infinite coordinate, expected finite metres")
+    good_rcs = np.isfinite(cloud.rcs_m2).all() and (cloud.rcs_m2 >= 0).all()
+    need(bool(good_rcs), "rcs_m2 has a negative or non-finite value, expected square metres >= 0")
+    need(len(set(cloud.names)) == parts == len(cloud.names), f"names {cloud.names}, expected {parts} unique names")
+    need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
+    need(0 <= cloud.part.min() and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
+    for index, kind in enumerate(cloud.kinds):
+        need(-1 <= cloud.parents[index] < index, f"parents[{index}] is {cloud.parents[index]}, expected an earlier part or -1")
+        if kind in ("rotor", "wing", "wheel"):
+            length = np.linalg.norm(cloud.axes[index])
+            need(abs(length - 1) < 1e-12, f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1")
+            need(bool(np.isfinite(cloud.hinges[index]).all()), f"hinges[{index}] ({cloud.names[index]}) is not finite")
+    lengths = np.linalg.norm(cloud.normals, axis=1)
+    need(bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()), "normals has a vector of length other than 1 or NaN")
+    missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
+    need(not missing, f"record lacks {sorted(missing)}")
+    need(cloud.category in CATEGORIES, f"record.category is {cloud.category!r}, expected one of {CATEGORIES}")
+    if "node" in cloud.kinds:
+        need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
+             f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
+        need(bool(np.isfinite(cloud.track).all()), "track has a NaN or infinite coordinate")
+        need(cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate")
+        need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
+    return cloud
+
+
+def write(path: str | Path, cloud: Cloud) -> None:
+    """Write a checked cloud; equal clouds give equal bytes.
+
+    Raises: InputError where the cloud breaks the contract.
+    """
+    check(cloud, str(path))
+    with replacing(path) as temporary:
+        np.savez(
+            temporary,
+            points=cloud.points, normals=cloud.normals, rcs_m2=cloud.rcs_m2, part=cloud.part.astype(np.int64),
+            kinds=np.array(cloud.kinds), names=np.array(cloud.names), parents=cloud.parents.astype(np.int64),
+            hinges=cloud.hinges, axes=cloud.axes, track=cloud.track,
+            record=np.array(json.dumps(cloud.record, sort_keys=True)),
+        )  # fmt: skip
+
+
+def read(path: str | Path) -> Cloud:
+    """Read and check a cloud file.
+
+    Raises: InputError naming the file and what is wrong with it.
+    """
+    existing(path, "cloud")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            arrays = {name: data[name] for name in data.files}
+        record = json.loads(str(arrays.pop("record")))
+        kinds = tuple(str(value) for value in arrays.pop("kinds"))
+        names = tuple(str(value) for value in arrays.pop("names"))
+        cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
+    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+        raise InputError(f"{path}: not a cloud file ({error})") from error
+    return check(cloud, str(path))
