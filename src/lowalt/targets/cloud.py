@@ -80,20 +80,38 @@ def check(cloud: Cloud, where: str) -> Cloud:
     }.items():  # fmt: skip
         found = np.shape(getattr(cloud, name))
         need(found == shape, f"{name} has shape {found}, expected {shape}")
-    need(bool(np.isfinite(cloud.points).all()), "points has a NaN or infinite coordinate, expected finite metres")
+    need(
+        bool(np.isfinite(cloud.points).all()),
+        "points has a NaN or infinite coordinate, expected finite metres",
+    )
     good_rcs = np.isfinite(cloud.rcs_m2).all() and (cloud.rcs_m2 >= 0).all()
     need(bool(good_rcs), "rcs_m2 has a negative or non-finite value, expected square metres >= 0")
-    need(len(set(cloud.names)) == parts == len(cloud.names), f"names {cloud.names}, expected {parts} unique names")
+    need(
+        len(set(cloud.names)) == parts == len(cloud.names),
+        f"names {cloud.names}, expected {parts} unique names",
+    )
     need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
-    need(0 <= cloud.part.min() and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
+    need(cloud.part.min() >= 0 and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
     for index, kind in enumerate(cloud.kinds):
-        need(-1 <= cloud.parents[index] < index, f"parents[{index}] is {cloud.parents[index]}, expected an earlier part or -1")
+        need(
+            -1 <= cloud.parents[index] < index,
+            f"parents[{index}] is {cloud.parents[index]}, expected an earlier part or -1",
+        )
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            need(abs(length - 1) < 1e-12, f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1")
-            need(bool(np.isfinite(cloud.hinges[index]).all()), f"hinges[{index}] ({cloud.names[index]}) is not finite")
+            need(
+                abs(length - 1) < 1e-12,
+                f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1",
+            )
+            need(
+                bool(np.isfinite(cloud.hinges[index]).all()),
+                f"hinges[{index}] ({cloud.names[index]}) is not finite",
+            )
     lengths = np.linalg.norm(cloud.normals, axis=1)
-    need(bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()), "normals has a vector of length other than 1 or NaN")
+    need(
+        bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()),
+        "normals has a vector of length other than 1 or NaN",
+    )
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     need(not missing, f"record lacks {sorted(missing)}")
     need(cloud.category in CATEGORIES, f"record.category is {cloud.category!r}, expected one of {CATEGORIES}")
@@ -101,7 +119,10 @@ def check(cloud: Cloud, where: str) -> Cloud:
         need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
              f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
         need(bool(np.isfinite(cloud.track).all()), "track has a NaN or infinite coordinate")
-        need(cloud.record.get("track_rate_hz", 0) > 0, "record.track_rate_hz is missing, expected a positive rate")
+        need(
+            cloud.record.get("track_rate_hz", 0) > 0,
+            "record.track_rate_hz is missing, expected a positive rate",
+        )
         need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
     return cloud
 

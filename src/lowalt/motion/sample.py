@@ -1,0 +1,106 @@
+"""Drawing motion models: the published ranges and our defaults for what the paper leaves open.
+
+One stream a motion model (seed, "motion", subtype, model); draws happen in a fixed order, so a model is the
+same whatever else the configuration names.
+"""
+
+import math
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.motion.poses import attitude
+from lowalt.motion.table import NUMBERS, PHASES
+from lowalt.network import Network
+from lowalt.targets.cloud import Cloud
+
+AIRBORNE = ("UAV", "Bird")
+
+
+def region_polygon(network: Network, polygon_m: list | None) -> np.ndarray:
+    """Return the region's corners (K, 2) m, counter-clockwise: the given ones, or the stations' convex hull.
+
+    Raises: InputError where the polygon is degenerate.
+    """
+    corners = np.array([s.position_m[:2] for s in network.stations] if polygon_m is None else polygon_m, dtype=float)
+    if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
+        raise InputError(
+            f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) corners in metres; "
+            "with fewer than three stations give motion.region.polygon_m"
+        )
+    centre = corners.mean(axis=0)
+    corners = corners[np.argsort(np.arctan2(*(corners - centre).T[::-1]), kind="stable")]
+    if np.any(_edges(corners, corners.mean(axis=0)) <= 0):
+        raise InputError(f"motion: region polygon {corners.tolist()} is degenerate or not convex")
+    return corners
+
+
+def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Signed area test of a point against every edge: positive inside a counter-clockwise convex polygon."""
+    step, to_point = np.roll(corners, -1, axis=0) - corners, point - corners
+    return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
+
+
+def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    for _ in range(10_000):
+        point = rng.uniform(low, high)
+        far = np.all(np.hypot(*(masts - point).T) >= clearance_m)
+        if far and np.all(_edges(corners, point) > 0):
+            return point
+    raise InputError(f"motion: no place in the region is {clearance_m} m away from every mast")
+
+
+def _rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
+    """Fill in rate, phases and the place in a recording."""
+    if cloud.category == "Vehicle":
+        row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
+    elif cloud.category in AIRBORNE:
+        row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])
+    moving = len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
+    if moving > PHASES:
+        raise InputError(f"motion of {cloud.subtype}: {moving} moving parts, expected at most {PHASES}")
+    for index in range(moving):
+        row[f"phase_{index}_rad"] = rng.uniform(0.0, 2 * math.pi)
+    if "node" in cloud.kinds:
+        duration = len(cloud.track) / cloud.record["track_rate_hz"]
+        row["start_s"] = rng.uniform(0.0, duration)
+        row["playback"] = 1.0
+        if cadence == "tied":
+            row["playback"] = speed / cloud.record["track_speed_mps"]
+
+
+def draw(
+    rng: np.random.Generator,
+    cloud: Cloud,
+    published: dict,
+    network: Network,
+    corners: np.ndarray,
+    settings: dict,
+) -> dict:
+    """Return one motion model's row (without group and model) for the target `cloud`.
+
+    published: the subtype's ranges (config/targets.csv); corners: (K, 2) m from `region_polygon`; settings: the
+    motion block of the configuration. All ranges are uniform. Wheels turn at F = v / (pi D) (paper Eq. 16).
+    Raises: InputError where no place satisfies the region or the target has too many parts.
+    """
+    row = dict.fromkeys(NUMBERS, math.nan)
+    masts = np.array([station.position_m[:2] for station in network.stations])
+    row["x_m"], row["y_m"] = map(float, _place(rng, corners, masts, settings["region"]["mast_clearance_m"]))
+    row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
+    row["pitch_rad"] = row["roll_rad"] = 0.0
+    speed = 0.0
+    if cloud.category in AIRBORNE:
+        row["z_m"] = rng.uniform(*settings["height_m"][cloud.category])
+        tilt = math.radians(settings["tilt_deg"])
+        row["pitch_rad"], row["roll_rad"] = rng.uniform(-tilt, tilt), rng.uniform(-tilt, tilt)
+        for axis in "xyz":
+            bound = published[f"v{axis}_abs_max"]
+            row[f"v{axis}_mps"] = rng.uniform(-bound, bound)
+    else:
+        row["z_m"] = cloud.record["origin_height_m"]
+        speed = rng.uniform(published["speed_lo"], published["speed_hi"])
+        velocity = speed * attitude(row["yaw_rad"], 0.0, 0.0)[:, 1]
+        row["vx_mps"], row["vy_mps"], row["vz_mps"] = map(float, velocity)
+    _rates(rng, cloud, published, row, speed, settings["cadence"])
+    return {"subtype": cloud.subtype, "category": cloud.category, **row}

@@ -1,0 +1,56 @@
+"""The motion table: one row a motion model, a CSV file a person can read and a computer reads back exactly."""
+
+import csv
+import math
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+
+PHASES = 16
+"""Most moving parts with a phase of their own (EH216-S flown as coaxial pairs has 16 rotors)."""
+
+TEXTS = ("subtype", "category", "group")
+NUMBERS = (
+    "x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad",
+    "rate_hz", *(f"phase_{index}_rad" for index in range(PHASES)), "start_s", "playback",
+)  # fmt: skip
+COLUMNS = (*TEXTS, "model", *NUMBERS)
+
+
+def write_table(path: str | Path, rows: list[dict]) -> None:
+    """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for row in rows:
+            numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in NUMBERS)
+            writer.writerow([*(row[name] for name in TEXTS), int(row["model"]), *numbers])
+
+
+def read_table(path: str | Path) -> list[dict]:
+    """Read a motion table: a list of dicts, `model` an int, numbers floats, NaN where a cell is empty.
+
+    Raises: InputError naming the file, line and column that is wrong.
+    """
+    with existing(path, "motion table").open(newline="") as file:
+        reader = csv.reader(file)
+        header = tuple(next(reader, ()))
+        if header != COLUMNS:
+            raise InputError(f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order")
+        return [_row(path, line, cells) for line, cells in enumerate(reader, start=2)]
+
+
+def _row(path: str | Path, line: int, cells: list[str]) -> dict:
+    if len(cells) != len(COLUMNS):
+        raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(COLUMNS)}")
+    row: dict = dict(zip(COLUMNS, cells, strict=True))
+    for name in ("model", *NUMBERS):
+        text = row[name]
+        try:
+            row[name] = int(text) if name == "model" else float(text) if text else math.nan
+        except ValueError:
+            raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a number") from None
+        if math.isinf(row[name]):
+            raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a finite number")
+    return row

@@ -1,0 +1,232 @@
+"""Motion: laws of rigid rotation, exact phases, the table's round trip, ranges and streams."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lowalt.errors import InputError
+from lowalt.motion import poses, positions, read_table, write_table
+from lowalt.motion.poses import attitude, rodrigues, turns
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.table import NUMBERS
+from lowalt.network import Network
+from lowalt.streams import stream
+from lowalt.targets.cloud import Cloud
+
+NETWORK = {
+    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
+    "symbol_interval_s": 2.5e-3, "symbols": 400, "transmit_array": [16, 4], "receive_array": [16, 4], "power_w": 1.0,
+    "stations": {
+        "A": {"position_m": [0, 0, 25], "normal_deg": 30},
+        "B": {"position_m": [500, 0, 25], "normal_deg": 150},
+        "C": {"position_m": [250, 433.0127018922193, 25], "normal_deg": 270},
+    },
+}  # fmt: skip
+MOTION = {
+    "region": {"polygon_m": None, "mast_clearance_m": 10.0},
+    "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
+    "tilt_deg": 20.0,
+    "cadence": "free",
+}
+
+
+def rigid_cloud(kind: str, category: str, extra: dict | None = None) -> Cloud:
+    """A body point and one moving part of three points, hinged off the origin about a slanted axis."""
+    axis = np.array([1.0, 2.0, 2.0]) / 3
+    nothing = np.full(3, np.nan)
+    return Cloud(
+        points=np.array([[0.0, 0, 0], [0.3, 0, 0], [0.3, 0.2, 0], [0.4, 0.1, 0.1]]),
+        part=np.array([0, 1, 1, 1]),
+        kinds=("body", kind),
+        names=("body", f"{kind} 0"),
+        parents=np.array([-1, -1]),
+        hinges=np.array([nothing, [0.3, 0.1, 0.0]]),
+        axes=np.array([nothing, axis]),
+        normals=np.full((4, 3), np.nan),
+        rcs_m2=np.ones(4),
+        record={"subtype": "test", "category": category, "source": "test", "checksum": "", **(extra or {})},
+    )
+
+
+def row(**values: float) -> dict:
+    """A motion row at rest at the origin, with the given values changed."""
+    rest = dict.fromkeys(NUMBERS, math.nan)
+    rest.update(dict.fromkeys(("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"), 0.0))
+    rest.update(yaw_rad=0.0, pitch_rad=0.0, roll_rad=0.0)
+    return {"subtype": "test", "category": "UAV", "group": "seen", "model": 0, **rest, **values}
+
+
+@given(st.lists(st.floats(-10, 10), min_size=3, max_size=3))
+def test_attitude_is_a_rotation(angles):
+    matrix = attitude(*angles)
+    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-14)
+    assert np.linalg.det(matrix) == pytest.approx(1, abs=1e-13)
+
+
+def test_attitude_turns_about_z_then_x_then_y_as_published():
+    quarter = math.pi / 2
+    np.testing.assert_allclose(attitude(quarter, 0, 0) @ [0, 1, 0], [-1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(attitude(0, quarter, 0) @ [0, 1, 0], [0, 0, 1], atol=1e-15)
+    np.testing.assert_allclose(attitude(0, 0, quarter) @ [0, 0, 1], [1, 0, 0], atol=1e-15)
+    np.testing.assert_allclose(
+        attitude(0.3, 0.5, 0.7), attitude(0.3, 0, 0) @ attitude(0, 0.5, 0) @ attitude(0, 0, 0.7), atol=1e-15
+    )
+
+
+def test_rodrigues_keeps_the_axis_and_adds_angles():
+    axis = np.array([2.0, 3.0, 6.0]) / 7
+    one, two, both = rodrigues(axis, np.array([0.4, 1.1, 1.5]))
+    np.testing.assert_allclose(one @ axis, axis, atol=1e-15)
+    np.testing.assert_allclose(one @ two, both, atol=1e-15)
+
+
+@given(st.floats(0.1, 1000), st.integers(0, 10**6))
+def test_turns_match_exact_arithmetic(rate, symbol):
+    time = symbol * 2.5e-3
+    with mpmath.workdps(60):
+        exact = mpmath.mpf(rate) * mpmath.mpf(time)
+        exact = exact - mpmath.nint(exact)
+        found = turns(rate, np.array([time]))[0]
+        difference = abs(mpmath.mpf(found) - exact)
+        assert min(difference, abs(difference - 1)) < mpmath.mpf(2) ** -52
+
+
+def test_parts_stay_rigid_and_do_not_drift_over_a_million_symbols():
+    cloud = rigid_cloud("rotor", "UAV")
+    motion = row(rate_hz=97.3, phase_0_rad=0.8, vx_mps=3.0, yaw_rad=1.0, pitch_rad=0.2)
+    times = np.array([0, 1, 999_999]) * 2.5e-3
+    found = positions(cloud, motion, times)
+    for frame in found:
+        moved = np.linalg.norm(frame[1:, None] - frame[None, 1:], axis=-1)
+        still = np.linalg.norm(cloud.points[1:, None] - cloud.points[None, 1:], axis=-1)
+        np.testing.assert_allclose(moved, still, atol=1e-12)
+    with mpmath.workdps(40):
+        angle = mpmath.mpf(motion["phase_0_rad"]) + 2 * mpmath.pi * mpmath.mpf(97.3) * mpmath.mpf(times[2])
+        turn = rodrigues(cloud.axes[1], np.array([float(mpmath.fmod(angle, 2 * mpmath.pi))]))[0]
+    arm = cloud.points[1:] - cloud.hinges[1]
+    expected = (arm @ turn.T + cloud.hinges[1]) @ attitude(1.0, 0.2, 0.0).T + [3.0 * times[2], 0, 0]
+    np.testing.assert_allclose(found[2, 1:], expected, atol=1e-11)
+
+
+def test_blade_tip_moves_at_two_pi_rate_times_radius():
+    cloud = rigid_cloud("rotor", "UAV")
+    step = 1e-6
+    found = positions(cloud, row(rate_hz=50.0, phase_0_rad=0.0), np.array([0.0, step]))
+    arm = cloud.points[3] - cloud.hinges[1]
+    radius = np.linalg.norm(arm - (arm @ cloud.axes[1]) * cloud.axes[1])
+    speed = np.linalg.norm(found[1, 3] - found[0, 3]) / step
+    assert speed == pytest.approx(2 * math.pi * 50 * radius, rel=1e-6)
+
+
+def test_a_wheel_point_on_the_ground_stands_still():
+    diameter, speed = 0.56, 13.0
+    wheel = rigid_cloud("wheel", "Vehicle", {"wheel_diameter_m": diameter})
+    hinge = np.array([0.8, 1.4, 0.0])
+    cloud = Cloud(
+        points=np.array([[0.0, 0, 0], hinge - [0, 0, diameter / 2], hinge, hinge]), part=wheel.part, kinds=wheel.kinds,
+        names=wheel.names, parents=wheel.parents, hinges=np.array([[np.nan] * 3, hinge]),
+        axes=np.array([[np.nan] * 3, [-1.0, 0, 0]]), normals=wheel.normals, rcs_m2=wheel.rcs_m2, record=wheel.record,
+    )  # fmt: skip
+    rate = speed / (math.pi * diameter)
+    found = positions(cloud, row(rate_hz=rate, phase_0_rad=0.0, vy_mps=speed), np.array([-1e-6, 1e-6]))
+    assert np.linalg.norm(found[1, 1] - found[0, 1]) / 2e-6 < 1e-4 * speed
+
+
+def test_an_outer_wing_rides_on_the_inner_one():
+    nothing = [np.nan] * 3
+    flap = {"mean_deg": 15, "amplitude_deg": 40, "fold_amplitude_deg": 30, "fold_lag_deg": 90}
+    cloud = Cloud(
+        points=np.array([[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]]), part=np.arange(3), kinds=("body", "wing", "wing"),
+        names=("body", "inner", "outer"), parents=np.array([-1, -1, 1]),
+        hinges=np.array([nothing, [0.0, 0, 0], [1.0, 0, 0]]), axes=np.array([nothing, [0, -1.0, 0], [0, -1.0, 0]]),
+        normals=np.full((3, 3), np.nan), rcs_m2=np.ones(3),
+        record={"subtype": "test", "category": "Bird", "source": "test", "checksum": "", "flap": flap},
+    )  # fmt: skip
+    times = np.linspace(0, 0.25, 7)
+    found = positions(cloud, row(rate_hz=4.0, phase_0_rad=0.3), times)
+    beat = 0.3 + 2 * np.pi * 4 * times
+    inner = np.radians(15 + 40 * np.cos(beat))
+    outer = inner + np.radians(30 * np.cos(beat - np.pi / 2))
+    elbow = np.stack([np.cos(inner), 0 * inner, np.sin(inner)], axis=1)
+    np.testing.assert_allclose(found[:, 1], elbow, atol=1e-14)
+    tip = elbow + np.stack([np.cos(outer), 0 * outer, np.sin(outer)], axis=1)
+    np.testing.assert_allclose(found[:, 2], tip, atol=1e-14)
+
+
+def test_a_recording_is_cyclic_and_linear_between_frames():
+    rng = np.random.default_rng(1)
+    track = rng.normal(size=(12, 31, 3))
+    nothing = np.full((31, 3), np.nan)
+    cloud = Cloud(
+        points=track[0], part=np.arange(31), kinds=("node",) * 31, names=tuple(map(str, range(31))),
+        parents=np.full(31, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(31), track=track,
+        record={"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "track_rate_hz": 120.0},
+    )  # fmt: skip
+    motion = row(start_s=11 / 120, playback=1.0)
+    found = positions(cloud, motion, np.array([0.0, 0.25 / 120, 1 / 120, 12 / 120]))
+    np.testing.assert_allclose(found[0], track[11], atol=1e-12)
+    np.testing.assert_allclose(found[1], 0.75 * track[11] + 0.25 * track[0], atol=1e-12)
+    np.testing.assert_allclose(found[2], track[0], atol=1e-12)
+    np.testing.assert_allclose(found[3], track[11], atol=1e-12)
+
+
+def test_the_table_reads_back_the_same_bits(tmp_path):
+    rng = np.random.default_rng(2)
+    rows = [row(**{name: float(rng.normal()) for name in NUMBERS}, model=index) for index in range(5)]
+    rows[1]["start_s"] = math.nan
+    path = tmp_path / "motion.csv"
+    write_table(path, rows)
+    back = read_table(path)
+    for was, now in zip(rows, back, strict=True):
+        assert all(was[name] == now[name] or (was[name] != was[name] and now[name] != now[name]) for name in was)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace("x_m", "x_km", 1), "columns"),
+        (lambda text: text.replace("0.0", "zero", 1), "line 2, column x_m: 'zero'"),
+        (lambda text: text.rsplit(",", 1)[0] + "\n", "cells"),
+    ],
+)
+def test_a_broken_table_is_refused_with_its_place(tmp_path, change, words):
+    path = tmp_path / "motion.csv"
+    write_table(path, [row()])
+    path.write_text(change(path.read_text()))
+    with pytest.raises(InputError, match=words):
+        read_table(path)
+
+
+def test_models_stay_in_their_ranges_and_streams_are_named():
+    network = Network.from_settings(NETWORK)
+    corners = region_polygon(network, None)
+    cloud = rigid_cloud("rotor", "UAV")
+    ranges = {"freq_lo_hz": 80, "freq_hi_hz": 256, "vx_abs_max": 10, "vy_abs_max": 5, "vz_abs_max": 3}
+    rows = [draw(stream(7, "motion", "test", i), cloud, ranges, network, corners, MOTION) for i in range(300)]
+    masts = np.array([s.position_m[:2] for s in network.stations])
+    for drawn in rows:
+        assert 80 <= drawn["rate_hz"] <= 256
+        assert abs(drawn["vy_mps"]) <= 5
+        assert 30 <= drawn["z_m"] <= 150
+        assert np.hypot(*(masts - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
+        assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+    # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
+    mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
+    assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)
+    again = draw(stream(7, "motion", "test", 4), cloud, ranges, network, corners, MOTION)
+    assert {k: v for k, v in again.items() if v == v} == {k: v for k, v in rows[4].items() if v == v}
+
+
+def test_a_missing_rate_is_refused_by_part_name():
+    with pytest.raises(InputError, match=r"rotor 0"):
+        poses(rigid_cloud("rotor", "UAV"), row(), np.arange(3) * 2.5e-3)
+
+
+def test_two_stations_need_a_polygon():
+    block = {**NETWORK, "stations": {k: NETWORK["stations"][k] for k in "AB"}}
+    with pytest.raises(InputError, match="polygon_m"):
+        region_polygon(Network.from_settings(block), None)
