@@ -13,19 +13,10 @@ from lowalt.motion import poses, positions, read_table, write_table
 from lowalt.motion.poses import attitude, rodrigues, turns
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
-from lowalt.network import Network
 from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud
 
-NETWORK = {
-    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
-    "symbol_interval_s": 2.5e-3, "symbols": 400, "transmit_array": [16, 4], "receive_array": [16, 4], "power_w": 1.0,
-    "stations": {
-        "A": {"position_m": [0, 0, 25], "normal_deg": 30},
-        "B": {"position_m": [500, 0, 25], "normal_deg": 150},
-        "C": {"position_m": [250, 433.0127018922193, 25], "normal_deg": 270},
-    },
-}  # fmt: skip
+MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])
 MOTION = {
     "region": {"polygon_m": None, "mast_clearance_m": 10.0},
     "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
@@ -202,22 +193,20 @@ def test_a_broken_table_is_refused_with_its_place(tmp_path, change, words):
 
 
 def test_models_stay_in_their_ranges_and_streams_are_named():
-    network = Network.from_settings(NETWORK)
-    corners = region_polygon(network, None)
+    corners = region_polygon(MASTS, None)
     cloud = rigid_cloud("rotor", "UAV")
     ranges = {"freq_lo_hz": 80, "freq_hi_hz": 256, "vx_abs_max": 10, "vy_abs_max": 5, "vz_abs_max": 3}
-    rows = [draw(stream(7, "motion", "test", i), cloud, ranges, network, corners, MOTION) for i in range(300)]
-    masts = np.array([s.position_m[:2] for s in network.stations])
+    rows = [draw(stream(7, "motion", "test", i), cloud, ranges, MASTS, corners, MOTION) for i in range(300)]
     for drawn in rows:
         assert 80 <= drawn["rate_hz"] <= 256
         assert abs(drawn["vy_mps"]) <= 5
         assert 30 <= drawn["z_m"] <= 150
-        assert np.hypot(*(masts - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
+        assert np.hypot(*(MASTS - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
         assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
     # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
     mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
     assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)
-    again = draw(stream(7, "motion", "test", 4), cloud, ranges, network, corners, MOTION)
+    again = draw(stream(7, "motion", "test", 4), cloud, ranges, MASTS, corners, MOTION)
     assert {k: v for k, v in again.items() if v == v} == {k: v for k, v in rows[4].items() if v == v}
 
 
@@ -227,6 +216,5 @@ def test_a_missing_rate_is_refused_by_part_name():
 
 
 def test_two_stations_need_a_polygon():
-    block = {**NETWORK, "stations": {k: NETWORK["stations"][k] for k in "AB"}}
     with pytest.raises(InputError, match="polygon_m"):
-        region_polygon(Network.from_settings(block), None)
+        region_polygon(MASTS[:2], None)

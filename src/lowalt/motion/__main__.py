@@ -2,10 +2,11 @@
 
 import sys
 
+import numpy as np
+
 from lowalt.command import parser, pick, run
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import write_table
-from lowalt.network import Network
 from lowalt.streams import stream
 from lowalt.targets.cloud import read
 
@@ -19,15 +20,15 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--count", type=int, required=True, help="models of each subtype")
     options.add_argument("--out", required=True, help="motion table to write (.csv)")
     given = options.parse_args(arguments)
-    seed, network, motion, published = pick(given.settings, "seed", "network", "motion", "published")
-    network = Network.from_settings(network)
-    corners = region_polygon(network, motion["region"]["polygon_m"])
+    seed, masts_m, motion, published = pick(given.settings, "seed", "masts_m", "motion", "published")
+    masts_m = np.array(masts_m, dtype=float)
+    corners = region_polygon(masts_m, motion["region"]["polygon_m"])
     clouds = [read(path) for path in given.clouds]
     rows = []
     for model in range(given.first, given.first + given.count):
         for cloud in clouds:
             rng = stream(seed, "motion", cloud.subtype, model)
-            row = draw(rng, cloud, published[cloud.subtype], network, corners, motion)
+            row = draw(rng, cloud, published[cloud.subtype], masts_m, corners, motion)
             rows.append({**row, "group": given.group, "model": model})
     write_table(given.out, rows)
     print(f"{given.out}: {len(rows)} motion models", file=sys.stderr)

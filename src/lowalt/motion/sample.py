@@ -11,18 +11,17 @@ import numpy as np
 from lowalt.errors import InputError
 from lowalt.motion.poses import attitude
 from lowalt.motion.table import NUMBERS, PHASES
-from lowalt.network import Network
 from lowalt.targets.cloud import Cloud
 
 AIRBORNE = ("UAV", "Bird")
 
 
-def region_polygon(network: Network, polygon_m: list | None) -> np.ndarray:
-    """Return the region's corners (K, 2) m, counter-clockwise: the given ones, or the stations' convex hull.
+def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
+    """Return the region's corners (K, 2) m, counter-clockwise: `polygon_m`, or the convex hull of `masts_m` (S, 2).
 
     Raises: InputError where the polygon is degenerate.
     """
-    corners = np.array([s.position_m[:2] for s in network.stations] if polygon_m is None else polygon_m, dtype=float)
+    corners = np.array(masts_m if polygon_m is None else polygon_m, dtype=float)
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
         raise InputError(
             f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) corners in metres; "
@@ -80,13 +79,12 @@ def draw(
 ) -> dict:
     """Return one motion model's row (without group and model) for the target `cloud`.
 
-    published: the subtype's ranges (config/targets.csv); corners: (K, 2) m from `region_polygon`; settings: the
-    motion block of the configuration. All ranges are uniform. Wheels turn at F = v / (pi D) (paper Eq. 16).
+    published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places; corners: (K, 2) m
+    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform. Wheels turn at F = v / (pi D) (paper Eq. 16).
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
-    masts = np.array([station.position_m[:2] for station in network.stations])
-    row["x_m"], row["y_m"] = map(float, _place(rng, corners, masts, settings["region"]["mast_clearance_m"]))
+    row["x_m"], row["y_m"] = map(float, _place(rng, corners, masts_m, settings["region"]["mast_clearance_m"]))
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     row["pitch_rad"] = row["roll_rad"] = 0.0
     speed = 0.0

@@ -1,0 +1,49 @@
+# lowalt: from records of targets to a benchmark and its report. One rule file a stage, in pipeline order.
+from snakemake.utils import min_version
+
+min_version("9.0")
+
+
+configfile: "config/default.yaml"
+
+
+include: "workflow/rules/common.smk"
+include: "workflow/rules/targets.smk"
+include: "workflow/rules/motion.smk"
+include: "workflow/rules/echo.smk"
+include: "workflow/rules/noise.smk"
+include: "workflow/rules/tiles.smk"
+include: "workflow/rules/shards.smk"
+include: "workflow/rules/recognition.smk"
+include: "workflow/rules/report.smk"
+
+
+localrules:
+    all,
+    clouds,
+    signals,
+    data,
+
+
+rule all:
+    default_target: True
+    input:
+        f"results/{RUN}/report.html",
+        f"results/{RUN}/accuracy.csv",
+
+
+rule clouds:
+    input:
+        expand("results/{run}/clouds/{subtype}.npz", run=RUN, subtype=SLUGS),
+        f"results/{RUN}/clouds.png",
+
+
+rule signals:
+    input:
+        expand("results/{run}/noisy/{chunk}.npy", run=RUN, chunk=PLAN.chunks),
+
+
+rule data:
+    input:
+        f"results/{RUN}/shards/index.json",
+        f"results/{RUN}/config.yaml",

@@ -1,0 +1,97 @@
+# What the rules share: the checked configuration, the plan that follows from it, and the settings of each stage.
+# This is the only file of the workflow with functions.
+import os
+import sys
+from pathlib import Path
+
+from snakemake.exceptions import WorkflowError
+
+from lowalt.config import canonical, check
+from lowalt.errors import InputError
+from lowalt.plan import Plan, slug
+from lowalt.sources import sources
+from lowalt.targets.records import load_records, missing_inputs, source_files
+
+# Jobs run `python -m lowalt.STAGE` by the interpreter that runs Snakemake, whether its environment is active or not.
+os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+# Float sums depend on how BLAS splits them over threads; `threads:` fixes that a rule, this fixes it for `python -m`.
+os.environ.setdefault("PYTHONHASHSEED", "0")
+
+SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "config.schema.yaml"
+
+
+def prepared(config):
+    """The checked configuration's records and plan; every fault is named before any job starts."""
+    try:
+        check(config, SCHEMA)
+        records = load_records(config["targets"]["table"], config["targets"]["records"])
+        published = {name: record["published"] for name, record in records.items()}
+        plan = Plan.of(config, published)
+        chosen = {name: records[name] for members in plan.groups.values() for name in members}
+        lacking = missing_inputs(chosen, INPUTS)
+        if lacking:
+            raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
+    return chosen, plan
+
+
+INPUTS = config["inputs"] or os.environ.get("LOWALT_INPUTS")
+if INPUTS:
+    os.environ["LOWALT_INPUTS"] = str(INPUTS)
+
+RECORDS, PLAN = prepared(config)
+RUN = config["run"]
+STATIONS = list(config["network"]["stations"])
+BY_SLUG = {slug(name): name for name in RECORDS}
+SLUGS = list(BY_SLUG)
+
+
+wildcard_constraints:
+    run=RUN,
+    subtype="|".join(SLUGS),
+    group="|".join(PLAN.groups),
+    part=r"\d{5}",
+    fold="train|val|test",
+    station="|".join(STATIONS),
+
+
+def code(module):
+    """The source files a stage runs, as inputs: editing one re-runs the stage."""
+    return [os.path.relpath(path, workflow.basedir) for path in sources(module)]
+
+
+def group_clouds(wildcards):
+    """Cloud files of a group's subtypes, in the table's order."""
+    return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in PLAN.groups[wildcards.group]]
+
+
+def record_files(wildcards):
+    """The user's mesh or recording files that one subtype's record names."""
+    return source_files(RECORDS[BY_SLUG[wildcards.subtype]], INPUTS)
+
+
+def cloud_settings(wildcards):
+    return canonical({"seed": config["seed"], "record": RECORDS[BY_SLUG[wildcards.subtype]]})
+
+
+def motion_settings(wildcards):
+    kept = ("region", "height_m", "tilt_deg", "cadence")
+    return canonical(
+        {
+            "seed": config["seed"],
+            "masts_m": [place["position_m"][:2] for place in config["network"]["stations"].values()],
+            "motion": {key: config["motion"][key] for key in kept},
+            "published": {name: RECORDS[name]["published"] for name in PLAN.groups[wildcards.group]},
+        }
+    )
+
+
+def motion_span(wildcards):
+    return "--first {} --count {}".format(*PLAN.span(f"{wildcards.group}-{wildcards.part}"))
+
+
+def chunk_echoes(wildcards):
+    """The stations' clean echoes of a chunk, in the order of the stations."""
+    stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+    return [f"{stem}/{station}.npy" for station in STATIONS]

@@ -1,0 +1,21 @@
+# Motion: the table of motion models of one chunk, one row a model, every parameter drawn from its own stream.
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's group
+# OUTPUTS: results/{run}/motion/{group}-{part}.csv
+
+
+rule motion:
+    input:
+        code=code("lowalt.motion"),
+        clouds=group_clouds,
+    output:
+        "results/{run}/motion/{group}-{part}.csv",
+    params:
+        settings=motion_settings,
+        span=motion_span,
+    log:
+        "results/{run}/logs/motion/{group}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/motion/{group}-{part}.jsonl"
+    shell:
+        "python -m lowalt.motion --settings {params.settings:q} --clouds {input.clouds:q}"
+        " --group {wildcards.group} {params.span} --out {output:q} 2> {log:q}"

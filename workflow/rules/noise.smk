@@ -1,0 +1,21 @@
+# Noise: complex white Gaussian noise at every SNR of the set, independent from station to station and SNR to SNR.
+# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/echo/{group}-{part}/*.npy
+# OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
+
+
+rule noise:
+    input:
+        code=code("lowalt.noise"),
+        motion="results/{run}/motion/{group}-{part}.csv",
+        echoes=chunk_echoes,
+    output:
+        "results/{run}/noisy/{group}-{part}.npy",
+    params:
+        settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
+    log:
+        "results/{run}/logs/noise/{group}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/noise/{group}-{part}.jsonl"
+    shell:
+        "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
+        " --echoes {input.echoes:q} --out {output:q} 2> {log:q}"

@@ -1,0 +1,35 @@
+# Targets: one calibration point cloud a subtype, from a built-in model, a mesh or a recording.
+# REQUIRED INPUTS: config/targets.csv and the record files; the user's files where a record names one.
+# OUTPUTS: results/{run}/clouds/{subtype}.npz, results/{run}/clouds.png
+
+
+rule cloud:
+    input:
+        code=code("lowalt.targets"),
+        files=record_files,
+    output:
+        "results/{run}/clouds/{subtype}.npz",
+    params:
+        settings=cloud_settings,
+    log:
+        "results/{run}/logs/cloud/{subtype}.log",
+    benchmark:
+        "results/{run}/benchmarks/cloud/{subtype}.jsonl"
+    resources:
+        mem_mb=2000,
+    shell:
+        "python -m lowalt.targets --settings {params.settings:q} --out {output:q} 2> {log:q}"
+
+
+rule gallery:
+    input:
+        code=code("lowalt.targets.gallery"),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+    output:
+        "results/{run}/clouds.png",
+    log:
+        "results/{run}/logs/gallery.log",
+    benchmark:
+        "results/{run}/benchmarks/gallery.jsonl"
+    shell:
+        "python -m lowalt.targets.gallery --clouds {input.clouds:q} --out {output:q} 2> {log:q}"
