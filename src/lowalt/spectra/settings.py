@@ -1,0 +1,107 @@
+"""The settings of the three spectra: windows, hops, FFT points and the grid of matched speeds."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lowalt.command import pick
+from lowalt.errors import InputError
+
+
+def _whole(where: str, value: object, least: int) -> int:
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise InputError(f"{where} is {value!r}, expected an integer >= {least}")
+    return int(value)
+
+
+def _power_of_two(where: str, value: object, least: int) -> int:
+    number = _whole(where, value, least)
+    # The sliding transform doubles its window and its points level by level.
+    if number & (number - 1):
+        raise InputError(f"{where} is {number}, expected a power of two")
+    return number
+
+
+@dataclass(frozen=True)
+class Fourier:
+    """One short-time Fourier transform: `window` and `hop` in symbols, `points` of the zero-padded FFT."""
+
+    window: int
+    hop: int
+    points: int
+
+    def __post_init__(self) -> None:
+        _power_of_two("spectra: window", self.window, 2)
+        _whole("spectra: hop", self.hop, 1)
+        _power_of_two("spectra: points", self.points, self.window)
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """The velocity-transfer spectrum: `window` and `hop` in symbols, the grid of matched speeds in m/s."""
+
+    window: int
+    hop: int
+    speed_min_mps: float
+    speed_max_mps: float
+    speed_step_mps: float
+
+    def __post_init__(self) -> None:
+        _whole("spectra.vt.window", self.window, 1)
+        _whole("spectra.vt.hop", self.hop, 1)
+        values = (self.speed_min_mps, self.speed_max_mps, self.speed_step_mps)
+        for name, value in zip(("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True):
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+                raise InputError(f"spectra.vt.{name} is {value!r}, expected a finite speed in m/s")
+        if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
+            raise InputError(f"spectra.vt: speeds {values}, expected min < max and a positive step")
+
+    @property
+    def speeds_mps(self) -> np.ndarray:
+        """Matched speeds v_min : step : v_max (m/s), shape (speeds,), ascending; positive recedes."""
+        count = int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9)) + 1
+        last = self.speed_min_mps + (count - 1) * self.speed_step_mps
+        return np.linspace(self.speed_min_mps, last, count)
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """The three spectra of a sample: velocity-resolution preferred, time-resolution preferred, velocity transfer."""
+
+    vrp: Fourier = Fourier(256, 1, 256)
+    trp: Fourier = Fourier(8, 1, 1024)
+    vt: Transfer = Transfer(8, 1, -6.1, 6.1, 0.1)
+
+    @classmethod
+    def from_settings(cls, block: dict) -> "Spectra":
+        """Build from the configuration's `spectra` block: {vrp: {window, hop, points}, trp: ..., vt: ...}.
+
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        vrp, trp, vt = pick(block, "vrp", "trp", "vt")
+        fourier = [Fourier(*pick(part, "window", "hop", "points")) for part in (vrp, trp)]
+        speeds = ("speed_min_mps", "speed_max_mps", "speed_step_mps")
+        return cls(*fourier, Transfer(*pick(vt, "window", "hop", *speeds)))
+
+    def check(self, symbols: int) -> None:
+        """Refuse signals too short for a window.
+
+        Raises: InputError naming the spectrum whose window is no shorter than the signal.
+        """
+        for name in ("vrp", "trp", "vt"):
+            windows(symbols, getattr(self, name).window, getattr(self, name).hop, name)
+
+
+def windows(symbols: int, window: int, hop: int, name: str) -> int:
+    """Return the number of windows, floor((N - L) / hop): one fewer than the usual count, as published.
+
+    Raises: InputError naming the spectrum where the signal is no longer than the window.
+    Source: paper, section IV-B (G), and IV-E (G_transfer).
+    """
+    count = (symbols - window) // hop
+    if count < 1:
+        raise InputError(
+            f"spectrum {name}: a signal of {symbols} symbols with a window of {window} and a hop of {hop} has "
+            f"no window, expected at least {window + hop} symbols"
+        )
+    return count

@@ -1,0 +1,91 @@
+"""From an amplitude to one of 256 index values: the scale as a list of thresholds, and tables to look them up fast.
+
+With x = value / the image's own largest |value|, and y = f(x) in [0, 1],
+    linear   y = x          decibel   y = max(0, 1 + 20 log10(x) / floor_db)          power   y = x^gamma,
+a spectrum of magnitudes takes the index floor(255 y + 1/2), a signed one 128 +- floor(127 y + 1/2), exactly
+symmetric about 128. All f rise, so an index is the number of thresholds that x reaches; thresholds are computed
+once in float64, and comparing is exact: no logarithm is taken of a pixel, and none of zero.
+An image without any value but zero gets 0 (128 where signed).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lowalt.errors import InputError
+
+SCALES = ("linear", "decibel", "power")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """An amplitude scale: `name` of SCALES, `floor_db` > 0 (decibel only), `gamma` > 0 (power only)."""
+
+    name: str = "decibel"
+    floor_db: float = 40.0
+    gamma: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.name not in SCALES:
+            raise InputError(f"images.scale is {self.name!r}, expected one of {SCALES}")
+        for key, value, low, high in (("floor_db", self.floor_db, 1, 140), ("gamma", self.gamma, 0.2, 2)):
+            good = isinstance(value, (int, float)) and not isinstance(value, bool) and low <= value <= high
+            if not good:
+                raise InputError(f"images.{key} is {value!r}, expected a number from {low} to {high}")
+
+    def thresholds(self, levels: int) -> np.ndarray:
+        """Return the x at which the index rises to 1 .. levels, shape (levels,), float64, ascending, in (0, 1)."""
+        y = (np.arange(1, levels + 1) - 0.5) / levels
+        if self.name == "decibel":
+            return 10 ** (self.floor_db * (y - 1) / 20)
+        return y if self.name == "linear" else y ** (1 / self.gamma)
+
+
+def index(values: np.ndarray, scale: Scale, signed: bool) -> np.ndarray:
+    """Return index images of value images, each scaled by its own largest |value|: (..., H, W) -> uint8.
+
+    values: float32 or float64, magnitudes >= 0 or, where `signed`, of both signs.
+    Raises: InputError where a value is not finite.
+    """
+    values = np.asarray(values)
+    if not np.isfinite(values).all():
+        raise InputError("images: a spectrum has a NaN or infinite value")
+    largest = np.abs(values).max(axis=(-2, -1), keepdims=True)
+    x = np.abs(values) / np.where(largest > 0, largest, 1)
+    steps = np.searchsorted(scale.thresholds(127 if signed else 255).astype(values.dtype), x, side="right")
+    return np.where(values < 0, 128 - steps, 128 + steps).astype(np.uint8) if signed else steps.astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class Lookup:
+    """Tables that give a float32 x in [0, 1] its step by one comparison.
+
+    A key is the leading bits of x above `lowest`; `base[key]` counts the thresholds below the key's interval and
+    `cut[key]` is the one inside it (2 where there is none).
+    """
+
+    lowest: int
+    shift: int
+    base: np.ndarray
+    cut: np.ndarray
+
+
+def lookup(scale: Scale, levels: int) -> Lookup:
+    """Return the tables of a scale with `levels` thresholds, rounded to float32.
+
+    The mantissa bits of a key are as many as keep two thresholds out of one interval.
+    """
+    thresholds = scale.thresholds(levels).astype(np.float32)
+    bits = thresholds.view(np.int32)
+    top = int(np.float32(1).view(np.int32))
+    lowest = int(np.float32(2.0 ** np.floor(np.log2(thresholds[0]))).view(np.int32))
+    for mantissa in range(6, 24):
+        shift = 23 - mantissa
+        keys = (bits - lowest) >> shift
+        if len(np.unique(keys)) == levels:
+            break
+    count = ((top - lowest) >> shift) + 1
+    base = np.searchsorted(keys, np.arange(count), side="left").astype(np.int32)
+    cut = np.full(count, 2, np.float32)
+    cut[keys] = thresholds
+    return Lookup(lowest, shift, base, cut)
