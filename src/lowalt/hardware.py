@@ -1,0 +1,34 @@
+"""The machine in words, for every measured figure: processor, cores, memory, and an accelerator where there is one."""
+
+import os
+import platform
+import shutil
+import subprocess
+from pathlib import Path
+
+
+def _processor() -> str:
+    try:
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.partition(":")[2].split())
+    except OSError:
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _accelerator() -> str:
+    """First NVIDIA GPU's name by its driver's own tool, without importing a framework."""
+    tool = shutil.which("nvidia-smi")
+    if not tool:
+        return "no GPU"
+    query = subprocess.run([tool, "--query-gpu=name", "--format=csv,noheader"], capture_output=True, text=True)
+    names = query.stdout.split("\n") if query.returncode == 0 else []
+    return names[0].strip() if names and names[0].strip() else "no GPU"
+
+
+def describe() -> str:
+    """Return one line without commas (it stands in CSV cells), such as "Intel Xeon; 2 cores; 24 GiB; no GPU"."""
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return f"{_processor()}; {cores} cores; {memory:.0f} GiB; {_accelerator()}".replace(",", " ")
