@@ -37,9 +37,7 @@ def sample_surface(
     running = np.cumsum(areas)
     total = running[-1] if len(running) else 0.0
     if not (np.isfinite(total) and total > 0):
-        raise InputError(
-            f"surface of {len(areas)} triangles has area {total}, expected a positive finite one"
-        )
+        raise InputError(f"surface of {len(areas)} triangles has area {total}, expected a positive finite one")
     where = (np.arange(count) + rng.random(count)) / count * total
     # side="right" passes over degenerate faces; the clip guards the last slice against rounding at its end.
     face = np.searchsorted(running, where, side="right").clip(max=np.flatnonzero(areas)[-1])
@@ -49,9 +47,7 @@ def sample_surface(
     return points, normals[face]
 
 
-def thin(
-    points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()
-) -> np.ndarray:
+def thin(points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()) -> np.ndarray:
     """Return the indices (count,) of `count` points spread as evenly as can be, in the order they were chosen.
 
     Farthest-point sampling: each next point is the one farthest from all chosen so far (lowest index on a tie),
@@ -69,10 +65,8 @@ def thin(
     chosen = np.empty(count, np.int64)
     first = int(rng.integers(len(points)))
     for step in range(count):
-        if step < len(keep):
-            index = keep[step]
-        else:
-            index = first if step == 0 else int(np.argmax(nearest))
+        farthest = int(np.argmax(nearest)) if step else first
+        index = keep[step] if step < len(keep) else farthest
         chosen[step] = index
         away = (columns[0] - columns[0, index]) ** 2
         for column in columns[1:]:

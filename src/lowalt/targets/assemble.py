@@ -1,0 +1,141 @@
+"""From a model's parts, each a set of closed shells, to a calibration point cloud of an exact count of points.
+
+Allotment of points over parts (the rule, also in the cloud's record):
+the moving parts of a model share `moving_share` of the points between them, by their weights, each rounded to
+whole copies (at least one point a copy); the body gets the rest. Parts with several copies (the blades of a rotor)
+are sampled once and turned, so that blades are equal. Echo strength goes with the count of points, so the share is
+also the part of the echo that carries micro-Doppler.
+"""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.targets.cloud import Cloud
+from lowalt.targets.sampling import sample_surface, thin
+from lowalt.targets.surfaces import Surface, inside, merged
+
+CANDIDATES_PER_POINT = 12
+"""Dense samples drawn for each wanted point before the farthest-point thinning."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One part of a model: closed shells in body axes (m), and how the part moves.
+
+    `copies` > 1: the shells are one of that many equal copies about the hinge's axis. `cuts` are volumes the part's
+    surface is cut away in (wheel wells). `weight` is its share among the moving parts.
+    """
+
+    name: str
+    kind: str
+    shells: tuple[Surface, ...]
+    hinge: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+    axis: tuple[float, float, float] = (np.nan, np.nan, np.nan)
+    parent: int = -1
+    copies: int = 1
+    weight: float = 1.0
+    cuts: tuple[Surface, ...] = ()
+
+
+def allot(parts: list[Part], count: int, moving_share: float) -> list[int]:
+    """Return the number of points of each part, whole copies each, `count` in total; the rule is the module's.
+
+    Raises: InputError where `count` leaves the body without a point.
+    """
+    weights = np.array([0.0 if part.kind == "body" else part.weight for part in parts])
+    wanted = count * moving_share * weights / max(weights.sum(), 1e-300)
+    counts = [part.copies * max(1, round(want / part.copies)) for part, want in zip(parts, wanted, strict=True)]
+    bodies = [index for index, part in enumerate(parts) if part.kind == "body"]
+    counts[bodies[0]] = count - sum(value for index, value in enumerate(counts) if index != bodies[0])
+    if counts[bodies[0]] < 1:
+        raise InputError(f"{count} points for {len(parts)} parts leave none for the body, expected more points")
+    return counts
+
+
+def _vertex_normals(surface: Surface) -> np.ndarray:
+    """Area-weighted unit normals of the vertices (V, 3)."""
+    a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+    cross = np.cross(b - a, c - a)
+    total = np.zeros_like(surface.vertices)
+    for corner in range(3):
+        np.add.at(total, surface.faces[:, corner], cross)
+    return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+
+def _exposed(points: np.ndarray, owner: np.ndarray, part: Part) -> np.ndarray:
+    """Whether each point (L, 3) of the shell `owner` (L,) is outside every other shell and every cut."""
+    hidden = np.zeros(len(points), bool)
+    for index, shell in enumerate(part.shells):
+        other = owner != index
+        hidden[other] |= inside(shell, points[other])
+    for cut in part.cuts:
+        hidden |= inside(cut, points)
+    return ~hidden
+
+
+def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Return `count` points (count, 3) on the part's outer skin and their unit normals (count, 3).
+
+    The outermost vertices along each axis are kept first, so that a cloud is as large as its model.
+    """
+    whole = merged(part.shells)
+    points, normals = sample_surface(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
+    owner_of_face = np.repeat(np.arange(len(part.shells)), [len(shell.faces) for shell in part.shells])
+    # The sampler walks the faces in order, so running areas give back the shell of each sample.
+    a, b, c = np.moveaxis(whole.vertices[whole.faces], 1, 0)
+    running = np.cumsum(np.bincount(owner_of_face, np.linalg.norm(np.cross(b - a, c - a), axis=1)))
+    slices = (np.arange(len(points)) + 0.5) / len(points) * running[-1]
+    owner = np.searchsorted(running, slices).clip(max=len(part.shells) - 1)
+    tips = np.unique(np.concatenate([whole.vertices.argmin(0), whole.vertices.argmax(0)]))
+    owner_of_vertex = np.repeat(np.arange(len(part.shells)), [len(shell.vertices) for shell in part.shells])
+    points = np.concatenate([whole.vertices[tips], points])
+    normals = np.concatenate([_vertex_normals(whole)[tips], normals])
+    seen = _exposed(points, np.concatenate([owner_of_vertex[tips], owner]), part)
+    points, normals, kept = points[seen], normals[seen], int(seen[: len(tips)].sum())
+    chosen = thin(points, count, rng, keep=range(min(kept, count)))
+    return points[chosen], normals[chosen]
+
+
+def turn(axis: np.ndarray, angle: float) -> np.ndarray:
+    """Return the rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (3,), Rodrigues' formula."""
+    x, y, z = axis
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def assemble(parts: list[Part], record: dict, moving_share: float, rng: np.random.Generator) -> Cloud:
+    """Return the cloud of `parts` with record["points"] points and record["rcs_m2_per_point"] each.
+
+    Raises: InputError where there are too few points for the parts.
+    """
+    counts = allot(parts, record["points"], moving_share)
+    points, normals, owner = [], [], []
+    for index, (part, count) in enumerate(zip(parts, counts, strict=True)):
+        one, facing = sample_part(part, count // part.copies, rng)
+        for copy in range(part.copies):
+            matrix = np.eye(3) if copy == 0 else turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
+            centre = np.zeros(3) if copy == 0 else np.array(part.hinge)
+            points.append((one - centre) @ matrix.T + centre)
+            normals.append(facing @ matrix.T)
+        owner.append(np.full(count, index))
+    points = np.concatenate(points)
+    record = record | {
+        "moving_share": moving_share,
+        "points_by_part": {part.name: count for part, count in zip(parts, counts, strict=True)},
+        "extent_m": [float(value) for value in np.ptp(points, axis=0)],
+    }
+    return Cloud(
+        points=points,
+        normals=np.concatenate(normals),
+        part=np.concatenate(owner),
+        kinds=tuple(part.kind for part in parts),
+        names=tuple(part.name for part in parts),
+        parents=np.array([part.parent for part in parts], np.int64),
+        hinges=np.array([part.hinge for part in parts], float),
+        axes=np.array([part.axis for part in parts], float),
+        rcs_m2=np.full(len(points), float(record["rcs_m2_per_point"])),
+        record=json.loads(json.dumps(record)),
+    )

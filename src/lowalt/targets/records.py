@@ -1,0 +1,169 @@
+"""Records: what each subtype is made from, read from the table of published values and from record files.
+
+A record file is YAML, one record a published name. Later files replace earlier ones, whole records at a time. What
+only one source understands (a mesh's unit, a recording's trim) is checked by that source's own `check_record`.
+"""
+
+import csv
+import math
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import yaml
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+from lowalt.targets.cloud import CATEGORIES
+
+SOURCES = ("builtin", "mesh", "mocap", "gait")
+COMMON_KEYS = ("source", "points", "rcs_m2_per_point")
+"""Keys every record may have; `source` it must have. Each source adds its own."""
+
+_WORDS = ("category", "name", "unseen_protocol")
+_WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
+_NUMBERS = (
+    "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
+    "wheel_diam_m", "speed_lo", "speed_hi",
+)  # fmt: skip
+
+
+def slug(name: str) -> str:
+    """Return a subtype's file name: lower case, each run of other characters than letters and digits one `-`."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+def load_table(path: str | Path) -> dict[str, dict]:
+    """Return the published table by name, in its order: metres, hertz and m/s as numbers, empty cells as None.
+
+    Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive number.
+    """
+    with existing(path, "table of published targets").open(newline="") as file:
+        reader = csv.DictReader(file)
+        columns, rows = reader.fieldnames or [], list(reader)
+    expected = {*_WORDS, *_WHOLE, *_NUMBERS}
+    if set(columns) != expected:
+        raise InputError(f"{path}: columns {sorted(set(columns) ^ expected)} missing or unknown")
+    table = {}
+    for row in rows:
+        name, where = row["name"], f"{path}: {row['name']}"
+        if name in table:
+            raise InputError(f"{where}: named twice, expected one row a subtype")
+        if row["category"] not in CATEGORIES or row["unseen_protocol"] not in ("seen", "unseen"):
+            raise InputError(f"{where}: category {row['category']!r}, unseen_protocol {row['unseen_protocol']!r}, "
+                             f"expected one of {CATEGORIES} and seen or unseen")  # fmt: skip
+        table[name] = {column: _cell(where, column, row[column]) for column in columns}
+    return table
+
+
+def _cell(where: str, column: str, text: str) -> str | int | float | None:
+    if column in _WORDS:
+        return text
+    if text == "":
+        return None
+    try:
+        value = int(text) if column in _WHOLE else float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(f"{where}: {column} is {text!r}, expected a positive number")
+    return value
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML's safe loader that refuses a key given twice instead of keeping the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if key in seen:
+                raise InputError(
+                    f"{node.start_mark.name}: {key!r} is named twice (line {key_node.start_mark.line + 1})"
+                )
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def read_records(path: str | Path) -> dict[str, dict]:
+    """Return the records of one file by subtype, as written.
+
+    Raises: InputError where the file is no mapping of names to records, or names a subtype or a key twice.
+    """
+    with existing(path, "record file").open() as file:
+        try:
+            records = yaml.load(file, _Loader)
+        except yaml.YAMLError as error:
+            raise InputError(f"{path}: not YAML ({error})") from error
+    if not isinstance(records, dict) or not all(isinstance(record, dict) for record in records.values()):
+        raise InputError(f"{path}: expected a mapping of subtypes' names to their records")
+    return records
+
+
+def load_records(table_path: str | Path, record_paths: list[str | Path]) -> dict[str, dict]:
+    """Return every subtype's merged and checked record, in the table's order.
+
+    A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen), `published` (the
+    table's row), and the defaults of `points` (the published count) and `rcs_m2_per_point` (1 m2).
+    Raises: InputError naming file, subtype, key, value and what was expected: a subtype the table lacks or a file
+    names twice, an unknown key, a value out of range, a subtype that no file has a record of.
+    """
+    table = load_table(table_path)
+    chosen: dict[str, tuple[str, dict]] = {}
+    for path in record_paths:
+        for name, record in read_records(path).items():
+            if name not in table:
+                raise InputError(f"{path}: unknown subtype {name!r}, expected one of {list(table)}")
+            chosen[name] = (f"{path}: {name}", record)
+    missing = [name for name in table if name not in chosen]
+    if missing:
+        raise InputError(f"no record for {missing} in {[str(path) for path in record_paths]}, expected one each")
+    return {name: merge(row, chosen[name][1], chosen[name][0]) for name, row in table.items()}
+
+
+def merge(row: dict, record: dict, where: str) -> dict:
+    """Return one record merged with its row of the published table and checked.
+
+    Raises: InputError naming `where`, the key, the value and what was expected.
+    """
+    source = record.get("source")
+    if source not in SOURCES:
+        raise InputError(f"{where}: source is {source!r}, expected one of {SOURCES}")
+    merged = {"rcs_m2_per_point": 1.0, "points": row["points_in_published_cloud_approx"], **record}
+    merged |= {
+        "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
+    }  # fmt: skip
+    points, rcs = merged["points"], merged["rcs_m2_per_point"]
+    if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+        raise InputError(f"{where}: points is {points!r}, expected a positive whole number")
+    if isinstance(rcs, bool) or not isinstance(rcs, (int, float)) or not (math.isfinite(rcs) and rcs >= 0):
+        raise InputError(f"{where}: rcs_m2_per_point is {rcs!r}, expected square metres >= 0")
+    extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}
+    return _source(source).check_record(merged, extra, where)
+
+
+def _source(name: str) -> ModuleType:
+    """The module of a source; each has `check_record(merged, extra, where)` and `record_files(record)`."""
+    return import_module(f"lowalt.targets.{name}")
+
+
+def source_files(record: dict, inputs: str | Path | None) -> list[str]:
+    """Return the paths of the user's files that a merged record names, inside the folder `inputs`.
+
+    Raises: InputError where the record names files and there is no folder.
+    """
+    names = _source(record["source"]).record_files(record)
+    if names and inputs is None:
+        raise InputError(f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs")
+    return [str(Path(inputs) / name) for name in names]
+
+
+def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[str]:
+    """Return one line for each file that a record names and the folder `inputs` lacks: subtype, source and path."""
+    lines = []
+    for name, record in records.items():
+        for file in _source(record["source"]).record_files(record):
+            if inputs is None or not (Path(inputs) / file).is_file():
+                lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'})")
+    return lines

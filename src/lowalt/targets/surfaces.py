@@ -1,0 +1,192 @@
+"""Closed triangle surfaces from parametric primitives, and what can be asked of one.
+
+Geometry only: nothing here knows a target, a part or a record. Every primitive is one closed shell with outward
+normals (right-hand rule), in the caller's unit. Built-in models place several overlapping shells side by side.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A triangle surface: `vertices` (V, 3) and `faces` (F, 3), indices in right-hand order seen from outside."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+
+    def moved(self, offset: Iterable[float]) -> "Surface":
+        """Return the surface shifted by `offset` (3,)."""
+        return Surface(self.vertices + np.asarray(offset, float), self.faces)
+
+    def mapped(self, matrix: np.ndarray) -> "Surface":
+        """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals stay outward."""
+        matrix = np.asarray(matrix, float)
+        faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
+        return Surface(self.vertices @ matrix.T, faces)
+
+
+def volume(surface: Surface) -> float:
+    """Return the enclosed volume, positive where the normals point outward (divergence theorem)."""
+    a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def merged(surfaces: Iterable[Surface]) -> Surface:
+    """Return several surfaces as one list of triangles."""
+    surfaces = list(surfaces)
+    starts = np.cumsum([0] + [len(s.vertices) for s in surfaces[:-1]])
+    faces = [s.faces + start for s, start in zip(surfaces, starts, strict=True)]
+    return Surface(np.concatenate([s.vertices for s in surfaces]), np.concatenate(faces))
+
+
+def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
+    """Return for each point (L, 3) whether it lies inside the closed surface, shape (L,) bool.
+
+    Source: solid angle of a triangle, Van Oosterom & Strackee 1983; the winding number is their sum over 4 pi.
+    """
+    result = np.zeros(len(points), bool)
+    low, high = surface.vertices.min(0), surface.vertices.max(0)
+    near = np.flatnonzero(((points > low) & (points < high)).all(1))
+    corners = surface.vertices[surface.faces]
+    # Blocks bound the memory of the points-by-triangles arrays.
+    for block in np.array_split(near, len(near) * len(corners) // 500_000 + 1):
+        a, b, c = np.moveaxis(corners[None] - points[block, None, None], 2, 0)
+        la, lb, lc = (np.sqrt(np.einsum("...i,...i->...", v, v)) for v in (a, b, c))
+        numerator = np.einsum("...i,...i->...", a, np.cross(b, c))
+        ab, bc, ca = (np.einsum("...i,...i->...", v, w) for v, w in ((a, b), (b, c), (c, a)))
+        angle = 2 * np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
+        result[block] = angle.sum(1) > 2 * np.pi
+    return result
+
+
+def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
+    """Return the closed skin over a row of sections (K, S, 3), each a loop of S points in the same sense.
+
+    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. Whichever way the
+    loops run, the normals come out outward.
+    """
+    sections = np.asarray(sections, float)
+    rows, sides, _ = sections.shape
+    tips = sections[[0, -1]].mean(1) if tips is None else np.asarray(tips, float)
+    grid = np.arange(rows * sides).reshape(rows, sides)
+    a, b = grid[:-1], np.roll(grid[:-1], -1, 1)
+    c, d = np.roll(grid[1:], -1, 1), grid[1:]
+    first, last = rows * sides, rows * sides + 1
+    faces = [
+        np.stack([a, b, c], -1).reshape(-1, 3),
+        np.stack([a, c, d], -1).reshape(-1, 3),
+        np.stack([np.full(sides, first), np.roll(grid[0], -1), grid[0]], -1),
+        np.stack([np.full(sides, last), grid[-1], np.roll(grid[-1], -1)], -1),
+    ]
+    surface = Surface(np.concatenate([sections.reshape(-1, 3), tips]), np.concatenate(faces))
+    return surface if volume(surface) > 0 else Surface(surface.vertices, surface.faces[:, ::-1])
+
+
+def superellipse(half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24) -> np.ndarray:
+    """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2): n = 2 an ellipse, larger n a rounded rectangle."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    c, s = np.cos(angle), np.sin(angle)
+    power = 2 / exponent
+    return np.stack([half_a * np.sign(c) * abs(c) ** power, half_b * np.sign(s) * abs(s) ** power], 1)
+
+
+def ellipsoid(radii: Iterable[float], centre: Iterable[float] = (0, 0, 0), sides: int = 16) -> Surface:
+    """Return an ellipsoid with the half axes `radii` (3,) about `centre` (3,)."""
+    polar = np.pi * np.arange(1, sides // 2) / (sides // 2)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([np.cos(turn), np.sin(turn)], 1)
+    rings = np.concatenate(
+        [np.sin(polar)[:, None, None] * ring, np.broadcast_to(np.cos(polar)[:, None, None], (len(polar), sides, 1))], 2
+    )
+    unit = loft(rings, tips=[[0, 0, 1], [0, 0, -1]])
+    return unit.mapped(np.diag(np.asarray(radii, float))).moved(centre)
+
+
+def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surface:
+    """Return a round tube along `path` (K, 3) with a radius at each of its points, closed by flat ends."""
+    path = np.asarray(path, float)
+    radii = np.broadcast_to(np.asarray(radii, float), len(path))
+    tangents = np.gradient(path, axis=0)
+    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    # One reference direction for all sections, the one least along the path, keeps the loops from twisting.
+    reference = np.eye(3)[np.argmin(abs(tangents).max(0))]
+    first = np.cross(tangents, reference)
+    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    second = np.cross(tangents, first)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    rings = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
+    return loft(path[:, None] + radii[:, None, None] * rings)
+
+
+def cylinder(radius: float, bottom: Iterable[float], top: Iterable[float], sides: int = 16) -> Surface:
+    """Return a cylinder between the centres of its two ends (3,)."""
+    return tube(np.array([bottom, top], float), radius, sides)
+
+
+def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow: float = 0.0) -> Surface:
+    """Return a body along y from stations (y, half_width, z_low, z_high): superellipse sections, closed ends.
+
+    `bow` shifts both tips outward along y by that length, which rounds the ends.
+    """
+    table = np.array(list(stations), float)
+    sections = []
+    for y, half_width, low, high in table:
+        loop = superellipse(half_width, (high - low) / 2, exponent, sides)
+        sections.append(np.stack([loop[:, 0], np.full(sides, y), loop[:, 1] + (low + high) / 2], 1))
+    sections = np.array(sections)
+    tips = sections[[0, -1]].mean(1)
+    tips[:, 1] += bow * np.array([-1, 1]) * np.sign(table[-1, 0] - table[0, 0])
+    return loft(sections, tips)
+
+
+def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0) -> Surface:
+    """Return a box of full edge lengths `size` (x, y, z) with its edges along y rounded by the exponent."""
+    x, y, z = (float(value) / 2 for value in size)
+    return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
+
+
+def ring(profile: np.ndarray, sides: int = 32) -> Surface:
+    """Return a closed profile (S, 2) of (radius, height) turned about the z axis: a tyre, a duct, a torus."""
+    profile = np.asarray(profile, float)
+    turn = 2 * np.pi * np.arange(sides) / sides
+    x = np.cos(turn)[:, None] * profile[:, 0]
+    y = np.sin(turn)[:, None] * profile[:, 0]
+    vertices = np.stack([x, y, np.broadcast_to(profile[:, 1], x.shape)], -1)
+    grid = np.arange(x.size).reshape(x.shape)
+    right, up = np.roll(grid, -1, 0), np.roll(grid, -1, 1)
+    both = np.roll(right, -1, 1)
+    faces = np.concatenate([np.stack([grid, right, both], -1), np.stack([grid, both, up], -1)]).reshape(-1, 3)
+    surface = Surface(vertices.reshape(-1, 3), faces)
+    return surface if volume(surface) > 0 else Surface(surface.vertices, faces[:, ::-1])
+
+
+def airfoil(chord: float, thickness: float, sides: int = 12) -> np.ndarray:
+    """Return a symmetric section (sides, 2) of (along chord, across), leading edge at +chord/4, as a loop.
+
+    `thickness` is the largest thickness over the chord.
+    Source: NACA four-digit thickness distribution with closed trailing edge, Abbott & von Doenhoff 1959.
+    """
+    half = sides // 2
+    x = (1 - np.cos(np.pi * np.arange(half + 1) / half)) / 2
+    y = 5 * thickness * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4)
+    upper, lower = np.stack([x, y], 1), np.stack([x, -y], 1)[-2:0:-1]
+    loop = np.concatenate([upper, lower]) * chord
+    return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
+
+
+def foil(stations: Iterable[tuple], thickness: float = 0.12, sides: int = 12) -> Surface:
+    """Return a wing or blade along +x from stations (x, y, z, chord, twist): airfoil sections, closed ends.
+
+    (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive twist (rad) raises
+    the leading edge.
+    """
+    sections = []
+    for x, y, z, chord, twist in stations:
+        loop = airfoil(chord, thickness, sides)
+        c, s = np.cos(twist), np.sin(twist)
+        along, across = loop[:, 0] * c - loop[:, 1] * s, loop[:, 0] * s + loop[:, 1] * c
+        sections.append(np.stack([np.full(sides, float(x)), y + along, z + across], 1))
+    return loft(np.array(sections))

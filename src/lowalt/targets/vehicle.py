@@ -1,0 +1,113 @@
+"""Built-in car models: a lower body and a greenhouse after the car's profile, and four turning wheels.
+
+Axes: front +y, right +x, up +z, metres; the origin lies in the middle of length, width and height, so that it stands
+half the height above the ground.
+"""
+
+import numpy as np
+
+from lowalt.targets.assemble import Part
+from lowalt.targets.surfaces import Surface, cylinder, hull, loft, ring, superellipse
+
+FIGURES = {
+    "car": {
+        "wheel_base": "length", "track": "length", "tyre_width": "length", "rolling_diameter": "length",
+        "front_overhang": "length", "ground_clearance": "length", "hood_height": "ratio", "belt_height": "ratio",
+        "deck_height": "ratio", "windshield_base": "ratio", "roof_front": "ratio", "roof_rear": "ratio",
+        "rear_glass_base": "ratio", "roof_width": "ratio",
+    }
+}  # fmt: skip
+"""Figures of a car. Heights are ratios to its height, stations along the car ratios to its length from the front
+bumper, `roof_width` to its width. Length, width and height are the published ones. `rolling_diameter` is the tyre's,
+used where the record says `wheel_size: rolling`; by default the wheel has the published (rim) diameter."""
+
+SPOKES = 5
+MOVING_SHARE = 0.35
+
+
+def _lower(length: float, width: float, height: float, f: dict) -> Surface:
+    """The body up to hood, belt and deck, as rounded sections along the car."""
+    floor, bottom = -height / 2 + f["ground_clearance"], -height / 2
+    hood, belt, deck = (bottom + f[name] * height for name in ("hood_height", "belt_height", "deck_height"))
+    nose = floor + 0.55 * (hood - floor)
+    tail = floor + 0.35 * (deck - floor)
+    half = width / 2
+    lift = 0.06 * height
+    rows = [
+        (0.0, 0.72, floor + lift, nose), (0.02, 0.86, floor + 0.5 * lift, 0.3 * nose + 0.7 * hood),
+        (0.08, 0.96, floor, hood), (0.18, 1.0, floor, hood + 0.25 * (belt - hood)), (f["windshield_base"], 1.0, floor, belt),
+        (f["rear_glass_base"], 1.0, floor, max(belt, deck)), (0.97, 0.93, floor + 0.5 * lift, deck),
+        (1.0, 0.82, floor + lift, max(tail, deck - 0.12 * height)),
+    ]  # fmt: skip
+    rows = sorted({round(row[0], 9): row for row in rows}.values())
+    return hull([(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows], exponent=4.5, sides=32)
+
+
+def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
+    """The cabin above the belt: rounded plan rings from the belt up to the roof."""
+    bottom = -height / 2
+    belt = bottom + (min(f["belt_height"], f["deck_height"]) - 0.1) * height
+    base = length * (0.5 - np.array([f["windshield_base"], f["rear_glass_base"]]))
+    roof = length * (0.5 - np.array([f["roof_front"], f["roof_rear"]]))
+    rings = []
+    for up, shrink in ((0.0, 1.0), (0.5, 1.0), (0.85, 1.0), (0.96, 0.97), (1.0, 0.88)):
+        ends = base + up * (roof - base)
+        middle, half_length = ends.mean(), abs(np.ptp(ends)) / 2 * shrink
+        half_width = width / 2 * (0.96 + up * (f["roof_width"] - 0.96)) * shrink
+        loop = superellipse(half_width, half_length, 4.0, 32)
+        z = belt + up * (height / 2 - belt)
+        rings.append(np.stack([loop[:, 0], loop[:, 1] + middle, np.full(32, z)], 1))
+    return loft(np.array(rings))
+
+
+def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
+    """Return a wheel about the x axis at the origin: tyre, hub and spokes, closed shells; it touches -diameter/2."""
+    radius, half = diameter / 2, tyre_width / 2
+    inner = 0.62 * radius
+    loop = superellipse((radius - inner) / 2, half, 3.5, 16) + np.array([(radius + inner) / 2, 0])
+    # The ring turns about z; carried over to x with a section vertex straight down.
+    to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    shells = [ring(loop, 32).mapped(to_x), cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0))]
+    for k in range(SPOKES):
+        angle = 2 * np.pi * k / SPOKES
+        out = np.array([0, np.cos(angle), np.sin(angle)])
+        across = np.array([0, -np.sin(angle), np.cos(angle)])
+        side = np.array([1.0, 0, 0])
+        section = superellipse(0.12 * radius, 0.2 * half, 4.0, 8)
+        rows = [out * r + 0.35 * half * side + section[:, :1] * across + section[:, 1:] * side
+                for r in (0.1 * radius, 1.04 * inner)]  # fmt: skip
+        shells.append(loft(np.array(rows)))
+    return tuple(shells)
+
+
+def parts(record: dict) -> tuple[list[Part], dict]:
+    """Return the parts of the car a merged record describes, and the facts its cloud's record adds.
+
+    Added: `wheel_diameter_m` (the one that sets the wheels' rate) and `origin_height_m`, the height of the origin
+    above the ground at which the wheels touch it.
+    """
+    f = {name: value["si"] for name, value in record["figures"].items()}
+    table = record["published"]
+    length, width, height = table["len_m"], table["wid_m"], table["hgt_m"]
+    rolling = record.get("wheel_size", "published") == "rolling"
+    diameter = f["rolling_diameter"] if rolling else table["wheel_diam_m"]
+    front = length / 2 - f["front_overhang"]
+    tyre = f["tyre_width"]
+    # Wheels stay inside the body's width, flush with its sides where the track is wide.
+    across = min(f["track"] / 2, width / 2 - tyre / 2)
+    shells = wheel(diameter, tyre)
+    mirror = np.diag([-1.0, 1.0, 1.0])
+    wheels, wells = [], []
+    for name, y in (("front", front), ("rear", front - f["wheel_base"])):
+        for side, word in ((-1, "left"), (1, "right")):
+            centre = (side * across, y, -height / 2 + diameter / 2)
+            turned = [shell if side > 0 else shell.mapped(mirror) for shell in shells]
+            wheels.append(
+                Part(f"{name} {word} wheel", "wheel", tuple(shell.moved(centre) for shell in turned), centre,
+                     (-1.0, 0.0, 0.0))
+            )  # fmt: skip
+            inside, outside = side * (across - 0.6 * tyre), side * width
+            wells.append(cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24))
+    body = Part("body", "body", (_lower(length, width, height, f), _greenhouse(length, width, height, f)),
+                cuts=tuple(wells))  # fmt: skip
+    return [body, *wheels], {"wheel_diameter_m": diameter, "origin_height_m": height / 2}
