@@ -218,3 +218,12 @@ def test_a_missing_rate_is_refused_by_part_name():
 def test_two_stations_need_a_polygon():
     with pytest.raises(InputError, match="polygon_m"):
         region_polygon(MASTS[:2], None)
+
+
+def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
+    square = np.array([[0, 0], [0, 10], [10, 0], [10, 10], [4, 5]], dtype=float)
+    assert sorted(map(tuple, region_polygon(square, None))) == sorted(map(tuple, square[:4]))
+    with pytest.raises(InputError, match="not convex"):
+        region_polygon(square, square.tolist())
+    with pytest.raises(InputError, match="flat"):
+        region_polygon(square, [[0, 0], [1, 1], [2, 2]])

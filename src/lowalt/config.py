@@ -72,11 +72,18 @@ def _expected(error: jsonschema.ValidationError) -> str:
     """What the schema wanted, in words."""
     rule, wanted = error.validator, error.validator_value
     words = {
-        "type": f"type {wanted}", "minimum": f"at least {wanted}", "maximum": f"at most {wanted}",
-        "exclusiveMinimum": f"more than {wanted}", "exclusiveMaximum": f"less than {wanted}", "enum": f"one of {wanted}",
-        "minItems": f"at least {wanted} item(s)", "maxItems": f"at most {wanted} items",
-        "uniqueItems": "every item once", "pattern": f"text like {wanted}", "minProperties": "an entry",
-    }  # fmt: skip
+        "type": f"type {wanted}",
+        "minimum": f"at least {wanted}",
+        "maximum": f"at most {wanted}",
+        "exclusiveMinimum": f"more than {wanted}",
+        "exclusiveMaximum": f"less than {wanted}",
+        "enum": f"one of {wanted}",
+        "minItems": f"at least {wanted} item(s)",
+        "maxItems": f"at most {wanted} items",
+        "minProperties": f"at least {wanted} entry",
+        "uniqueItems": "every item once",
+        "pattern": f"text like {wanted}",
+    }
     return words.get(rule, error.message)
 
 

@@ -7,6 +7,7 @@ same whatever else the configuration names.
 import math
 
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
 from lowalt.errors import InputError
 from lowalt.motion.poses import attitude
@@ -27,11 +28,15 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
             f"motion: region polygon has shape {corners.shape}, expected three or more (x, y) corners in metres; "
             "with fewer than three stations give motion.region.polygon_m"
         )
-    centre = corners.mean(axis=0)
-    corners = corners[np.argsort(np.arctan2(*(corners - centre).T[::-1]), kind="stable")]
-    if np.any(_edges(corners, corners.mean(axis=0)) <= 0):
-        raise InputError(f"motion: region polygon {corners.tolist()} is degenerate or not convex")
-    return corners
+    try:
+        hull = ConvexHull(corners).vertices
+    except QhullError:
+        raise InputError(
+            f"motion: region polygon {corners.tolist()} is flat, expected corners around an area"
+        ) from None
+    if polygon_m is not None and len(hull) < len(corners):
+        raise InputError(f"motion.region.polygon_m: value {polygon_m} is not convex, expected a convex polygon")
+    return corners[hull]
 
 
 def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
@@ -73,14 +78,15 @@ def draw(
     rng: np.random.Generator,
     cloud: Cloud,
     published: dict,
-    network: Network,
+    masts_m: np.ndarray,
     corners: np.ndarray,
     settings: dict,
 ) -> dict:
     """Return one motion model's row (without group and model) for the target `cloud`.
 
     published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places; corners: (K, 2) m
-    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform. Wheels turn at F = v / (pi D) (paper Eq. 16).
+    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform.
+    Wheels turn at F = v / (pi D) (paper Eq. 16).
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)

@@ -1,0 +1,121 @@
+"""Configuration, plan and source lists: faults named by key and value, counts known before any job."""
+
+import copy
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lowalt.config import canonical, check, load, load_yaml, merge
+from lowalt.errors import InputError
+from lowalt.plan import Plan, slug
+from lowalt.sources import PACKAGE, sources
+
+ROOT = Path(__file__).parent.parent
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+DEFAULT = load([ROOT / "config/default.yaml"], SCHEMA)
+
+
+@pytest.mark.parametrize("overlay", sorted(path.name for path in (ROOT / "config").glob("*.yaml")))
+def test_every_shipped_configuration_is_valid(overlay):
+    assert load([ROOT / "config/default.yaml", ROOT / "config" / overlay], SCHEMA)["seed"] >= 0
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"moton": {}}, r"unknown key\(s\) \['moton'\]"),
+        ({"network": {"carrier_hz": 4.9}}, r"network.carrier_hz: value 4.9, expected at least 100000000"),
+        ({"network": {"carrier_hz": "4.9 GHz"}}, r"network.carrier_hz: value '4.9 GHz', expected type number"),
+        ({"network": {"symbols": 0}}, r"network.symbols: value 0, expected at least 1"),
+        ({"network": {"stations": {"A": {"position_m": [0, 0]}}}}, r"stations.A.position_m: .* at least 3 item"),
+        ({"noise": {"snr_db": []}}, r"noise.snr_db: value \[\], expected at least 1 item"),
+        ({"noise": {"snr_db": [3, 3]}}, r"noise.snr_db: .* every item once"),
+        ({"targets": {"select": ["Crow", "Crow"]}}, r"targets.select: .* every item once"),
+        ({"motion": {"region": {"polygn": 1}}}, r"motion.region: unknown key\(s\) \['polygn'\]"),
+        ({"split": {"by": "model"}}, r"split.by: value 'model', expected one of"),
+        ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
+        ({"run": "../x"}, r"run: value '../x', expected text like"),
+    ],
+)
+def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
+    with pytest.raises(InputError, match=words):
+        check(merge(DEFAULT, overlay), SCHEMA)
+
+
+def test_a_missing_key_is_refused():
+    config = copy.deepcopy(DEFAULT)
+    del config["network"]["symbols"]
+    with pytest.raises(InputError, match=r"network: missing key\(s\) \['symbols'\]"):
+        check(config, SCHEMA)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("a: 1\na: 2\n", "stands twice"), ("- 1\n", "expected a mapping"), ("a: [\n", "not YAML")]
+)
+def test_a_broken_file_is_refused(tmp_path, text, words):
+    path = tmp_path / "config.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_yaml(path)
+
+
+def test_canonical_text_is_one_per_meaning():
+    assert canonical({"b": math.inf, "a": [1, 2.5]}) == canonical({"a": (1, 2.5), "b": math.inf})
+    assert canonical({"snr": math.inf}) == '{"snr": "inf"}'
+
+
+PUBLISHED = {f"t{index}": {"unseen_protocol": "seen" if index % 2 else "unseen"} for index in range(4)}
+
+
+def plan(**motion) -> Plan:
+    """A plan of four subtypes with the given motion keys."""
+    return Plan.of(merge(DEFAULT, {"motion": motion}), PUBLISHED)
+
+
+def test_the_plan_covers_every_model_once():
+    found = plan(models=55, models_per_chunk=20)
+    assert found.chunks == [f"{group}-{part:05d}" for group in ("seen", "unseen") for part in range(3)]
+    assert [found.span(chunk) for chunk in found.chunks[:3]] == [(0, 20), (20, 20), (40, 15)]
+    assert len(found.shards) == len(set(found.shards)) == sum(len(found.folds(chunk)) for chunk in found.chunks)
+
+
+def test_a_short_chunk_has_only_shards_with_samples():
+    found = plan(models=1, models_per_chunk=10)
+    assert 1 <= len(found.folds("seen-00000")) <= 2
+    assert set(plan(models=10, models_per_chunk=10).folds("seen-00000")) == {"train", "val", "test"}
+
+
+def test_a_chunk_that_breaks_blocks_and_an_unknown_subtype_are_refused():
+    with pytest.raises(InputError, match="models_per_chunk: value 15, expected a multiple of 10"):
+        plan(models_per_chunk=15)
+    with pytest.raises(InputError, match=r"targets.select: \['Dodo'\]"):
+        Plan.of(merge(DEFAULT, {"targets": {"select": ["Dodo"]}}), PUBLISHED)
+
+
+def test_slugs_are_plain_and_distinct():
+    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan"
+    assert slug("EH 216 S") == "eh-216-s"
+
+
+STAGES = ("targets", "motion", "echo", "noise", "tiles", "shards", "recognition", "report", "config")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_declared_sources_hold_every_module_really_imported(stage):
+    module = f"lowalt.{stage}.__main__" if (PACKAGE / stage).is_dir() else f"lowalt.{stage}"
+    program = (
+        f"import sys, importlib; importlib.import_module({module!r}); "
+        "print(*sorted(m.__file__ for n, m in sys.modules.items() if n.split('.')[0] == 'lowalt'), sep='\\n')"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    imported = {Path(line) for line in run.stdout.split("\n") if line}
+    assert imported <= set(sources(f"lowalt.{stage}"))
+    assert PACKAGE / "errors.py" in imported
+
+
+def test_sources_of_nothing_are_refused():
+    with pytest.raises(ModuleNotFoundError):
+        sources("lowalt.nowhere")
