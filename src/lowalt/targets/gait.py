@@ -1,0 +1,177 @@
+"""The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is given.
+
+Only the body is here: segment lengths, how the curves of `gait_walk` and `gait_run` turn the bones, and the cloud.
+Axes: x right, y front, z up, metres; the root's mean position is the origin.
+"""
+
+import hashlib
+import json
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.targets import gait_run, gait_walk
+from lowalt.targets.cloud import Cloud
+from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
+
+HIP_HEIGHT = 0.530
+"""Hip (greater trochanter) above ground, in statures. Source: Drillis and Contini 1966, in Winter's handbook."""
+
+# Winter's segment lengths; how spine, neck, hand and foot divide among CMU's bones is an estimate.
+_RIGHT = {
+    "hipjoint": (0.0955, 0, -0.045), "femur": (0, 0, -0.245), "tibia": (0, 0, -0.246),
+    "foot": (0, 0.077, -0.035), "toes": (0, 0.035, -0.004),
+    "clavicle": (0.1295, 0, 0), "humerus": (0, 0, -0.186), "radius": (0, 0, -0.146 * 2 / 3),
+    "wrist": (0, 0, -0.146 / 3), "hand": (0, 0, -0.05), "fingers": (0, 0, -0.058), "thumb": (0, 0.035, -0.03),
+}  # fmt: skip
+_MIDDLE = {
+    "lowerback": (0, 0, 0.081), "upperback": (0, 0, 0.081), "thorax": (0, 0, 0.081),
+    "lowerneck": (0, 0, 0.026), "upperneck": (0, 0, 0.026), "head": (0, 0, 0.130),
+}  # fmt: skip
+_TRUNK_SHARE = {"lowerback": 1 / 3, "upperback": 2 / 3, "thorax": 1, "lowerneck": 2 / 3, "upperneck": 1 / 3, "head": 0}
+
+
+def bones_m(stature_m: float) -> np.ndarray:
+    """Return the bones (31, 3) of an average adult in metres, standing, arms down; `stature_m` in metres."""
+    result = np.zeros((len(NODES), 3))
+    for index, name in enumerate(NODES[1:], start=1):
+        if name in _MIDDLE:
+            result[index] = _MIDDLE[name]
+        else:
+            result[index] = np.array(_RIGHT[name[1:]]) * ([-1, 1, 1] if name[0] == "l" else 1)
+    return result * stature_m
+
+
+def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
+    """Return the toes' pitch (rad): the foot's while it points up, about a third of it where the heel is lifted.
+
+    The ball bends at push-off, or the toes would be driven into the ground. Estimate; continuously differentiable.
+    """
+    down, width = np.minimum(foot_rad, 0), np.radians(5)
+    return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * np.expm1(down / width)
+
+
+def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.ndarray:
+    """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the right side's."""
+    result = np.empty((len(phase), len(NODES), 3, 3))
+    pelvis = rotation("z", trunk["turn"]) @ rotation("y", trunk["list"])
+    chest = rotation("z", trunk["twist"]) @ rotation("x", -trunk["lean"])
+    turned = {"root": pelvis}
+    for name, share in _TRUNK_SHARE.items():
+        below = 1 - share if name in ("lowerback", "upperback") else 0  # the neck comes back to straight ahead
+        yaw = share * trunk["twist"] + below * trunk["turn"]
+        turned[name] = rotation("z", yaw) @ rotation("x", -share * trunk["lean"])
+        turned[name] = turned[name] @ rotation("y", below * trunk["list"])
+    for side, later in (("r", 0.0), ("l", 0.5)):
+        hip, knee, ankle = leg((phase + later) % 1.0)
+        shoulder, elbow = arm((phase + later) % 1.0)
+        turned[side + "hipjoint"] = pelvis
+        # The hips ride on the pelvis, but the legs swing in planes along the path: a walker abducts and turns the
+        # hip against the pelvis, or the feet would be flung sideways at 1 m/s while they carry the body.
+        turned[side + "femur"] = rotation("x", hip)
+        turned[side + "tibia"] = rotation("x", hip - knee)
+        turned[side + "foot"] = rotation("x", hip - knee + ankle)
+        turned[side + "toes"] = rotation("x", _toe_pitch(hip - knee + ankle))
+        turned[side + "clavicle"] = chest
+        turned[side + "humerus"] = chest @ rotation("x", shoulder)
+        for name in ("radius", "wrist", "hand", "fingers", "thumb"):
+            turned[side + name] = chest @ rotation("x", shoulder + elbow)
+    for index, name in enumerate(NODES):
+        result[:, index] = turned[name]
+    return result
+
+
+def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple[np.ndarray, float, float]:
+    """Return one cycle (frames, 31, 3) in metres, its duration (s) and the distance it covers on the ground (m).
+
+    `kind` "walk" follows Boulic et al. 1990 at `speed_mps`; "run" follows `gait_run`, whose stride rate is fixed,
+    so that the stride grows with the speed. Horizontal progress is left out; the root's mean is the origin.
+    Raises: InputError where the kind is unknown or the speed outside the model.
+    """
+    phase = np.arange(frames) / frames
+    hip_m = HIP_HEIGHT * stature_m
+    if kind == "walk":
+        rv = speed_mps / hip_m
+        length, duration, _ = gait_walk.timing(rv)
+        turned = _rotations(
+            phase, lambda at: gait_walk.leg(rv, at), lambda at: gait_walk.arm(rv, at), gait_walk.trunk(rv, phase)
+        )
+        root, stride = gait_walk.shift(rv, phase) * hip_m, length * hip_m
+    elif kind == "run":
+        duration = 1 / gait_run.STRIDES_PER_SECOND
+        turned = _rotations(phase, gait_run.leg, gait_run.arm, gait_run.trunk(phase))
+        root, stride = gait_run.shift_m(phase), speed_mps * duration
+    else:
+        raise InputError(f"gait: {kind!r}, expected walk or run")
+    return forward_kinematics(root - root.mean(axis=0), turned, bones_m(stature_m)), duration, stride
+
+
+def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height_m: float = 0.02) -> float:
+    """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of the ground.
+
+    `cycle` (F, 31, 3) cyclic, front +y, horizontal progress left out; `speed_mps` is added back. Zero would be a
+    foot that stands still. The ground is the cycle's lowest point.
+    """
+    feet = cycle[:, FEET]
+    velocity = (np.roll(feet, -1, axis=0) - np.roll(feet, 1, axis=0)) * rate_hz / 2
+    velocity[..., 1] += speed_mps
+    lowest = feet[..., 2].argmin(axis=1)
+    frames = np.arange(len(feet))
+    down = feet[frames, lowest, 2] < cycle[..., 2].min() + height_m
+    return float(np.linalg.norm(velocity[frames, lowest, :2], axis=-1)[down].mean())
+
+
+KEYS = ("gait", "speed_mps", "stature_m", "rate_hz", "person")
+"""Keys of a gait record, beside those every record has; `person` says in words who walks."""
+
+_RANGES = {"speed_mps": (0.05, 6.0), "stature_m": (0.5, 2.6), "rate_hz": (20, 10_000)}
+
+
+def check_record(merged: dict, extra: dict, where: str) -> dict:
+    """Return the merged record of a built-in walk or run, checked, with the defaults of `stature_m` (the published
+    height), `rate_hz` (400 frames a second) and `points` (one a node).
+
+    `extra` are the keys of the record as written that are not common to all sources.
+    Raises: InputError naming `where`, the key, the value and what was expected.
+    """
+    unknown = sorted(set(extra) - set(KEYS))
+    if unknown:
+        raise InputError(f"{where}: unknown keys {unknown}, expected some of {sorted(KEYS)}")
+    if merged["category"] != "Pedestrian":
+        raise InputError(f"{where}: source is 'gait' for a {merged['category']}, expected builtin or mesh")
+    result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged, "points": len(NODES)}
+    for key, (low, high) in _RANGES.items():
+        value = result.get(key)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+            raise InputError(f"{where}: {key} is {value!r}, expected a number from {low} to {high}")
+    try:
+        cycle_m(result.get("gait"), result["stature_m"], result["speed_mps"], 2)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return result
+
+
+def record_files(record: dict) -> list[str]:
+    """Return the user's files a gait record needs: none."""
+    return []
+
+
+def gait_cloud(record: dict, seed: int) -> Cloud:
+    """Return the built-in pedestrian's cloud: one cycle of walking or running on the 31 nodes.
+
+    `record` is a merged record that `check_record` has passed. The cloud's record says cycle (s), stride (m),
+    cadence, height of the origin above ground (m) and foot speed in stance (m/s). The model has no randomness, so
+    `seed` is only noted.
+    """
+    kind, stature, speed = record["gait"], record["stature_m"], record["speed_mps"]
+    duration = cycle_m(kind, stature, speed, 2)[1]
+    # A whole number of frames a cycle: the rate gives way by less than a frame, the duration does not.
+    track, duration, stride = cycle_m(kind, stature, speed, max(2, round(duration * record["rate_hz"])))
+    rate = len(track) / duration
+    facts = {
+        "track_rate_hz": rate, "cycle_s": duration, "stride_m": stride, "track_speed_mps": stride / duration,
+        "cadence_steps_per_min": 120 / duration, "origin_height_m": float(-track[..., 2].min()),
+        "stance_foot_speed_mps": stance_speed_mps(track, rate, stride / duration),
+        "checksum": hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest(), "seed": seed,
+    }  # fmt: skip
+    return node_cloud(track, record | facts)

@@ -1,0 +1,66 @@
+"""Running angles over one cycle at about 3 m/s, and where each figure comes from.
+
+Phase 0 is the right foot's first contact; control points are joined by the same monotone periodic curves as the
+walk's. Angles in degrees here, radians outside; flexion is positive. Sources:
+[H] Heiderscheit et al. 2011, Med Sci Sports Exerc 43(2) 296-302, table 3, preferred step rate;
+[L] Lieberman et al. 2015, J Exp Biol 218, 3406-3414: 84.8 strides a minute at 3.0 m/s;
+[N] Novacheck 1998, "The biomechanics of running", Gait and Posture 7, 77-95: toe-off at 39 % of the cycle, swing
+knee about 90 degrees, ankle from about 25 degrees up in mid-stance to 20 down at toe-off (read from curves);
+[E] estimate; those of the leg are fitted so that the foot slides least and keeps to the ground at 3 m/s.
+The hip's angles are those of the thigh against the vertical: [H] less the 1 degree that fits the pelvis.
+"""
+
+import numpy as np
+
+from lowalt.targets.gait_walk import through
+
+STRIDES_PER_SECOND = 84.8 / 60
+"""Stride rate in Hz [L]."""
+
+SUPPORT = 0.39
+"""Share of the cycle with the foot on the ground [N]."""
+
+HIP = ((0.0, 26.0), (0.12, 17.0), (0.44, -20.0), (0.82, 45.0))
+"""[H] at contact; [E] the rest."""
+
+KNEE = ((0.0, 17.8), (0.15, 46.3), (0.40, 27.0), (0.68, 90.0), (0.95, 16.0))
+"""[H] at contact and in stance; [N] swing; [E] toe-off and before contact."""
+
+ANKLE = ((0.0, 1.0), (0.20, 26.0), (0.46, -20.0), (0.70, 0.0))
+"""[N] stance and toe-off; [E] the rest."""
+
+ELBOW_DEG, ELBOW_SWING_DEG = 90.0, 12.0
+SHOULDER_DEG, SHOULDER_SWING_DEG = -15.0, 27.0
+TURN_DEG, TWIST_DEG, LEAN_DEG = 8.0, 14.0, 7.0
+BOB_M = 0.035
+"""All [E]; `BOB_M` is half the range of the bob."""
+
+
+def leg(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return flexion (rad) of hip, knee and ankle of the right leg, each shaped like `phase`."""
+    return tuple(np.radians(through(list(points), phase)) for points in (HIP, KNEE, ANKLE))
+
+
+def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return flexion (rad) of shoulder and elbow of the right arm, each shaped like `phase`."""
+    swing = np.cos(2 * np.pi * np.asarray(phase))
+    shoulder = SHOULDER_DEG - SHOULDER_SWING_DEG * swing
+    return np.radians(shoulder), np.radians(ELBOW_DEG - ELBOW_SWING_DEG * swing)
+
+
+def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does; each shaped like `phase`."""
+    swing = np.cos(2 * np.pi * np.asarray(phase))
+    angles = {
+        "list": np.zeros_like(swing),
+        "turn": TURN_DEG * swing,
+        "lean": np.full_like(swing, LEAN_DEG),
+        "twist": -TWIST_DEG * swing,
+    }
+    return {name: np.radians(value) for name, value in angles.items()}
+
+
+def shift_m(phase: np.ndarray) -> np.ndarray:
+    """Return the root's periodic translation (..., 3) in metres: lowest in each mid-stance, highest in flight."""
+    up = -BOB_M * np.cos(4 * np.pi * (np.asarray(phase) - SUPPORT / 2))
+    return np.stack([np.zeros_like(up), np.zeros_like(up), up], axis=-1)

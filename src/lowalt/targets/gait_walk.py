@@ -1,0 +1,120 @@
+"""Walking angles over one cycle: the curves of Boulic, Magnenat-Thalmann and Thalmann, and nothing else.
+
+Source: "A global human walking model with real-time kinematic personification", The Visual Computer 6 (1990)
+344-358. Everything depends on the relative speed rv = v / (hip height), 0 < rv <= 3, and on the phase in [0, 1),
+0 at the right heel strike. Angles come in degrees there and leave in radians here; flexion is positive.
+"""
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from lowalt.errors import InputError
+
+
+def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
+    """Return a periodic, continuously differentiable curve through (phase, value) control points, at `phase`.
+
+    Monotone between control points (Fritsch and Carlson 1980), so no overshoot; any values of `phase`.
+    """
+    times, values = np.array(sorted((time % 1.0, value) for time, value in points)).T
+    # Two periods on either side make the slopes at the seam those of the periodic curve.
+    shifts = np.arange(-2, 3)
+    curve = PchipInterpolator((times + shifts[:, None]).ravel(), np.tile(values, len(shifts)))
+    return curve(np.asarray(phase) % 1.0)
+
+
+def timing(rv: float) -> tuple[float, float, float]:
+    """Return (cycle length / hip height, cycle duration in s, share of support in the cycle) at relative speed rv.
+
+    Raises: InputError where rv is outside the model's 0 < rv <= 3.
+    """
+    if not 0 < rv <= 3:
+        raise InputError(f"gait: relative speed {rv:.3g} hip heights a second, expected more than 0 and at most 3")
+    length = 1.346 * np.sqrt(rv)
+    duration = length / rv
+    return float(length), float(duration), float((0.752 * duration - 0.143) / duration)
+
+
+def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return flexion (rad) of hip, knee and ankle of the right leg, each shaped like `phase`.
+
+    The left leg is half a cycle later. Three speed ranges: up to 0.5 the amplitudes grow with speed, up to 1.3
+    they stay, up to 3 they change a little again.
+    """
+    _, _, support = timing(rv)
+    slow, fast = min(rv, 0.5) / 0.5, max(rv - 1.3, 0) / 1.7
+    hip = [(0.2 * fast - 0.1, 25 * slow + 5 * fast), (0.5, -15 * slow), (0.9, 25 * slow + 6 * fast)]
+    if fast == 0:
+        hip = hip[1:]  # the first control point is the last one, a cycle earlier
+    knee = [
+        (0.17 - 0.05 * fast, 3 + 22 * fast),
+        (0.4, 3),
+        (0.75 - 0.05 * fast, 70 * slow - 5 * fast),
+        (1 - 0.03 * fast, 3 + 3 * fast),
+    ]
+    ankle = [
+        (0, -3 + 5 * fast),
+        (0.08, -3 - 15 * slow + 4 * fast),
+        (0.5 - 0.1 * fast, -3 + 11 * slow - 3 * fast),
+        (support, -3 - 17 * slow - 8 * fast),
+        (0.85, -3 + 5 * fast),
+    ]
+    return tuple(np.radians(through(points, phase)) for points in (hip, knee, ankle))
+
+
+def arm(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return flexion (rad) of shoulder and elbow of the right arm, each shaped like `phase`."""
+    swing = 9.88 * rv
+    shoulder = 3 - swing / 2 - swing * np.cos(2 * np.pi * np.asarray(phase))
+    slow, middle, fast = min(rv, 0.5), min(max(rv - 0.5, 0) / 0.8, 1), max(rv - 1.3, 0) / 1.7
+    elbow = [
+        (0.05, 3 + 6 * slow + 8 * middle - 6 * fast),
+        (0.5 + 0.01 * middle + 0.04 * fast, 3 + 34 * slow + 24 * middle + 26 * fast),
+        (0.9 - 0.1 * fast, 3 + 10 * slow + 9 * middle - 6 * fast),
+    ]
+    return np.radians(shoulder), np.radians(through(elbow, phase))
+
+
+def trunk(rv: float, phase: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the trunk's rotations (rad), each shaped like `phase`.
+
+    `list` lowers the swinging side (positive lowers the right hip), `turn` brings the right hip forward, `lean`
+    tilts the trunk forward, `twist` brings the right shoulder forward.
+    """
+    phase = np.asarray(phase) % 1.0
+    drop = 1.66 * rv
+    first, second = phase < 0.15, phase < 0.5
+    third = phase < 0.65
+    sway = np.select(
+        [first, second, third],
+        [
+            -drop + drop * np.cos(2 * np.pi * phase * 10 / 3),
+            -drop - drop * np.cos(2 * np.pi * (phase - 0.15) * 10 / 7),
+            drop - drop * np.cos(2 * np.pi * (phase - 0.5) * 10 / 3),
+        ],
+        drop + drop * np.cos(2 * np.pi * (phase - 0.65) * 10 / 7),
+    )
+    tilt = -8 * rv**2 + 8 * rv if rv < 0.5 else 2.0
+    lean = tilt - tilt * np.sin(2 * np.pi * (2 * phase - 0.1))
+    twist = through([(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)], phase)
+    angles = {"list": sway, "turn": 4 * rv * np.cos(2 * np.pi * phase), "lean": lean, "twist": twist}
+    return {name: np.radians(value) for name, value in angles.items()}
+
+
+def shift(rv: float, phase: np.ndarray) -> np.ndarray:
+    """Return the root's periodic translation (..., 3): right, front, up, in hip heights.
+
+    To the right over the right foot's support, forward in both double supports, lowest in double support.
+    """
+    _, _, support = timing(rv)
+    side = 0.128 * rv * (1 - rv) if rv < 0.5 else 0.032
+    along = -0.084 * rv * (1 - rv) if rv < 0.5 else -0.021
+    phase, up = np.asarray(phase), 0.015 * rv
+    return np.stack(
+        [
+            side * np.sin(2 * np.pi * (phase - 0.1)),
+            along * np.sin(2 * np.pi * (2 * phase + 2 * (0.625 - support))),
+            -up + up * np.sin(2 * np.pi * (2 * phase - 0.35)),
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,92 @@
+"""The 31 nodes of a pedestrian: their names, who hangs on whom, and forward kinematics.
+
+Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A node is the far
+end of the bone that carries its name, as in the CMU skeleton files. Axes: x right, y front, z up, metres.
+"""
+
+import numpy as np
+
+from lowalt.targets.cloud import Cloud
+
+LIMBS = {
+    "lhipjoint": "root", "lfemur": "lhipjoint", "ltibia": "lfemur", "lfoot": "ltibia", "ltoes": "lfoot",
+    "rhipjoint": "root", "rfemur": "rhipjoint", "rtibia": "rfemur", "rfoot": "rtibia", "rtoes": "rfoot",
+    "lowerback": "root", "upperback": "lowerback", "thorax": "upperback",
+    "lowerneck": "thorax", "upperneck": "lowerneck", "head": "upperneck",
+    "lclavicle": "thorax", "lhumerus": "lclavicle", "lradius": "lhumerus", "lwrist": "lradius",
+    "lhand": "lwrist", "lfingers": "lhand", "lthumb": "lwrist",
+    "rclavicle": "thorax", "rhumerus": "rclavicle", "rradius": "rhumerus", "rwrist": "rradius",
+    "rhand": "rwrist", "rfingers": "rhand", "rthumb": "rwrist",
+}  # fmt: skip
+"""Each bone and the bone it hangs on, parents first."""
+
+NODES = ("root", *LIMBS)
+"""The 31 node names in the order of every pedestrian cloud; that of the CMU skeleton files."""
+
+PARENTS = (-1, *(NODES.index(parent) for parent in LIMBS.values()))
+"""Index of each node's parent in NODES, -1 for the root."""
+
+FEET = tuple(NODES.index(name) for name in ("lfoot", "ltoes", "rfoot", "rtoes"))
+"""Indices of the nodes that touch the ground."""
+
+_LEG = ("femur", "tibia")
+_SPINE = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
+
+
+def forward_kinematics(root_m: np.ndarray, rotations: np.ndarray, offsets_m: np.ndarray) -> np.ndarray:
+    """Return node positions (F, 31, 3) in metres.
+
+    `root_m` (F, 3) position of the root, `rotations` (F, 31, 3, 3) global rotation of every bone, `offsets_m`
+    (31, 3) each bone from its parent's node to its own, unrotated. Source: plain tree kinematics.
+    """
+    positions = np.empty((len(root_m), len(NODES), 3))
+    positions[:, 0] = root_m
+    for node in range(1, len(NODES)):
+        bone = rotations[:, node] @ offsets_m[node]
+        positions[:, node] = positions[:, PARENTS[node]] + bone
+    return positions
+
+
+def stature_m(offsets_m: np.ndarray) -> float:
+    """Return the vertical extent in metres of a skeleton that stands straight, from the toes to the node `head`.
+
+    `offsets_m` (31, 3) bones in the rest pose. Legs and spine count with their whole length, hip joint and foot
+    with their vertical part in the rest pose; the mean of both legs.
+    """
+
+    def bone(name: str) -> np.ndarray:
+        return offsets_m[NODES.index(name)]
+
+    spine = sum(np.linalg.norm(bone(name)) for name in _SPINE)
+    legs = 0.0
+    for side in "lr":
+        legs += sum(np.linalg.norm(bone(side + name)) for name in _LEG)
+        legs -= sum(bone(side + name)[2] for name in ("hipjoint", "foot", "toes"))
+    return float(spine + legs / 2)
+
+
+def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
+    """Return right-handed rotations (..., 3, 3) about the axis "x", "y" or "z" by `angle_rad` (...)."""
+    first, second = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
+    angle_rad = np.asarray(angle_rad, float)
+    result = np.zeros((*angle_rad.shape, 3, 3))
+    result[..., 3 - first - second, 3 - first - second] = 1.0
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    result[..., first, first] = result[..., second, second] = cos
+    result[..., first, second], result[..., second, first] = -sin, sin
+    return result
+
+
+def node_cloud(track_m: np.ndarray, record: dict) -> Cloud:
+    """Return the cloud of a cyclic recording: one part a node, the track's first frame as points.
+
+    `track_m` (F, 31, 3) metres, body-centred; `record` the cloud's record, with `track_rate_hz` and
+    `rcs_m2_per_point`. Nodes have no surface, so normals are NaN.
+    """
+    count = len(NODES)
+    nothing = np.full((count, 3), np.nan)
+    return Cloud(
+        points=track_m[0].copy(), part=np.arange(count), kinds=("node",) * count, names=NODES,
+        parents=np.full(count, -1), hinges=nothing, axes=nothing.copy(), normals=nothing.copy(),
+        rcs_m2=np.full(count, float(record["rcs_m2_per_point"])), record=record, track=track_m,
+    )  # fmt: skip
