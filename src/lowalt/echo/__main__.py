@@ -1,0 +1,58 @@
+"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals at one station."""
+
+import sys
+
+import numpy as np
+
+from lowalt.command import parser, pick, run
+from lowalt.echo.engine import echo_signal
+from lowalt.echo.motion import Rigid
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.motion import poses, read_table
+from lowalt.network import Network
+from lowalt.targets.cloud import Cloud, read
+
+
+def signals(
+    network: Network, name: str, clouds: dict[str, Cloud], rows: list[dict], tolerance: float | None
+) -> np.ndarray:
+    """Return clean signals (models, N) complex64 of the motion table `rows` at station `name`.
+
+    The beams aim at each cloud's origin at the first symbol.
+    Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
+    """
+    station, times_s = network.station(name), network.times_s
+    result = np.empty((len(rows), network.symbols), np.complex64)
+    for index, row in enumerate(rows):
+        sample = f"{row['subtype']}, model {row['model']}"
+        cloud = clouds.get(row["subtype"])
+        if cloud is None:
+            raise InputError(f"{sample}: no cloud of this subtype among {sorted(clouds)}")
+        motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
+        aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+        result[index] = echo_signal(
+            network, station, motion, cloud.rcs_m2, aim, tolerance, sample=f"{sample}, station {name}"
+        ).signal
+    return result
+
+
+def main(arguments: list[str]) -> None:
+    """Compute one chunk's echoes at one station and write one array file."""
+    options = parser("lowalt.echo", __doc__)
+    options.add_argument("--motion", required=True, help="the chunk's motion table")
+    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
+    options.add_argument("--station", required=True, help="name of the station that listens")
+    options.add_argument("--out", required=True, help="clean signals to write (.npy), complex64 (models, symbols)")
+    given = options.parse_args(arguments)
+    block, tolerance = pick(given.settings, "network", "tolerance")
+    network = Network.from_settings(block)
+    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    result = signals(network, given.station, clouds, read_table(given.motion), tolerance)
+    with replacing(given.out) as temporary:
+        np.save(temporary, result)
+    print(f"{given.out}: {len(result)} signals", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,143 @@
+"""The echo's public calls: input checked, reference ranges in double-double, one kernel, three answers."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo import answers
+from lowalt.echo.motion import Rigid, Scene, check
+from lowalt.echo.precise import reference
+from lowalt.echo.radar import Radar, radar
+from lowalt.echo.terms import aim_cosines
+from lowalt.errors import InputError
+from lowalt.network import Network, Station
+
+
+class Path(NamedTuple):
+    """One way of the wave to every point and back, beside or instead of the direct one.
+
+    delay_s: extra delay (s), gain: complex factor, each a number or an array that broadcasts to (N, L).
+    The direct path is Path(0.0, 1.0).
+    """
+
+    delay_s: float | np.ndarray = 0.0
+    gain: complex | np.ndarray = 1.0
+
+
+class EchoResult(NamedTuple):
+    """Signal of one station.
+
+    signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: how
+    many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding).
+    """
+
+    signal: np.ndarray
+    cell: np.ndarray
+    near_ties: int
+
+
+def echo_signal(
+    network: Network,
+    station: Station,
+    motion: Rigid | np.ndarray,
+    rcs_m2: np.ndarray | float,
+    aim_m: np.ndarray,
+    tolerance: float | None = None,
+    paths: Sequence[Path] | None = None,
+    sample: str = "",
+) -> EchoResult:
+    """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
+
+    motion: `Rigid`, or positions (N, L, 3) in metres; rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams
+    point; tolerance: largest error allowed, relative to the sample's max |Y_bin|, None for the exact closed form;
+    paths: all ways of the wave (default: the direct one alone); sample: a name for error messages.
+    Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
+    """
+    scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    count = len(scene.translation)
+    values, cells = np.empty(count, np.complex128), np.empty(count, np.int64)
+    ties, computed = np.empty(count, np.bool_), np.empty(count, np.int64)
+    fault = answers.signal(scene, radio, refs, np.arange(count), aims, *ways, values, cells, ties, computed)
+    _check_fault(fault, scene, station, sample)
+    return EchoResult(values, cells, int(ties.sum()))
+
+
+def range_cells(
+    network: Network,
+    station: Station,
+    motion: Rigid | np.ndarray,
+    rcs_m2: np.ndarray | float,
+    aim_m: np.ndarray,
+    paths: Sequence[Path] | None = None,
+    sample: str = "",
+) -> np.ndarray:
+    """Return all range cells Y_k,r (N, M) complex128; arguments and errors as `echo_signal`. Source: Eq. 25."""
+    return _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, True)
+
+
+def subcarrier_matrix(
+    network: Network,
+    station: Station,
+    motion: Rigid | np.ndarray,
+    rcs_m2: np.ndarray | float,
+    aim_m: np.ndarray,
+    paths: Sequence[Path] | None = None,
+    sample: str = "",
+) -> np.ndarray:
+    """Return Y_k (N, M) complex128, the known symbol removed; arguments and errors as `echo_signal`. Source: Eq. 24."""
+    return _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, False)
+
+
+def _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, cells: bool) -> np.ndarray:
+    scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    out = np.empty((len(refs), network.subcarriers), np.complex128)
+    _check_fault(answers.matrix(scene, radio, refs, aims, *ways, cells, out), scene, station, sample)
+    return out
+
+
+def _prepare(network, station, motion, rcs_m2, aim_m, paths, sample):
+    scene = check(network, station, motion, rcs_m2, aim_m, sample)
+    radio: Radar = radar(network, station)
+    first = scene.part[0] if len(scene.part) else 0
+    refs = reference(
+        scene.translation[:, first], radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo
+    )
+    aims = aim_cosines(scene.aim, radio.station, radio.sine, radio.cosine)
+    points = len(scene.part) or scene.translation.shape[1]
+    return scene, radio, refs, aims, _ways(paths, (len(refs), points), sample)
+
+
+def _ways(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> tuple[np.ndarray, np.ndarray]:
+    """Delays and gains of all paths as (K, N or 1, L or 1) arrays; K = 0 for the direct path alone."""
+    if paths is None:
+        return np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128)
+    where = f"{sample}: " if sample else ""
+    if len(paths) == 0:
+        raise InputError(f"{where}paths is empty, expected at least one path")
+    result = []
+    for name, kind in (("delay_s", np.float64), ("gain", np.complex128)):
+        arrays = [np.asarray(getattr(path, name), kind) for path in paths]
+        for index, array in enumerate(arrays):
+            if not np.isfinite(array).all():
+                raise InputError(f"{where}paths[{index}].{name} has a NaN or infinite value, expected finite numbers")
+            try:
+                np.broadcast_to(array, shape)
+            except ValueError:
+                raise InputError(
+                    f"{where}paths[{index}].{name} has shape {array.shape}, expected to broadcast to {shape}"
+                ) from None
+        widest = np.broadcast_shapes((1, 1), *(array.shape for array in arrays))
+        result.append(np.stack([np.broadcast_to(array, widest) for array in arrays]))
+    return result[0], result[1]
+
+
+def _check_fault(fault: int, scene: Scene, station: Station, sample: str) -> None:
+    if fault:
+        points = len(scene.part) or scene.translation.shape[1]
+        n, l = divmod(fault - 1, points)  # noqa: E741
+        where = f"{sample}: " if sample else ""
+        raise InputError(
+            f"{where}position of point {l} at symbol {n} is {station.position_m}, the place of station {station.name} "
+            f"(r = 0), expected r > 0"
+        )

@@ -1,0 +1,120 @@
+"""The echo's slow truth: every sum of the paper as printed, and one value at a time in 50 digits.
+
+Angles, Kronecker steering vectors, channel matrices, beamforming and the inverse DFT are all formed, so that
+nothing here shares an idea (or a line) with the closed form in `lowalt.echo`. Eq. numbers are the paper's.
+"""
+
+import mpmath
+import numpy as np
+
+C = 299_792_458.0
+
+
+def angles(position_m, station_m, normal_rad):
+    """Range (m), horizontal and pitch angle (rad) of one point seen by a station (Eq. 4)."""
+    dx, dy, dz = np.asarray(position_m, float) - np.asarray(station_m, float)
+    r = np.sqrt(dx**2 + dy**2 + dz**2)
+    flat = np.sqrt(dx**2 + dy**2)
+    # Straight above the station the azimuth has no meaning; any value will do, since cos(phi) is zero there.
+    turn = (dx + 1j * dy) / flat / np.exp(1j * normal_rad) if flat > 0 else 1.0
+    return r, np.pi / 2 - np.angle(turn), np.arcsin(np.clip(dz / r, -1, 1))
+
+
+def steering(counts, kappa, theta, phi):
+    """Steering vector (horizontal x vertical,) of a planar array, spacing c / 2 f0 (Eqs. 8 to 13)."""
+    psi, omega = np.cos(phi) * np.cos(theta), np.sin(phi)
+    horizontal = np.exp(1j * np.pi * kappa * psi * np.arange(counts[0]))
+    vertical = np.exp(1j * np.pi * kappa * omega * np.arange(counts[1]))
+    return np.kron(horizontal, vertical)
+
+
+def subcarriers(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
+    """Received signal y (N, M) of Eqs. 7 and 24 with the known symbol removed; `paths` of (delay s, gain)."""
+    n_symbols, n_points = positions_m.shape[:2]
+    kappa = station.frequency_hz / network.carrier_hz
+    frequency = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+    n_t, n_r = np.prod(network.transmit), np.prod(network.receive)
+    _, theta0, phi0 = angles(aim_m, station.position_m, station.normal_rad)
+    beam_t = np.sqrt(network.power / n_t) * steering(network.transmit, kappa, theta0, phi0)
+    beam_r = np.sqrt(1 / n_r) * steering(network.receive, kappa, theta0, phi0)
+    wavelength = C / network.carrier_hz
+    result = np.zeros((n_symbols, network.subcarriers), complex)
+    for n in range(n_symbols):
+        for l in range(n_points):  # noqa: E741
+            r, theta, phi = angles(positions_m[n, l], station.position_m, station.normal_rad)
+            alpha = wavelength * np.sqrt(rcs_m2[l]) / ((4 * np.pi) ** 1.5 * r**2)
+            channel = np.outer(
+                steering(network.receive, kappa, theta, phi), steering(network.transmit, kappa, theta, phi)
+            )
+            gain = np.conj(beam_r) @ channel @ np.conj(beam_t)
+            for delay, factor in paths:
+                whole = np.broadcast_to(factor, (n_symbols, n_points))[n, l]
+                later = np.broadcast_to(delay, (n_symbols, n_points))[n, l]
+                result[n] += alpha * gain * whole * np.exp(-2j * np.pi * frequency * (2 * r / C + later))
+    return result
+
+
+def range_cells(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
+    """All range cells (N, M): the inverse DFT over subcarriers as a matrix (Eq. 25)."""
+    m = np.arange(network.subcarriers)
+    # The exponent is reduced in integers, so that large M costs no digits.
+    turn = np.outer(m, m) % network.subcarriers / network.subcarriers
+    inverse = np.exp(2j * np.pi * turn) / network.subcarriers
+    return subcarriers(network, station, positions_m, rcs_m2, aim_m, paths) @ inverse
+
+
+def echo(network, station, positions_m, rcs_m2, aim_m, paths=((0.0, 1.0),)):
+    """Signal (N,) at the strongest cell of every symbol, and that cell (N,); the lowest index wins a tie."""
+    cells = range_cells(network, station, positions_m, rcs_m2, aim_m, paths)
+    best = np.argmax(abs(cells), axis=1)
+    return cells[np.arange(len(cells)), best], best
+
+
+def cell_mp(network, station, points_m, rcs_m2, aim_m, cell, digits=50):
+    """One cell of one symbol, a Python complex, from `digits` decimal digits of arithmetic.
+
+    points_m: a list of L positions of three numbers (floats or mpmath numbers), taken as exact.
+    """
+    return complex(cells_mp(network, station, points_m, rcs_m2, aim_m, [cell], digits)[0])
+
+
+def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
+    """The cells listed of one symbol, mpmath complex numbers; arguments as `cell_mp`.
+
+    Each point's steering and subcarrier sums are plain geometric sums over exactly given phases; a run of equal
+    steps is summed by Horner's rule.
+    """
+    with mpmath.workdps(digits):
+        mpf, pi = mpmath.mpf, mpmath.pi
+        carrier, low = mpf(network.carrier_hz), mpf(station.frequency_hz)
+        spacing, count = mpf(network.subcarrier_spacing_hz), network.subcarriers
+        normal = mpf(station.normal_rad)
+
+        def look(position):
+            d = [mpf(a) - mpf(b) for a, b in zip(position, station.position_m, strict=True)]
+            r = mpmath.sqrt(sum(v * v for v in d))
+            return r, (-mpmath.sin(normal) * d[0] + mpmath.cos(normal) * d[1]) / r, d[2] / r
+
+        def run(step, length):
+            total = mpmath.mpc(0)
+            for _ in range(length):
+                total = total * step + 1
+            return total
+
+        _, psi0, omega0 = look(aim_m)
+        n_t, n_r = (int(np.prod(a)) for a in (network.transmit, network.receive))
+        sums = [mpmath.mpc(0) for _ in cells]
+        for position, rcs in zip(points_m, rcs_m2, strict=True):
+            r, psi, omega = look(position)
+            alpha = mpf(C) / carrier * mpmath.sqrt(mpf(rcs)) / ((4 * pi) ** mpf(1.5) * r * r)
+            step_h = mpmath.expjpi(low / carrier * (psi - psi0))
+            step_v = mpmath.expjpi(low / carrier * (omega - omega0))
+            gain = mpmath.mpc(alpha)
+            for array in (network.transmit, network.receive):
+                gain *= run(step_h, array[0]) * run(step_v, array[1])
+            gain *= mpmath.expjpi(-4 * low * r / mpf(C))
+            for place, cell in enumerate(cells):
+                step = mpmath.expjpi(2 * mpf(int(cell)) / count - 4 * spacing * r / mpf(C))
+                sums[place] += gain * run(step, count) / count
+        scale = mpmath.sqrt(mpf(network.power) / (n_t * n_r))
+        return [scale * value for value in sums]

@@ -1,0 +1,185 @@
+"""The echo against the direct sum of the paper, the physics read back, and its laws."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import reference
+from lowalt.echo import Path, Rigid, echo_signal, range_cells, subcarrier_matrix
+from lowalt.network import SPEED_OF_LIGHT, Network, Station
+
+
+def network(**changes) -> Network:
+    base = Network(
+        4.9e9, 120e3, 256, 10, 2.5e-3, 400, (16, 4), (16, 4), 1.0,
+        (Station("A", (0.0, 0.0, 25.0), 0.5, 4.9e9), Station("B", (500.0, 0.0, 25.0), 2.6, 4.9e9 + 265 * 120e3)),
+    )  # fmt: skip
+    return dataclasses.replace(base, **changes)
+
+
+def cloud_in_motion(rng, symbols, points, centre, size=1.0, speed=10.0):
+    """Random points about a moving, turning centre: positions (N, L, 3)."""
+    body = rng.normal(scale=size, size=(points, 3))
+    angle = np.linspace(0, 3, symbols)
+    turn = np.zeros((symbols, 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -np.sin(angle)
+    turn[:, 2, 2] = 1
+    path = np.asarray(centre) + np.linspace(0, 1, symbols)[:, None] * rng.normal(scale=speed, size=3)
+    return Rigid(turn[:, None], path[:, None], body, np.zeros(points, int))
+
+
+def positions(motion: Rigid) -> np.ndarray:
+    return (
+        np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points) + motion.translation[:, motion.part]
+    )
+
+
+def relative(value, truth) -> float:
+    return float(np.max(abs(value - truth)) / np.max(abs(truth)))
+
+
+@pytest.mark.parametrize("station", [0, 1])
+@pytest.mark.parametrize("rigid", [True, False])
+def test_closed_form_is_the_direct_sum(station, rigid):
+    net = network()
+    seen = net.stations[station]
+    rng = np.random.default_rng(1)
+    motion = cloud_in_motion(rng, 6, 30, (180.0, 120.0, 60.0), 1.5, 30.0)
+    rcs = rng.uniform(0, 2, 30)
+    aim = motion.translation[0, 0]
+    truth, cell = reference.echo(net, seen, positions(motion), rcs, aim)
+    result = echo_signal(net, seen, motion if rigid else positions(motion), rcs, aim)
+    assert relative(result.signal, truth) < 1e-9
+    assert (result.cell == cell).all() and result.near_ties == 0
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+def test_any_arrays_and_any_number_of_subcarriers(data):
+    counts = st.tuples(st.integers(1, 9), st.integers(1, 9))
+    spacing = data.draw(st.sampled_from([15e3, 120e3, 480e3]))
+    net = network(
+        carrier_hz=data.draw(st.floats(0.5e9, 100e9)), subcarrier_spacing_hz=spacing,
+        subcarriers=data.draw(st.integers(1, 40)), transmit=data.draw(counts), receive=data.draw(counts),
+        power=data.draw(st.floats(0.1, 100)),
+    )  # fmt: skip
+    seen = Station("A", (3.0, -2.0, 5.0), data.draw(st.floats(0, 7)), net.carrier_hz * data.draw(st.floats(0.9, 1.1)))
+    rng = np.random.default_rng(data.draw(st.integers(0, 99)))
+    away = 10 ** data.draw(st.floats(0, 3))
+    centre = np.array(seen.position_m) + away * rng.normal(size=3)
+    motion = cloud_in_motion(rng, 3, data.draw(st.integers(1, 8)), centre, 0.05 * away, 0.1 * away)
+    rcs = rng.uniform(0.1, 2, len(motion.points))
+    truth = reference.range_cells(net, seen, positions(motion), rcs, motion.translation[0, 0])
+    cells = range_cells(net, seen, motion, rcs, motion.translation[0, 0])
+    # The direct sum's own plain phases are the coarser side: 2e-16 of the largest phase.
+    noise = 1e-11 + 1e-14 * 4 * np.pi * 1.2 * net.carrier_hz / SPEED_OF_LIGHT * away
+    assert relative(cells, truth) < noise
+    result = echo_signal(net, seen, motion, rcs, motion.translation[0, 0])
+    strongest = abs(cells).max(axis=1)
+    assert np.allclose(abs(result.signal), strongest, rtol=1e-12)
+    assert np.allclose(abs(cells[np.arange(3), result.cell]), strongest, rtol=1e-12)
+
+
+def test_three_answers_agree_and_paths_add():
+    net = network(subcarriers=24)
+    rng = np.random.default_rng(5)
+    motion = cloud_in_motion(rng, 4, 7, (90.0, 40.0, 10.0))
+    seen, rcs, aim = net.stations[0], np.ones(7), motion.translation[0, 0]
+    paths = [Path(0.0, rng.normal(size=(4, 7))), Path(rng.uniform(0, 1e-6, (4, 1)), 0.3 - 0.4j)]
+    truth = reference.subcarriers(net, seen, positions(motion), rcs, aim, paths)
+    assert relative(subcarrier_matrix(net, seen, motion, rcs, aim, paths), truth) < 1e-9
+    cells = range_cells(net, seen, motion, rcs, aim, paths)
+    assert relative(cells, np.fft.ifft(truth, axis=1)) < 1e-9
+    result = echo_signal(net, seen, motion, rcs, aim, paths=paths)
+    assert (result.cell == abs(cells).argmax(axis=1)).all()
+    direct = echo_signal(net, seen, motion, rcs, aim)
+    one = echo_signal(net, seen, motion, rcs, aim, paths=[Path()])
+    assert relative(one.signal, direct.signal) < 1e-14
+
+
+def test_a_moving_point_is_in_its_cell_with_its_doppler():
+    net = network()
+    seen = net.stations[0]
+    speed, start = 2.0, 30.05 * net.cell_m
+    x = start + speed * net.times_s
+    path = np.stack([x, 0 * x, np.full_like(x, 25.0)], axis=1)[:, None]
+    result = echo_signal(net, seen, path, 1.0, path[0, 0])
+    assert (result.cell == np.rint(x / net.cell_m) % 256).all() and set(result.cell) == {30}
+    centre = seen.frequency_hz + (net.subcarriers - 1) * net.subcarrier_spacing_hz / 2
+    turns = np.unwrap(np.angle(result.signal)) / (2 * np.pi)
+    rate = np.polyfit(net.times_s, turns, 1)[0]
+    assert rate == pytest.approx(-2 * speed * centre / SPEED_OF_LIGHT, rel=1e-9)
+
+
+def test_crossing_a_cell_edge_turns_the_phase_by_almost_pi():
+    net = network()
+    seen = net.stations[0]
+    x = (30.5 + np.array([-1e-8, 1e-8])) * net.cell_m
+    path = np.stack([x, 0 * x, np.full_like(x, 25.0)], axis=1)[:, None]
+    before, after = echo_signal(net, seen, path, 1.0, path[0, 0]).signal
+    jump = np.angle(after / before)
+    assert abs(jump) == pytest.approx(np.pi * 255 / 256, abs=1e-3)
+    assert abs(before) == pytest.approx(abs(after), rel=1e-4)
+
+
+@pytest.mark.parametrize("count", [1, 2, 16, 25, 256])
+def test_chebyshev_limits(count):
+    from lowalt.echo.terms import dirichlet
+
+    for whole in range(-3, 4):
+        sign = (-1.0) ** (whole * (count - 1))
+        assert dirichlet(float(whole), count) == sign * count
+        assert dirichlet(whole + 1e-9, count) == pytest.approx(sign * count, rel=1e-12)
+
+
+def test_memory_of_the_command_is_its_output(tmp_path):
+    from lowalt.echo.__main__ import main
+
+    with pytest.raises(Exception, match="missing"):
+        main(["--settings", "{}", "--motion", "x", "--clouds", "y", "--station", "A", "--out", str(tmp_path / "o.npy")])
+
+
+BAD = {
+    "positions": (np.full((2, 3, 3), np.nan), "positions.0, 0, 0. is nan"),
+    "infinite": (np.full((2, 3, 3), np.inf), "positions.0, 0, 0. is inf"),
+    "empty": (np.zeros((2, 0, 3)), r"positions has shape \(2, 0, 3\), expected \(N, L, 3\)"),
+    "flat": (np.zeros((2, 3)), r"positions has shape \(2, 3\)"),
+    "here": (np.full((2, 3, 3), [0.0, 0.0, 25.0]), "point 0 at symbol 0 .*r = 0"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_positions_are_named(case):
+    from lowalt.errors import InputError
+
+    value, message = BAD[case]
+    net = network()
+    with pytest.raises(InputError, match="crow, model 3: .*" + message):
+        echo_signal(net, net.stations[0], value, 1.0, (9.0, 9.0, 9.0), sample="crow, model 3")
+
+
+def test_other_bad_arguments_are_named():
+    from lowalt.errors import InputError
+
+    net = network()
+    good = np.full((2, 3, 3), 40.0)
+    cases = [
+        (dict(rcs_m2=-1.0), "rcs_m2.0. is -1"),
+        (dict(rcs_m2=np.ones(2)), r"rcs_m2 has shape \(2,\), expected \(3,\)"),
+        (dict(aim_m=(0.0, 0.0, 25.0)), "no direction to aim at"),
+        (dict(aim_m=(np.nan, 0.0, 25.0)), "aim_m.0. is nan"),
+        (dict(paths=[]), "paths is empty"),
+        (dict(paths=[Path(np.nan)]), "paths.0..delay_s has a NaN"),
+        (dict(paths=[Path(0, np.ones((2, 5)))]), r"paths.0..gain has shape \(2, 5\)"),
+    ]
+    for change, message in cases:
+        arguments = dict(rcs_m2=1.0, aim_m=(9.0, 9.0, 9.0)) | change
+        with pytest.raises(InputError, match=message):
+            echo_signal(net, net.stations[0], good, **arguments)
+    with pytest.raises(InputError, match="frequency_hz is -1"):
+        echo_signal(net, Station("A", (0.0, 0.0, 25.0), 0.0, -1.0), good, 1.0, (9.0, 9.0, 9.0))
