@@ -44,7 +44,8 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
         have == want or (isinstance(want, str) and have > 0) for have, want in zip(array.shape, shape, strict=True)
     )
     if not fits:
-        raise InputError(f"{sample}{name} has shape {array.shape}, expected {str(shape).replace("'", '')}")
+        expected = str(shape).replace("'", "")
+        raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
     # Least and largest say whether all are finite (NaN passes through both); only a fault pays for finding it.
     if not (np.isfinite(array.min()) and np.isfinite(array.max())):
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
