@@ -42,6 +42,30 @@ def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
     return len(offsets) - 1, offsets[-1]
 
 
+def stored_array(path: Path, name: str) -> np.ndarray:
+    """Return a one-dimensional array of an uncompressed .npz as a read-only memory map.
+
+    Raises: InputError naming the file where it has no such array or is cut off.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            info = archive.getinfo(name)
+        with path.open("rb") as file:
+            file.seek(info.header_offset + 26)
+            file.seek(sum(struct.unpack("<HH", file.read(4))), 1)
+            if np.lib.format.read_magic(file) != (1, 0):
+                raise ValueError(f"{name} is not of version 1.0")
+            shape, _, dtype = np.lib.format.read_array_header_1_0(file)
+            start = file.tell()
+        if info.compress_type != zipfile.ZIP_STORED or len(shape) != 1:
+            raise ValueError(f"{name} is compressed or not one-dimensional")
+        if shape[0] == 0:
+            return np.zeros(0, dtype)
+        return np.memmap(path, dtype, "r", start, shape)
+    except (OSError, zipfile.BadZipFile, KeyError, ValueError, struct.error) as error:
+        raise InputError(f"{path}: no array {name} ({error})") from error
+
+
 class Tiles:
     """Read-only view of a tiles file: `len(tiles)`, `tiles[i]` -> bytes of the i-th PNG."""
 
@@ -51,19 +75,8 @@ class Tiles:
         Raises: InputError naming the file where it is missing or not a tiles file.
         """
         self.path = existing(path, "tiles")
-        try:
-            with zipfile.ZipFile(self.path) as archive:
-                with archive.open("offsets.npy") as member:
-                    self.offsets = np.lib.format.read_array(member)
-                info = archive.getinfo("data.npy")
-            self._data = np.memmap(self.path, np.uint8, "r")
-            local = bytes(self._data[info.header_offset : info.header_offset + 30])
-            start = info.header_offset + 30 + sum(struct.unpack("<HH", local[26:30]))
-            self._start = start + 10 + int.from_bytes(bytes(self._data[start + 8 : start + 10]), "little")
-        except (zipfile.BadZipFile, KeyError, ValueError, struct.error, EOFError) as error:
-            raise InputError(f"{self.path}: not a tiles file ({error})") from error
-        if self._start + int(self.offsets[-1]) > len(self._data):
-            raise InputError(f"{self.path}: ends before its last image")
+        self.offsets = np.array(stored_array(self.path, "offsets.npy"))
+        self._data = stored_array(self.path, "data.npy")
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -71,5 +84,4 @@ class Tiles:
     def __getitem__(self, number: int) -> bytes:
         if not 0 <= number < len(self):
             raise IndexError(number)
-        first, last = (self._start + int(self.offsets[number + k]) for k in (0, 1))
-        return self._data[first:last].tobytes()
+        return self._data[self.offsets[number] : self.offsets[number + 1]].tobytes()

@@ -1,0 +1,69 @@
+"""The index of a data set: every shard with its group, fold, counts and checksums, and how signals are rendered.
+
+It merges the headers of the shards' tables; the shards themselves are not read. A sample's own offsets and
+SHA-256 stay in its shard's table, whose SHA-256 stands in the index: one checksum of the index covers everything.
+"""
+
+import json
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing, sha256
+from lowalt.shards.table import read_header, table_path
+
+FORMAT = "lowalt-shards-1"
+
+
+def build(shards: list[str | Path], render: dict, out: str | Path) -> dict:
+    """Write the index of these shards to `out` and return it.
+
+    render: the settings that turn signals into tiles ({network, spectra, images}). Paths in the index are relative
+    to its folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
+    """
+    entries = []
+    for shard in map(Path, shards):
+        table = table_path(shard)
+        header = read_header(table)
+        existing(shard, "shard")
+        found = shard.stat().st_size
+        if found != header["bytes"]:
+            raise InputError(f"{shard}: {found} bytes, its table says {header['bytes']}")
+        entries.append({**header, "path": _relative(shard, Path(out)), "table_sha256": sha256(table)})
+    names = [entry["name"] for entry in entries]
+    kinds = sorted({entry["kind"] for entry in entries})
+    if len(set(names)) < len(names) or len(kinds) != 1:
+        raise InputError(f"{out}: {len(names)} shards of kinds {kinds}, expected names once and one kind")
+    index = {
+        "format": FORMAT,
+        "kind": kinds[0],
+        "samples": sum(entry["samples"] for entry in entries),
+        "bytes": sum(entry["bytes"] for entry in entries),
+        "render": render,
+        "shards": sorted(entries, key=lambda entry: entry["name"]),
+    }
+    with replacing(out) as temporary:
+        temporary.write_text(json.dumps(index, indent=1, sort_keys=True) + "\n")
+    return index
+
+
+def _relative(shard: Path, index: Path) -> str:
+    try:
+        return shard.resolve().relative_to(index.resolve().parent).as_posix()
+    except ValueError:
+        raise InputError(f"{shard}: not below the folder of the index, {index.resolve().parent}") from None
+
+
+def load(path: str | Path) -> dict:
+    """Return an index.
+
+    Raises: InputError naming the file where it is missing or no index.
+    """
+    existing(path, "index")
+    try:
+        index = json.loads(Path(path).read_text())
+        good = index["format"] == FORMAT
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path}: not an index of shards ({error})") from error
+    if not good:
+        raise InputError(f"{path}: format {index['format']!r}, expected {FORMAT!r}")
+    return index

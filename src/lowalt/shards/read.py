@@ -1,0 +1,170 @@
+"""Map-style access to the samples of shards: any sample at any time, by memory map, checked on every access.
+
+No torch here: a data set of any framework is `len` and one of the methods below.
+"""
+
+import functools
+import hashlib
+import io
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.network import Network
+from lowalt.plan import GROUPS
+from lowalt.shards.index import load
+from lowalt.shards.table import map_samples, table_path
+from lowalt.spectra import Spectra
+from lowalt.splits import FOLDS
+from lowalt.tiles.png import decode
+from lowalt.tiles.render import Renderer, split
+from lowalt.tiles.settings import Images
+
+
+class ShardSet:
+    """The samples of some groups and folds of a data set, numbered in the order of the index.
+
+    Picklable: workers open their own maps. Every access checks the sample's SHA-256 unless `check` is off.
+    """
+
+    def __init__(
+        self, index_path: str | Path, groups: Iterable[str] = GROUPS, folds: Iterable[str] = FOLDS, check: bool = True
+    ) -> None:
+        """Select the shards of these groups and folds.
+
+        Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
+        """
+        self.index_path, self.groups, self.folds, self.check = Path(index_path), tuple(groups), tuple(folds), check
+        for what, given, known in (("group", self.groups, GROUPS), ("fold", self.folds, FOLDS)):
+            if set(given) - set(known):
+                raise InputError(f"{what}s {given}, expected some of {known}")
+        self.index = load(index_path)
+        self.kind = self.index["kind"]
+        self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
+        self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
+        self._maps: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def __len__(self) -> int:
+        return int(self._ends[-1])
+
+    def __getstate__(self) -> dict:
+        return {k: v for k, v in self.__dict__.items() if k not in ("_maps", "renderer")} | {"_maps": {}}
+
+    def _open(self, shard: int) -> tuple[np.ndarray, np.ndarray]:
+        """Tables and bytes of a shard, mapped at first use."""
+        if shard not in self._maps:
+            entry = self.shards[shard]
+            path = self.index_path.parent / entry["path"]
+            samples = map_samples(table_path(path))
+            try:
+                data = np.memmap(path, np.uint8, "r")
+            except (OSError, ValueError) as error:
+                raise InputError(f"{path}: cannot be read ({error})") from error
+            if len(samples) != entry["samples"] or len(data) != entry["bytes"]:
+                raise InputError(f"{path}: {len(data)} bytes, {len(samples)} samples; the index says otherwise")
+            self._maps[shard] = samples, data
+        return self._maps[shard]
+
+    def _locate(self, number: int) -> tuple[int, int]:
+        number = int(number)
+        if not 0 <= number < len(self):
+            raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
+        shard = int(np.searchsorted(self._ends, number, side="right")) - 1
+        return shard, number - int(self._ends[shard])
+
+    def _bytes(self, number: int, member: str) -> bytes:
+        """The bytes of a member of a sample, after the sample's check."""
+        shard, place = self._locate(number)
+        samples, data = self._open(shard)
+        row = samples[place]
+        start, size = int(row["offset"]), int(row["size"])
+        if self.check and hashlib.sha256(data[start : start + size]).digest() != row["sha256"].tobytes():
+            name = self.shards[shard]["name"]
+            raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
+        first = int(row[f"{member}_offset"])
+        return data[first : first + int(row[f"{member}_size"])].tobytes()
+
+    def _column(self, name: str) -> np.ndarray:
+        parts = [self._open(shard)[0][name] for shard in range(len(self.shards))]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    @functools.cached_property
+    def renderer(self) -> Renderer:
+        """What turns the signals of these shards into tiles, as the index says."""
+        block = self.index["render"]
+        return Renderer(
+            Network.from_settings(block["network"]),
+            Spectra.from_settings(block["spectra"]),
+            Images.from_settings(block["images"]),
+        )
+
+    @property
+    def palette(self) -> np.ndarray:
+        """The 256 colours of the index values, (256, 3) uint8."""
+        return Images.from_settings(self.index["render"]["images"]).palette
+
+    @property
+    def keys(self) -> np.ndarray:
+        """Keys of all samples, (n,) bytes."""
+        return self._column("key")
+
+    @property
+    def labels(self) -> np.ndarray:
+        """Labels 0 .. 3 of all samples, (n,) int64, without reading a record."""
+        return self._column("label").astype(np.int64)
+
+    @property
+    def models(self) -> np.ndarray:
+        """Motion model numbers of all samples, (n,) int64, unique within a subtype."""
+        return self._column("model").astype(np.int64)
+
+    @property
+    def snrs_db(self) -> np.ndarray:
+        """SNRs of all samples, (n,) float64."""
+        return self._column("snr_db").astype(float)
+
+    def record(self, number: int) -> dict:
+        """Return the JSON record of a sample.
+
+        Raises: InputError naming shard and sample where it is damaged.
+        """
+        return json.loads(self._bytes(number, "record"))
+
+    def png(self, number: int) -> bytes:
+        """Return the PNG file of a sample of an image shard.
+
+        Raises: InputError where these are signal shards, or naming shard and sample where it is damaged.
+        """
+        self._need("image")
+        return self._bytes(number, "data")
+
+    def signal(self, number: int) -> np.ndarray:
+        """Return the signals of a sample of a signal shard, (stations, symbols) complex64.
+
+        Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
+        """
+        self._need("signal")
+        return np.lib.format.read_array(io.BytesIO(self._bytes(number, "data")))
+
+    def tile(self, number: int) -> np.ndarray:
+        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered: the same pixels from both kinds.
+
+        Raises: InputError naming shard and sample where it is damaged.
+        """
+        if self.kind == "signal":
+            return self.renderer.tile(self.signal(number))
+        return decode(self.png(number))[0]
+
+    def images(self, number: int) -> np.ndarray:
+        """Return the images of a sample, (9, S, S) uint8: station by station, VRP, TRP, VT.
+
+        Raises: InputError naming shard and sample where it is damaged.
+        """
+        return split(self.tile(number))
+
+    def _need(self, kind: str) -> None:
+        if self.kind != kind:
+            raise InputError(f"{self.index_path}: shards of kind {self.kind!r}, expected {kind!r}")

@@ -1,0 +1,70 @@
+"""The sample table of a shard: `{shard}.npz` beside `{shard}.tar`, one row a sample, and the shard's own header.
+
+    header    str, JSON: name, kind, group, fold, samples, bytes, sha256
+    samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)
+
+The table is stored uncompressed, so that a loader maps it into memory and a million samples cost it nothing.
+"""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.tiles.files import stored_array
+
+SAMPLE = np.dtype(
+    [
+        ("key", "S96"),
+        ("label", "<i8"),
+        ("model", "<i8"),
+        ("snr_db", "<f8"),
+        ("offset", "<i8"),
+        ("size", "<i8"),
+        ("record_offset", "<i8"),
+        ("record_size", "<i8"),
+        ("data_offset", "<i8"),
+        ("data_size", "<i8"),
+        ("sha256", "u1", (32,)),
+    ]
+)
+KINDS = ("image", "signal")
+EXTENSIONS = {"image": "png", "signal": "npy"}
+
+
+def table_path(shard: str | Path) -> Path:
+    """Return the path of a shard's table."""
+    return Path(shard).with_suffix(".npz")
+
+
+def write(path: str | Path, header: dict, samples: np.ndarray) -> None:
+    """Write header and rows; equal content, equal bytes."""
+    with replacing(path) as temporary:
+        np.savez(temporary, header=np.array(json.dumps(header, sort_keys=True)), samples=samples)
+
+
+def read_header(path: str | Path) -> dict:
+    """Return the header of a shard's table.
+
+    Raises: InputError naming the file where it is missing or damaged.
+    """
+    existing(path, "shard table")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return json.loads(str(data["header"]))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a shard table ({error})") from error
+
+
+def map_samples(path: str | Path) -> np.ndarray:
+    """Return the rows of a shard's table as a read-only memory map.
+
+    Raises: InputError naming the file where it is missing or damaged.
+    """
+    samples = stored_array(existing(path, "shard table"), "samples.npy")
+    if samples.dtype != SAMPLE:
+        raise InputError(f"{path}: columns {samples.dtype.names}, expected {SAMPLE.names}")
+    return samples

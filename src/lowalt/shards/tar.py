@@ -1,0 +1,70 @@
+"""The tar layer: members with fixed owner, mode and time, so that equal samples are equal bytes.
+
+The layout is that of webdataset's `TarWriter(encoder=False, mtime=0)`: USTAR headers, members of a sample side
+by side in the order of their extensions, two empty blocks at the end, the file filled up to 10 240 bytes.
+"""
+
+import hashlib
+import tarfile
+from dataclasses import dataclass
+from typing import BinaryIO
+
+from lowalt.errors import InputError
+
+BLOCK = 512
+RECORD = 10240
+
+
+def member(name: str, data: bytes) -> bytes:
+    """Return header, data and padding of one member.
+
+    Raises: InputError where the name is longer than a plain tar header holds.
+    """
+    info = tarfile.TarInfo(name)
+    info.size, info.mtime, info.mode = len(data), 0, 0o444
+    info.uname = info.gname = "bigdata"
+    if len(name.encode()) > 100:
+        raise InputError(f"shard member {name!r}: longer than the 100 bytes of a tar header")
+    return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % BLOCK)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Where a sample stands in its shard (bytes): the whole of it and its two members' data."""
+
+    offset: int
+    size: int
+    record: tuple[int, int]
+    data: tuple[int, int]
+    sha256: bytes
+
+
+class Writer:
+    """Writes samples to an open file and keeps the running SHA-256 of the whole shard."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._hash, self.size = file, hashlib.sha256(), 0
+
+    def _put(self, data: bytes) -> None:
+        self._file.write(data)
+        self._hash.update(data)
+        self.size += len(data)
+
+    def add(self, key: str, record: bytes, extension: str, data: bytes) -> Span:
+        """Append the members {key}.json and {key}.{extension}, in alphabetical order; return where they stand."""
+        if "." in key or "/" in key:
+            raise InputError(f"sample key {key!r}: expected no dot and no slash")
+        offset, places, parts = self.size, {}, []
+        for name, content in sorted({"json": record, extension: data}.items()):
+            start = offset + sum(map(len, parts)) + BLOCK
+            places[name] = (start, len(content))
+            parts.append(member(f"{key}.{name}", content))
+        span = b"".join(parts)
+        self._put(span)
+        return Span(offset, len(span), places["json"], places[extension], hashlib.sha256(span).digest())
+
+    def close(self) -> str:
+        """Write the end of the archive; return the SHA-256 of the whole file in hexadecimal."""
+        end = self.size + 2 * BLOCK
+        self._put(bytes(2 * BLOCK + -end % RECORD))
+        return self._hash.hexdigest()

@@ -1,0 +1,71 @@
+"""Finding damage: every byte of every shard and table against the index, each fault named."""
+
+import hashlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import sha256
+from lowalt.shards.index import load
+from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.tar import BLOCK
+
+
+def faults(index_path: str | Path) -> Iterator[str]:
+    """Yield one line a fault of a data set: the shard, the sample where it lies in one, and what is wrong.
+
+    A shard whose SHA-256 is right has no fault; otherwise its samples are checked one by one.
+    Raises: InputError where the index itself cannot be read.
+    """
+    index = load(index_path)
+    folder = Path(index_path).parent
+    for entry in index["shards"]:
+        yield from shard_faults(folder / entry["path"], entry)
+
+
+def shard_faults(path: Path, entry: dict) -> Iterator[str]:
+    """Yield the faults of one shard and its table against the shard's entry of the index."""
+    table = table_path(path)
+    if not table.is_file():
+        yield f"{table.name}: missing"
+    elif sha256(table) != entry["table_sha256"]:
+        yield f"{table.name}: the table is damaged (SHA-256 differs)"
+    if not path.is_file():
+        yield f"{path.name}: missing"
+        return
+    if path.stat().st_size == entry["bytes"] and sha256(path) == entry["sha256"]:
+        return
+    try:
+        samples = map_samples(table)
+    except InputError:
+        yield f"{path.name}: damaged, and its table cannot tell where"
+        return
+    found = path.stat().st_size
+    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"], found))
+
+
+def _locate(path: Path, samples: np.ndarray, expected: int, found: int) -> Iterator[str]:
+    """Faults of a shard known to be damaged, sample by sample, then what is left over."""
+    if found != expected:
+        yield f"{found} bytes, expected {expected}"
+    end, named = 0, found != expected
+    with path.open("rb") as file:
+        for row in samples:
+            end = int(row["offset"]) + int(row["size"])
+            file.seek(int(row["offset"]))
+            data = file.read(int(row["size"]))
+            key = row["key"].decode(errors="replace")
+            if len(data) < row["size"]:
+                yield f"sample {key} is cut off or missing"
+                named = True
+            elif hashlib.sha256(data).digest() != row["sha256"].tobytes():
+                yield f"sample {key} is damaged (SHA-256 differs)"
+                named = True
+        file.seek(end)
+        rest = file.read()
+    if rest.strip(b"\0") or len(rest) < 2 * BLOCK:
+        yield "the end of the archive is damaged"
+    elif not named:
+        yield "SHA-256 differs"

@@ -1,0 +1,83 @@
+"""One shard: the samples of a chunk that belong to one fold, shuffled by their names, with their table."""
+
+import io
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.network import Network
+from lowalt.shards.record import rank, record, sample_key
+from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
+from lowalt.shards.table import write as write_table
+from lowalt.shards.tar import Writer
+from lowalt.splits import FOLDS, fold
+from lowalt.targets.cloud import CATEGORIES
+
+
+def npy(signals: np.ndarray) -> bytes:
+    """Return a signal array as the bytes of an .npy file."""
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, np.ascontiguousarray(signals), version=(1, 0))
+    return buffer.getvalue()
+
+
+def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> list[tuple[int, int]]:
+    """Return (row, SNR index) of the samples of the fold `wanted`, in the shuffled order of the shard."""
+    chosen = []
+    for number, row in enumerate(rows):
+        for level, snr_db in enumerate(snrs):
+            if fold(split, seed, row["subtype"], row["model"], snr_db) == wanted:
+                chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
+    return [(number, level) for _, number, level in sorted(chosen)]
+
+
+def write_shard(
+    path: str | Path, rows: list[dict], snrs: list[float], split: dict, seed: int, network: Network, wanted: str,
+    kind: str, content: Callable[[int, int], bytes],
+) -> dict:  # fmt: skip
+    """Write `path` (.tar) and its table beside it; return the table's header.
+
+    rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
+    sample's .png (kind "image") or .npy (kind "signal").
+    Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
+    """
+    if wanted not in FOLDS or kind not in KINDS:
+        raise InputError(f"{path}: fold {wanted!r} of kind {kind!r}, expected one of {FOLDS} and of {KINDS}")
+    groups = sorted({row["group"] for row in rows})
+    if len(groups) != 1:
+        raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
+    chosen = select(rows, snrs, split, seed, wanted)
+    table = np.zeros(len(chosen), SAMPLE)
+    with replacing(path) as temporary:
+        with temporary.open("wb") as file:
+            tar = Writer(file)
+            for place, (number, level) in enumerate(chosen):
+                row, snr_db = rows[number], snrs[level]
+                key = sample_key(row["subtype"], row["model"], snr_db)
+                text = record(row, snr_db, wanted, seed, network)
+                span = tar.add(key, text, EXTENSIONS[kind], content(number, level))
+                label = CATEGORIES.index(row["category"])
+                digest = np.frombuffer(span.sha256, np.uint8)
+                table[place] = (
+                    key,
+                    label,
+                    row["model"],
+                    snr_db,
+                    span.offset,
+                    span.size,
+                    *span.record,
+                    *span.data,
+                    digest,
+                )
+            checksum = tar.close()
+        if len(np.unique(table["key"])) != len(table):
+            raise InputError(f"{path}: a sample key stands twice")
+        header = {
+            "name": Path(path).name, "kind": kind, "group": groups[0], "fold": wanted,
+            "samples": len(table), "bytes": tar.size, "sha256": checksum,
+        }  # fmt: skip
+        write_table(table_path(path), header, table)
+    return header

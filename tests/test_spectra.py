@@ -1,0 +1,170 @@
+"""Spectra against the definitions written out in loops, and the laws and physics that they keep."""
+
+import numpy as np
+import pytest
+import reference_spectra as reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.errors import InputError
+from lowalt.network import SPEED_OF_LIGHT
+from lowalt.spectra import Fourier, Spectra, Transfer, magnitudes, trp, vrp, vt, windows
+from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
+
+INTERVAL = 2.5e-3
+CARRIER = 4.93192e9
+
+
+def noise(*shape, seed=0):
+    pair = np.random.default_rng(seed).standard_normal((2, *shape))
+    return pair[0] + 1j * pair[1]
+
+
+def close(found, expected):
+    """Agreement to 1e-10 of the largest value."""
+    assert found.shape == expected.shape
+    assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(("symbols", "window", "hop", "points"), [(40, 16, 1, 16), (41, 8, 3, 32), (20, 2, 4, 2)])
+def test_magnitudes_are_the_definition(symbols, window, hop, points):
+    signal = noise(symbols)
+    close(magnitudes(signal, Fourier(window, hop, points)), reference.stft(signal, window, hop, points))
+
+
+def test_published_shapes_and_definition_at_published_settings():
+    signal = noise(400, seed=1)
+    assert vrp(signal).shape == (256, 144)
+    assert trp(signal).shape == (1024, 392)
+    assert vt(signal, CARRIER, INTERVAL).shape == (123, 392)
+    # Four windows of the long transform and thirteen of the short one keep the loops short.
+    close(vrp(signal[:260]), reference.stft(signal[:260], 256, 1, 256))
+    close(trp(signal[:21]), reference.stft(signal[:21], 8, 1, 1024))
+
+
+@pytest.mark.parametrize(("window", "hop"), [(8, 1), (5, 2)])
+def test_velocity_transfer_is_the_definition(window, hop):
+    signal = noise(40, seed=2)
+    setting = Spectra(vt=Transfer(window, hop, -6.1, 6.1, 0.1))
+    speeds = [-6.1 + 0.1 * step for step in range(123)]
+    expected = reference.velocity_transfer(signal, CARRIER, INTERVAL, window, hop, speeds)
+    close(vt(signal, CARRIER, INTERVAL, setting), expected)
+
+
+def test_batches_are_single_signals():
+    signals = noise(2, 3, 300, seed=3)
+    for function in (vrp, trp, lambda s: vt(s, CARRIER, INTERVAL)):
+        whole = function(signals)
+        assert whole.shape[:2] == (2, 3)
+        np.testing.assert_array_equal(whole[1, 2], function(signals[1, 2]))
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(("window", "points"), [(256, 256), (8, 1024), (2, 2), (4, 64), (16, 16)])
+def test_sliding_transform_is_the_definition(dtype, window, points):
+    signal = noise(400, seed=4).astype(np.complex128 if dtype == np.float64 else np.complex64)
+    expected = np.fft.ifftshift(magnitudes(signal, Fourier(window, 1, points)), axes=0)
+    found = np.empty(expected.shape, dtype)
+    parts = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
+    fourier_magnitudes(*parts, window, points, *turns(points, dtype), found)
+    bound = 1e-10 if dtype == np.float64 else 2e-6
+    assert np.abs(found - expected).max() <= bound * expected.max()
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize("window", [1, 5, 8])
+def test_sliding_transfer_is_the_definition(dtype, window):
+    signal = noise(400, seed=5).astype(np.complex128 if dtype == np.float64 else np.complex64)
+    setting = Spectra(vt=Transfer(window, 1, -6.1, 6.1, 0.1))
+    expected = vt(signal, CARRIER, INTERVAL, setting)
+    steps = np.outer(setting.vt.speeds_mps, np.arange(window + 1))
+    phase = 4 * np.pi * CARRIER * INTERVAL / SPEED_OF_LIGHT * steps
+    share = np.array([(window / (window + 1)) ** 2], dtype)
+    found = np.empty(expected.shape, dtype)
+    parts = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
+    transfer(*parts, window, np.cos(phase).astype(dtype), np.sin(phase).astype(dtype), share, found)
+    bound = 1e-10 if dtype == np.float64 else 5e-6
+    assert np.abs(found - expected).max() <= bound * np.abs(expected).max()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(-128, 127), st.floats(0.1, 10), st.floats(0, 6.3))
+def test_a_tone_on_a_bin_stands_in_one_row(row, amplitude, phase):
+    tone = amplitude * np.exp(1j * (2 * np.pi * row * np.arange(300) / 256 + phase))
+    spectrum = vrp(tone)
+    assert (spectrum.argmax(axis=0) == row + 128).all()
+    np.testing.assert_allclose(spectrum.max(axis=0), 256 * amplitude, rtol=1e-12)
+    # Parseval: a window's energy is the mean of its squared spectrum.
+    np.testing.assert_allclose((spectrum**2).mean(axis=0), 256 * amplitude**2, rtol=1e-10)
+
+
+@pytest.mark.parametrize("speed", [-5.2, -0.4, 0.0, 3.3])
+def test_speed_of_a_receding_point_is_read_back(speed):
+    """Range grows with v, so the echo turns by -4 pi f v T_r / c a symbol: a fall in FFT frequency."""
+    echo = np.exp(-4j * np.pi * CARRIER * speed * INTERVAL * np.arange(400) / SPEED_OF_LIGHT)
+    frequency = (vrp(echo)[:, 70].argmax() - 128) / 256 / INTERVAL
+    assert abs(frequency + 2 * CARRIER * speed / SPEED_OF_LIGHT) <= 0.5 / 256 / INTERVAL + 1e-9
+    speeds = Spectra().vt.speeds_mps
+    transition = np.abs(vt(echo, CARRIER, INTERVAL)[:, 70])
+    # A steady point gains nothing at its own speed: |9|^2 (8/9)^2 - |8|^2 = 0.
+    assert transition[np.abs(speeds - speed).argmin()] < 1e-9 * transition.max()
+
+
+def test_laws_of_scale_and_delay():
+    signal = noise(400, seed=6)
+    np.testing.assert_allclose(vrp(2j * signal), 2 * vrp(signal), rtol=1e-12)
+    quadrupled = vt(2j * signal, CARRIER, INTERVAL)
+    single = vt(signal, CARRIER, INTERVAL)
+    np.testing.assert_allclose(quadrupled, 4 * single, atol=1e-10 * np.abs(single).max())
+    np.testing.assert_array_equal(trp(signal[5:])[:, :300], trp(signal)[:, 5:305])
+
+
+def test_windows_are_one_fewer_than_usual():
+    assert [windows(400, 256, 1, "vrp"), windows(400, 8, 1, "trp"), windows(400, 8, 3, "vt")] == [144, 392, 130]
+
+
+@pytest.mark.parametrize("symbols", [255, 256])
+def test_a_signal_no_longer_than_a_window_is_refused_by_name(symbols):
+    with pytest.raises(InputError, match="spectrum vrp.*256.*257"):
+        vrp(noise(symbols))
+    with pytest.raises(InputError, match="vrp"):
+        Spectra().check(symbols)
+    with pytest.raises(InputError, match="vt"):
+        vt(noise(8), CARRIER, INTERVAL)
+
+
+def test_a_signal_that_is_not_finite_is_refused():
+    signal = noise(400)
+    signal[3] = np.nan
+    for function in (vrp, trp, lambda s: vt(s, CARRIER, INTERVAL)):
+        with pytest.raises(InputError, match="NaN"):
+            function(signal)
+
+
+BLOCK = {
+    "vrp": {"window": 256, "hop": 1, "points": 256},
+    "trp": {"window": 8, "hop": 1, "points": 1024},
+    "vt": {"window": 8, "hop": 1, "speed_min_mps": -6.1, "speed_max_mps": 6.1, "speed_step_mps": 0.1},
+}
+
+
+def test_settings_default_to_the_published_ones():
+    assert Spectra.from_settings(BLOCK) == Spectra()
+    np.testing.assert_allclose(Spectra().vt.speeds_mps, np.arange(-61, 62) / 10, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("part", "change", "named"),
+    [
+        ("vrp", {"window": 255}, "255"),
+        ("vrp", {"points": 128}, "128"),
+        ("trp", {"hop": 0}, "hop"),
+        ("trp", {"overlap": 3}, "overlap"),
+        ("vt", {"speed_step_mps": 0}, "step"),
+        ("vt", {"speed_min_mps": 7.0}, "min < max"),
+        ("vt", {"speed_max_mps": float("inf")}, "speed_max_mps"),
+    ],
+)
+def test_wrong_settings_are_refused_by_name(part, change, named):
+    with pytest.raises(InputError, match=named):
+        Spectra.from_settings({**BLOCK, part: {**BLOCK[part], **change}})
