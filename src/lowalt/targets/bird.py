@@ -24,7 +24,7 @@ primaries at the tip."""
 FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
 """Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi F t - fold_lag)."""
 
-MOVING_SHARE = 0.5
+MOVING_SHARE = 0.62
 
 
 def _body(length: float, f: dict) -> tuple[Surface, ...]:

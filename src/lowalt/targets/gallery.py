@@ -1,4 +1,4 @@
-"""Gallery: all clouds in one picture, one row a category at a fixed scale, coloured by part."""
+"""Gallery: all clouds in one picture, coloured by part: a line-up at one scale a category, then each by itself."""
 
 import argparse
 from pathlib import Path
@@ -10,72 +10,85 @@ from lowalt.files import replacing
 from lowalt.targets.cloud import CATEGORIES, Cloud, read
 
 COLUMNS = 5
-ELEVATION_DEG, AZIMUTH_DEG = 24.0, 35.0
-BODY_COLOUR = "#6b7280"
-PART_COLOURS = ("#d1495b", "#0077b6", "#edae49", "#2a9d8f", "#8e44ad", "#5f8a1f", "#e76f51", "#264653")
+VIEWS = {"UAV": (160.0, 55.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
+"""Azimuth from the front towards the right and elevation of the viewer (degrees): where each category shows best."""
+
+BODY_COLOUR = "#52525b"
+PART_COLOURS = ("#d1495b", "#0077b6", "#e09f1f", "#2a9d8f", "#8e44ad", "#5f8a1f", "#e76f51", "#264653")
+FAINT = 0.22
+"""Opacity of points that face away from the viewer."""
 
 
-def view(points: np.ndarray) -> np.ndarray:
-    """Return points (L, 3) as seen from the front right above, orthographic: right, up and toward the viewer (L, 3)."""
-    azimuth, elevation = np.radians(AZIMUTH_DEG), np.radians(ELEVATION_DEG)
+def axes_of(category: str) -> np.ndarray:
+    """Return the rotation (3, 3) from body axes to right, up and toward the viewer, for the category's view."""
+    azimuth, elevation = np.radians(VIEWS[category])
     toward = np.array([np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     right = np.array([-np.cos(azimuth), np.sin(azimuth), 0.0])
-    up = np.cross(toward, right)
-    return points @ np.stack([right, up, toward], 1)
+    return np.stack([right, np.cross(toward, right), toward])
 
 
 def shown(cloud: Cloud) -> np.ndarray:
-    """Return the points as they are drawn (L, 3): a recording's first frame, otherwise the cloud itself."""
-    return cloud.track[0] if len(cloud.track) else cloud.points
+    """Return the points as seen (L, 3), right, up, toward (m): a recording's first frame, or the cloud at rest."""
+    points = cloud.track[0] if len(cloud.track) else cloud.points
+    seen = points @ axes_of(cloud.category).T
+    return seen - [*((seen.max(0) + seen.min(0))[:2] / 2), 0]
 
 
-def colours(cloud: Cloud) -> list[str]:
-    """Return one colour a point: grey for the body, the parts' colours in turn for the rest."""
-    return [
-        BODY_COLOUR if cloud.kinds[part] == "body" else PART_COLOURS[part % len(PART_COLOURS)] for part in cloud.part
-    ]
+def colours(cloud: Cloud) -> np.ndarray:
+    """Return one colour a point, RGBA (L, 4): grey for the body, the parts in turn, faint where it faces away."""
+    from matplotlib.colors import to_rgba
+
+    names = [BODY_COLOUR if kind == "body" else PART_COLOURS[i % len(PART_COLOURS)] for i, kind in enumerate(cloud.kinds)]
+    result = np.array([to_rgba(name) for name in names])[cloud.part]
+    toward = cloud.normals @ axes_of(cloud.category)[2]
+    # Points without a normal compare false and stay full.
+    result[toward < -0.05, 3] = FAINT
+    return result
 
 
-def scale(clouds: list[Cloud]) -> float:
-    """Return half the side (m) of the square that holds every cloud of a category as drawn."""
-    return max(np.ptp(view(shown(cloud)), axis=0)[:2].max() for cloud in clouds) / 2 * 1.05
-
-
-def draw(axes, cloud: Cloud, half: float, note: str) -> None:
-    """Draw one cloud into matplotlib axes, `half` (m) from the middle to each edge, nearer points in front."""
-    seen = view(shown(cloud))
-    middle = (seen.max(0) + seen.min(0))[:2] / 2
+def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
+    """Draw one cloud into matplotlib axes in metres, `shift` (m) to the right, nearer points in front."""
+    seen = shown(cloud)
     order = np.argsort(seen[:, 2])
-    shade = np.array(colours(cloud))
-    axes.scatter(*(seen[order, :2] - middle).T, c=shade[order], s=5.0, linewidths=0)
-    axes.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
-    axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {cloud.record['source']}{note}", fontsize=7)
-    for spine in axes.spines.values():
-        spine.set_color("#d4d4d8")
+    axes.scatter(seen[order, 0] + shift, seen[order, 1], c=colours(cloud)[order], s=size, linewidths=0)
 
 
-def figure(clouds: list[Cloud], zoom: bool = False):
-    """Return the matplotlib figure: the clouds by category, in rows of five, one scale a category.
+def _lineup(axes, clouds: list[Cloud]) -> None:
+    """All clouds of a category side by side at one scale, with a bar of a round length."""
+    widths = np.array([np.ptp(shown(cloud)[:, 0]) for cloud in clouds])
+    gap = 0.12 * widths.mean()
+    middles = np.cumsum(widths + gap) - widths / 2
+    for cloud, middle in zip(clouds, middles, strict=True):
+        draw(axes, cloud, 1.6, middle)
+    low = min(shown(cloud)[:, 1].min() for cloud in clouds)
+    bar = 10 ** np.floor(np.log10(widths.max()))
+    axes.plot([0, bar], [low - gap, low - gap], color="black", linewidth=1.2)
+    axes.text(bar, low - gap, f"  {bar:g} m", va="center", fontsize=7)
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    axes.set_title(f"{clouds[0].category}: one scale", fontsize=9, loc="left")
 
-    With `zoom` each cloud fills its own panel, so that the small ones can be looked at.
-    """
+
+def figure(clouds: list[Cloud]):
+    """Return the matplotlib figure: for each category a line-up at one scale, then every cloud filling its panel."""
     from matplotlib.figure import Figure
 
-    groups = [(name, [c for c in clouds if c.category == name]) for name in CATEGORIES]
-    rows = [
-        (name, members, members[start : start + COLUMNS])
-        for name, members in groups
-        for start in range(0, len(members), COLUMNS)
-    ]
-    result = Figure(figsize=(2.4 * COLUMNS, 2.7 * len(rows)), dpi=110, layout="constrained")
-    panels = result.subplots(len(rows), COLUMNS, squeeze=False)
-    for line, (name, members, row) in zip(panels, rows, strict=True):
-        for axes, cloud in zip(line, row, strict=False):
-            half = scale([cloud] if zoom else members)
-            draw(axes, cloud, half, f", {2 * half:.2g} m")
-        for axes in line[len(row) :]:
-            axes.set_axis_off()
-        line[0].set_ylabel(name, fontsize=9)
+    groups = [members for name in CATEGORIES if (members := [c for c in clouds if c.category == name])]
+    rows = [-(-len(members) // COLUMNS) for members in groups]
+    result = Figure(figsize=(2.5 * COLUMNS, sum(1.5 + 2.6 * count for count in rows)), dpi=110, layout="constrained")
+    blocks = result.subfigures(len(groups), 1, squeeze=False, height_ratios=[1.5 + 2.6 * count for count in rows])[:, 0]
+    for block, members, count in zip(blocks, groups, rows, strict=True):
+        grid = block.add_gridspec(count + 1, COLUMNS, height_ratios=[1.5] + [2.6] * count)
+        _lineup(block.add_subplot(grid[0, :]), members)
+        for index, cloud in enumerate(members):
+            axes = block.add_subplot(grid[1 + index // COLUMNS, index % COLUMNS])
+            draw(axes, cloud, 7.0)
+            half = np.ptp(shown(cloud), axis=0)[:2].max() / 2 * 1.06
+            axes.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
+            source = cloud.record["source"]
+            axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {source}, {2 * half:.2g} m wide", fontsize=7)
+            for spine in axes.spines.values():
+                spine.set_color("#d4d4d8")
     return result
 
 
@@ -84,12 +97,10 @@ def main(arguments: list[str]) -> None:
     line = argparse.ArgumentParser(prog="python -m lowalt.targets.gallery", description=__doc__)
     line.add_argument("--clouds", required=True, nargs="+", type=Path, help="cloud files")
     line.add_argument("--out", required=True, type=Path, help="picture to write (.png)")
-    line.add_argument(
-        "--zoom", action="store_true", help="let every cloud fill its panel, instead of one scale a category"
-    )
     given = line.parse_args(arguments)
     with replacing(given.out) as temporary:
-        figure([read(path) for path in given.clouds], given.zoom).savefig(temporary)
+        # No version or date in the file: equal clouds give equal bytes.
+        figure([read(path) for path in given.clouds]).savefig(temporary, metadata={"Software": None})
 
 
 if __name__ == "__main__":

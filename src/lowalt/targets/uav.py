@@ -69,11 +69,11 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
 
 
 def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
-    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, first blade pointing outward."""
+    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, the first blade square to its arm."""
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
-    out = np.arctan2(hub[1], hub[0])
+    out = np.arctan2(hub[1], hub[0]) + np.pi / 2
     turn = np.array([[np.cos(out), -np.sin(out), 0], [np.sin(out), np.cos(out), 0], [0, 0, 1]])
     axis = (0.0, 0.0, float(sense))
     return Part(name, "rotor", (shell.mapped(turn).moved(hub),), tuple(hub), axis, copies=int(figure["blade_count"]))

@@ -7,7 +7,7 @@ half the height above the ground.
 import numpy as np
 
 from lowalt.targets.assemble import Part
-from lowalt.targets.surfaces import Surface, cylinder, hull, loft, ring, superellipse
+from lowalt.targets.surfaces import Surface, box, cylinder, hull, loft, ring, superellipse
 
 FIGURES = {
     "car": {
@@ -108,6 +108,9 @@ def parts(record: dict) -> tuple[list[Part], dict]:
             )  # fmt: skip
             inside, outside = side * (across - 0.6 * tyre), side * width
             wells.append(cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24))
+    # No station looks up at a car: the underside between the sills would only take points from what is seen.
+    floor = f["ground_clearance"] + 0.06 * height
+    wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
     body = Part("body", "body", (_lower(length, width, height, f), _greenhouse(length, width, height, f)),
                 cuts=tuple(wells))  # fmt: skip
     return [body, *wheels], {"wheel_diameter_m": diameter, "origin_height_m": height / 2}
