@@ -39,23 +39,24 @@ def velocity_transfer(signal, frequency_hz, interval_s, window, hop, speeds):
     return out
 
 
+def resampled_line(values, out):
+    """The triangle kernel on one axis, one output value after the other."""
+    ratio = len(values) / out
+    result = []
+    for j in range(out):
+        top = bottom = 0.0
+        for i, value in enumerate(values):
+            weight = max(0.0, 1 - abs(i + 0.5 - (j + 0.5) * ratio) / max(1.0, ratio))
+            top += weight * value
+            bottom += weight
+        result.append(top / bottom)
+    return result
+
+
 def resampled(values, size):
-    """Triangle kernel on both axes, one output value after the other."""
-
-    def line(row, out):
-        ratio = len(row) / out
-        result = []
-        for j in range(out):
-            top = bottom = 0.0
-            for i, value in enumerate(row):
-                weight = max(0.0, 1 - abs(i + 0.5 - (j + 0.5) * ratio) / max(1.0, ratio))
-                top += weight * value
-                bottom += weight
-            result.append(top / bottom)
-        return result
-
-    rows = np.array([line(row, size) for row in values])
-    return np.array([line(column, size) for column in rows.T]).T
+    """The triangle kernel on both axes, rows first."""
+    rows = np.array([resampled_line(row, size) for row in values])
+    return np.array([resampled_line(column, size) for column in rows.T]).T
 
 
 def index_image(values, signed, scale, floor_db=40.0, gamma=1.0):

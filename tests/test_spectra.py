@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-import reference_spectra as reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import reference_spectra as reference
 from lowalt.errors import InputError
 from lowalt.network import SPEED_OF_LIGHT
 from lowalt.spectra import Fourier, Spectra, Transfer, magnitudes, trp, vrp, vt, windows
@@ -125,7 +125,7 @@ def test_windows_are_one_fewer_than_usual():
 
 @pytest.mark.parametrize("symbols", [255, 256])
 def test_a_signal_no_longer_than_a_window_is_refused_by_name(symbols):
-    with pytest.raises(InputError, match="spectrum vrp.*256.*257"):
+    with pytest.raises(InputError, match=r"spectrum vrp.*256.*257"):
         vrp(noise(symbols))
     with pytest.raises(InputError, match="vrp"):
         Spectra().check(symbols)

@@ -1,0 +1,297 @@
+"""Images of spectra: the resampling kernel, the scales, the fused renderer, PNG and the command line."""
+
+import io
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+import reference_spectra as reference
+from lowalt.command import settings as read_settings
+from lowalt.errors import InputError
+from lowalt.network import Network
+from lowalt.spectra import Fourier, Spectra, Transfer, trp, vrp, vt
+from lowalt.tiles import (
+    Images,
+    Renderer,
+    Scale,
+    colour_map,
+    decode,
+    encode,
+    files,
+    join,
+    paint,
+    resize,
+    split,
+    triangle,
+)
+from lowalt.tiles.__main__ import main
+from lowalt.tiles.render import normalised
+from lowalt.tiles.scale import index, lookup
+
+NETWORK = {
+    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
+    "symbol_interval_s": 2.5e-3, "symbols": 400, "transmit_array": [16, 4], "receive_array": [16, 4], "power_w": 1.0,
+    "stations": {
+        "A": {"position_m": [0.0, 0.0, 25.0], "normal_deg": 30.0},
+        "B": {"position_m": [500.0, 0.0, 25.0], "normal_deg": 150.0},
+        "C": {"position_m": [250.0, 433.0, 25.0], "normal_deg": 270.0},
+    },
+}  # fmt: skip
+SPECTRA = {
+    "vrp": {"window": 256, "hop": 1, "points": 256},
+    "trp": {"window": 8, "hop": 1, "points": 1024},
+    "vt": {"window": 8, "hop": 1, "speed_min_mps": -6.1, "speed_max_mps": 6.1, "speed_step_mps": 0.1},
+}
+IMAGES = {"size": 256, "scale": "decibel", "floor_db": 40.0, "gamma": 1.0, "colour_map": "viridis"}
+SCALES = [Scale("linear"), Scale("decibel", 40.0), Scale("decibel", 60.0), Scale("power", gamma=0.5)]
+
+
+def renderer(scale=None, **changes):
+    network = Network.from_settings({**NETWORK, **changes})
+    return Renderer(network, Spectra(), Images(256, scale or Scale()))
+
+
+def echoes(seed=0, level=1e-7, snr=0.05):
+    """A rotor-like phase modulation with noise, (3, 400) complex64."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(400) * 2.5e-3
+    tones = np.exp(1j * 8 * np.sin(2 * np.pi * rng.uniform(2, 12, (3, 1)) * times)) * np.exp(60j * np.pi * times)
+    grain = rng.standard_normal((2, 3, 400))
+    return (level * (tones + snr * (grain[0] + 1j * grain[1]))).astype(np.complex64)
+
+
+@pytest.mark.parametrize(
+    ("size", "out"), [(5, 5), (5, 8), (9, 4), (144, 256), (392, 256), (1024, 256), (256, 224), (1, 3)]
+)
+def test_triangle_is_its_formula(size, out):
+    values = np.random.default_rng(size).standard_normal(size)
+    np.testing.assert_allclose(triangle(size, out) @ values, reference.resampled_line(values, out), atol=1e-12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(1, 90), st.integers(1, 90))
+def test_laws_of_the_triangle(size, out):
+    weights = triangle(size, out)
+    np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-12)
+    assert (weights >= 0).all()
+    # Turning the axis round before or after is the same: images turn rows round after the definition.
+    np.testing.assert_allclose(weights, weights[::-1, ::-1], atol=1e-12)
+    if size == out:
+        np.testing.assert_array_equal(weights, np.eye(size))
+
+
+def test_the_kernel_is_pillows_bilinear():
+    values = np.random.default_rng(0).random((123, 392)).astype(np.float32)
+    pillow = np.asarray(Image.fromarray(values).resize((256, 256), Image.Resampling.BILINEAR))
+    ours = triangle(123, 256) @ values @ triangle(392, 256).T
+    np.testing.assert_allclose(pillow, ours, atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
+@pytest.mark.parametrize("signed", [False, True])
+def test_index_is_the_formula(scale, signed):
+    values = np.random.default_rng(1).standard_normal((40, 40)) ** 3
+    values = values if signed else np.abs(values)
+    expected = reference.index_image(values[::-1], signed, scale.name, scale.floor_db, scale.gamma)
+    np.testing.assert_array_equal(index(values, scale, signed), expected)
+
+
+@pytest.mark.parametrize("scale", [*SCALES, Scale("power", gamma=2.0), Scale("decibel", 140.0)])
+@pytest.mark.parametrize("levels", [127, 255])
+def test_lookup_counts_thresholds_exactly(scale, levels):
+    """On both sides of every threshold and on many values between, the tables give the count itself."""
+    table, thresholds = lookup(scale, levels), scale.thresholds(levels).astype(np.float32)
+    edges = [thresholds, np.nextafter(thresholds, np.float32(0)), np.nextafter(thresholds, np.float32(2))]
+    x = np.minimum(np.concatenate([*edges, np.linspace(0, 1, 9999, dtype=np.float32)]), np.float32(1))
+    keys = np.maximum(x.view(np.int32) - table.lowest, 0) >> table.shift
+    found = table.base[keys] + (x >= table.cut[keys])
+    np.testing.assert_array_equal(found, np.searchsorted(thresholds, x, side="right"))
+
+
+@pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
+def test_renderer_agrees_with_the_definition(scale):
+    """float32 against the float64 definition: at most one level off, and seldom."""
+    signals, tiles = echoes(), renderer(scale)
+    found = split(tiles.tile(signals)).astype(int)
+    for station in range(3):
+        carrier = tiles.network.stations[station].frequency_hz
+        spectra = (vrp(signals[station]), trp(signals[station]), vt(signals[station], carrier, 2.5e-3))
+        for view, values in enumerate(spectra):
+            resampled = triangle(values.shape[0], 256) @ values @ triangle(values.shape[1], 256).T
+            expected = index(resampled[::-1], scale, signed=view == 2)
+            off = np.abs(found[3 * station + view] - expected)
+            assert off.max() <= 1
+            assert (off > 0).mean() < 1e-3
+
+
+def test_renderer_against_the_loops():
+    """A small sample, all the way from the definitions in loops."""
+    block = {**NETWORK, "symbols": 40, "stations": {"A": NETWORK["stations"]["A"]}}
+    spectra = Spectra(Fourier(16, 1, 16), Fourier(8, 2, 32), Transfer(6, 1, -3.0, 3.0, 0.25))
+    tiles = Renderer(Network.from_settings(block), spectra, Images(24, Scale("linear")))
+    signal = echoes(3)[:1, :40]
+    images = split(tiles.tile(signal)).astype(int)
+    speeds = [-3 + 0.25 * step for step in range(25)]
+    values = [
+        reference.stft(signal[0], 16, 1, 16),
+        reference.stft(signal[0], 8, 2, 32),
+        reference.velocity_transfer(signal[0], 4.9e9, 2.5e-3, 6, 1, speeds),
+    ]
+    for view in range(3):
+        expected = reference.index_image(reference.resampled(values[view], 24), view == 2, "linear")
+        off = np.abs(images[view] - expected)
+        assert off.max() <= 1
+        assert (off > 0).mean() < 0.01
+
+
+def test_orientation_of_axes():
+    """Row 0 is the most positive value, time runs right, stations go down, spectra go right."""
+    times = np.arange(400)
+    rising = np.exp(2j * np.pi * 100 * 2.5e-3 * times) * (times > 200)
+    receding = np.exp(-4j * np.pi * 4.9e9 * 4.0 * 2.5e-3 * times / 299792458) * (times % 50 < 25)
+    tile = renderer(Scale("linear")).tile(np.stack([rising, receding, 0 * rising]).astype(np.complex64))
+    images = split(tile)
+    # 100 Hz of the +-200 Hz stands a quarter from the top and only in the second half of the time.
+    assert abs(int(images[1][:, 200].argmax()) - 64) <= 1
+    assert images[1][:, :120].max() == 0
+    # A receding speed is a negative frequency, in the lower half of the Fourier images, but positive in the VT.
+    assert images[3].sum(axis=1).argmax() > 128
+    assert np.abs(images[5].astype(int) - 128).sum(axis=1).argmax() < 128
+    assert (images[6] == 0).all() and (images[8] == 128).all()
+    np.testing.assert_array_equal(tile[:256, 256:512], images[1])
+    np.testing.assert_array_equal(join(images), tile)
+
+
+@pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
+def test_zero_and_constant_signals_have_defined_images(scale):
+    tiles = renderer(scale)
+    zero = split(tiles.tile(np.zeros((3, 400), np.complex64)))
+    assert (zero[[0, 1, 3, 4, 6, 7]] == 0).all()
+    assert (zero[[2, 5, 8]] == 128).all()
+    constant = split(tiles.tile(np.full((3, 400), 0.25 + 0.5j, np.complex64)))
+    # Frequency zero is bin 128 from below, row 127 from above; nothing changes along time.
+    assert (constant[0][127] == 255).all() and (constant[0][[126, 128]] == 0).all()
+    assert (constant == constant[..., :1]).all()
+    flat = np.full((9, 9), 3.0)
+    assert (index(flat, scale, signed=False) == 255).all()
+    assert (index(-flat, scale, signed=True) == 1).all()
+
+
+@pytest.mark.parametrize("snr_db", [-60, 200, np.inf])
+def test_extreme_snrs_have_defined_images(snr_db):
+    clean = echoes(1, snr=0)
+    grain = np.random.default_rng(2).standard_normal((2, 3, 400))
+    noise = 1e-7 * 10 ** (-snr_db / 20) * (grain[0] + 1j * grain[1]) / np.sqrt(2)
+    images = split(renderer().tile((clean + noise).astype(np.complex64)))
+    assert ((images.max(axis=(1, 2)) == 255) | (images.min(axis=(1, 2)) == 1)).all()
+    if snr_db == 200:
+        np.testing.assert_array_equal(images, split(renderer().tile(clean)))
+
+
+@pytest.mark.parametrize("level", [1e-36, 1e-30, 1e-12, 1.0, 1e30])
+def test_the_level_of_a_signal_changes_no_pixel(level):
+    """A power of two between two signals is no difference, however small or large they are."""
+    signals = echoes(4, level=1.0)
+    power = 2.0 ** np.round(np.log2(level))
+    np.testing.assert_array_equal(renderer().tile((signals * power).astype(np.complex64)), renderer().tile(signals))
+    assert 0.5 <= np.abs(np.concatenate([normalised(signals[0]).real, normalised(signals[0]).imag])).max() < 1
+
+
+def test_pixels_depend_on_the_signal_alone():
+    first, second = echoes(5), echoes(6)
+    tiles = renderer()
+    alone = tiles.tile(first)
+    tiles.tile(second)
+    np.testing.assert_array_equal(tiles.tile(first), alone)
+    np.testing.assert_array_equal(tiles.tile(first[[1, 0, 2]])[512:], alone[512:])
+
+
+def test_refusals_name_what_is_wrong():
+    with pytest.raises(InputError, match=r"spectrum vrp.*256"):
+        renderer(symbols=256)
+    with pytest.raises(InputError, match=r"\(2, 400\)"):
+        renderer().tile(echoes()[:2])
+    bad = echoes()
+    bad[1, 7] = np.inf
+    with pytest.raises(InputError, match="infinite"):
+        renderer().tile(bad)
+    for change, named in [
+        ({"scale": "log"}, "log"), ({"floor_db": 0}, "floor_db"), ({"gamma": 9}, "gamma"), ({"size": 0}, "size"),
+        ({"colour_map": "rainbows"}, "rainbows"), ({"sise": 3}, "sise"),
+    ]:  # fmt: skip
+        with pytest.raises(InputError, match=named):
+            Images.from_settings({**IMAGES, **change})
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 40), st.integers(1, 40), st.integers(0, 2**32 - 1))
+def test_png_gives_the_pixels_back(height, width, seed):
+    image = np.random.default_rng(seed).integers(0, 256, (height, width), np.uint8)
+    palette = colour_map("viridis")
+    data = encode(image, palette)
+    found, colours = decode(data)
+    np.testing.assert_array_equal(found, image)
+    np.testing.assert_array_equal(colours, palette)
+    with Image.open(io.BytesIO(data)) as picture:
+        np.testing.assert_array_equal(np.asarray(picture.convert("RGB")), paint(image, palette))
+
+
+def test_damaged_or_other_images_are_refused():
+    data = encode(np.arange(256, dtype=np.uint8).reshape(16, 16), colour_map("gray"))
+    gray = io.BytesIO()
+    Image.new("L", (4, 4)).save(gray, "PNG")
+    for bad in (b"", data[:60], data[:100] + b"\0" + data[101:], b"GIF89a", gray.getvalue()):
+        with pytest.raises(InputError, match="image"):
+            decode(bad)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(2, 80), st.integers(0, 2**32 - 1))
+def test_resize_is_pillows_on_index_values(size, seed):
+    image = np.random.default_rng(seed).integers(0, 256, (64, 64), np.uint8)
+    pillow = np.asarray(Image.fromarray(image.astype(np.float32)).resize((size, size), Image.Resampling.BILINEAR))
+    off = np.abs(resize(image, size) - pillow)
+    assert off.max() <= 0.5 + 1e-3
+    np.testing.assert_array_equal(resize(np.stack([image] * 2), size)[1], resize(image, size))
+
+
+def test_tiles_file_keeps_every_image(tmp_path):
+    images = [bytes([number]) * (number * 7) for number in range(5)]
+    assert files.write(tmp_path / "tiles.npz", iter(images)) == (5, 70)
+    found = files.Tiles(tmp_path / "tiles.npz")
+    assert [found[number] for number in range(len(found))] == images
+    with np.load(tmp_path / "tiles.npz") as plain:
+        assert plain["data"].tobytes() == b"".join(images)
+        assert plain["offsets"].tolist() == [0, 0, 7, 21, 42, 70]
+    assert zipfile.ZipFile(tmp_path / "tiles.npz").testzip() is None
+    with pytest.raises(IndexError):
+        found[5]
+    (tmp_path / "bad.npz").write_bytes((tmp_path / "tiles.npz").read_bytes()[:-20])
+    with pytest.raises(InputError, match=r"bad\.npz"):
+        files.Tiles(tmp_path / "bad.npz")
+
+
+def test_command_line_renders_a_chunk(tmp_path):
+    signals = np.stack([echoes(seed) for seed in range(4)]).reshape(2, 2, 3, 400)
+    np.save(tmp_path / "noisy.npy", signals)
+    block = json.dumps({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    outputs = []
+    for name in ("one", "two"):
+        out = tmp_path / name / "chunk.npz"
+        main(["--settings", block, "--signals", str(tmp_path / "noisy.npy"), "--out", str(out)])
+        outputs.append(out)
+    assert outputs[0].read_bytes() == outputs[1].read_bytes()
+    assert sorted(path.name for path in outputs[0].parent.iterdir()) == ["chunk.npz"]
+    tiles = files.Tiles(outputs[0])
+    assert len(tiles) == 4
+    np.testing.assert_array_equal(decode(tiles[2])[0], renderer().tile(signals[1, 0]))
+    np.save(tmp_path / "noisy.npy", signals[..., :300])
+    with pytest.raises(InputError, match=r"noisy\.npy"):
+        main(["--settings", block, "--signals", str(tmp_path / "noisy.npy"), "--out", str(tmp_path / "no.npz")])
+    assert not (tmp_path / "no.npz").exists()
+    assert read_settings(block)["images"] == IMAGES
