@@ -110,14 +110,14 @@ def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height
     """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of the ground.
 
     `cycle` (F, 31, 3) cyclic, front +y, horizontal progress left out; `speed_mps` is added back. Zero would be a
-    foot that stands still. The ground is the cycle's lowest point.
+    foot that stands still. The ground is the feet's lowest point.
     """
     feet = cycle[:, FEET]
     velocity = (np.roll(feet, -1, axis=0) - np.roll(feet, 1, axis=0)) * rate_hz / 2
     velocity[..., 1] += speed_mps
     lowest = feet[..., 2].argmin(axis=1)
     frames = np.arange(len(feet))
-    down = feet[frames, lowest, 2] < cycle[..., 2].min() + height_m
+    down = feet[frames, lowest, 2] < feet[..., 2].min() + height_m
     return float(np.linalg.norm(velocity[frames, lowest, :2], axis=-1)[down].mean())
 
 

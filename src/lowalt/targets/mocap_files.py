@@ -1,0 +1,164 @@
+"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays, with every fault named by file and frame.
+
+Only the formats are here; what the angles do to the bones is in `mocap`. File axes: x left, y up, z front.
+Source: Acclaim's ASF/AMC format as the CMU Graphics Lab Motion Capture Database writes it.
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+from lowalt.targets.skeleton import LIMBS, NODES
+
+INCH_M = 0.0254
+_DOF = ("tx", "ty", "tz", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A skeleton file: bones (31, 3) in file units and file axes, `axes_rad` (31, 3) each bone's own frame, `dofs` the
+    channels of each node in the order of the file, `unit_m` metres a file unit."""
+
+    bones: np.ndarray
+    axes_rad: np.ndarray
+    dofs: dict[str, tuple[str, ...]]
+    unit_m: float
+
+
+def _sections(text: str) -> dict[str, list[list[str]]]:
+    """Return the file's sections by keyword, each a list of lines split into words."""
+    sections: dict[str, list[list[str]]] = {}
+    current: list[list[str]] = []
+    for line in text.splitlines():
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        if words[0].startswith(":"):
+            current = sections.setdefault(words[0].lower(), [])
+            words = words[1:]
+        if words:
+            current.append(words)
+    return sections
+
+
+def _blocks(lines: list[list[str]]) -> list[dict[str, list[str]]]:
+    """Return the begin/end blocks as mappings of first words to the words after them."""
+    blocks: list[dict[str, list[str]]] = []
+    for words in lines:
+        if words[0] == "begin":
+            blocks.append({})
+        elif words[0] != "end" and blocks:
+            blocks[-1].setdefault(words[0].lower(), words[1:])
+    return blocks
+
+
+def read_skeleton(path: str | Path) -> Skeleton:
+    """Return the skeleton of an .asf file.
+
+    Raises: InputError naming the file and what is missing, unknown or no number; also where the bones are not the 31
+    nodes, or angles are not in degrees.
+    """
+    path = existing(path, "skeleton file")
+    sections = _sections(path.read_text(errors="replace"))
+    for name in (":units", ":root", ":bonedata", ":hierarchy"):
+        if name not in sections:
+            raise InputError(f"{path}: no section {name}, expected an ASF skeleton")
+    units = {words[0].lower(): words[1:] for words in sections[":units"]}
+    if units.get("angle") != ["deg"]:
+        raise InputError(f"{path}: units angle is {units.get('angle')}, expected deg")
+    parents = {child: words[0] for words in sections[":hierarchy"] for child in words[1:]}
+    if parents != LIMBS:
+        wrong = sorted(name for name in {*parents, *LIMBS} if parents.get(name) != LIMBS.get(name))
+        raise InputError(f"{path}: hierarchy differs from CMU's 31 nodes at {wrong}")
+    root = {words[0].lower(): words[1:] for words in sections[":root"]}
+    bones, axes = np.zeros((len(NODES), 3)), np.zeros((len(NODES), 3))
+    dofs = {"root": tuple(word.lower() for word in root.get("order", []))}
+    try:
+        unit_m = INCH_M / float(units["length"][0])
+        fixed = [float(word) for word in root["position"][:3] + root["orientation"][:3]]
+        named = {block["name"][0]: block for block in _blocks(sections[":bonedata"])}
+        for name in LIMBS:
+            block, index = named[name], NODES.index(name)
+            direction = np.array([float(word) for word in block["direction"]])
+            bones[index] = direction / np.linalg.norm(direction) * float(block["length"][0])
+            if block["axis"][3].upper() != "XYZ":
+                raise InputError(f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ")
+            axes[index] = np.radians([float(word) for word in block["axis"][:3]])
+            dofs[name] = tuple(word.lower() for word in block.get("dof", []))
+    except (KeyError, IndexError, ValueError, ZeroDivisionError) as error:
+        raise InputError(f"{path}: missing or no number: {error}, expected an ASF skeleton") from None
+    wrong = {name: dof for name, dof in dofs.items() if not set(dof) <= set(_DOF[0 if name == "root" else 3 :])}
+    if wrong or len(dofs["root"]) != 6 or any(fixed):
+        raise InputError(f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})")
+    if not (np.isfinite(bones).all() and np.isfinite(axes).all() and 0 < unit_m < math.inf):
+        raise InputError(f"{path}: a length, direction or axis is not finite")
+    return Skeleton(bones, axes, dofs, unit_m)
+
+
+def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
+    """Return (frame number, words) of every line of data up to frame `last`; what follows is never looked at."""
+    result, frame = [], 0
+    for line in path.read_text(errors="replace").splitlines():
+        words = line.split()
+        if not words or words[0].startswith(("#", ":")):
+            continue
+        if len(words) == 1 and words[0].isdigit():
+            if last is not None and int(words[0]) > last:
+                break
+            if int(words[0]) != frame + 1:
+                raise InputError(f"{path}: frame {words[0]} follows frame {frame}, expected {frame + 1}")
+            frame += 1
+        elif not frame:
+            raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
+        else:
+            result.append((frame, words))
+    return result
+
+
+def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
+    expected = len(skeleton.dofs.get(words[0], ()))
+    try:
+        values = [float(word) for word in words[1:]]
+    except ValueError:
+        values = []
+    if not expected or len(values) != expected or not all(map(math.isfinite, values)):
+        raise InputError(
+            f"{where}: {' '.join(words)[:80]!r}, expected a node of the skeleton and {expected} finite numbers"
+        )
+    return values
+
+
+def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None) -> dict[str, np.ndarray]:
+    """Return the channels (F, channels) of each node that has any, frames `first` to `last` (1-based, inclusive).
+
+    Values in file units and degrees. Frames outside first..last are not checked, so a record can trim known faults.
+    Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a value that is no
+    finite number, an all-zero root, a frame equal to the one before it, fewer than two frames left.
+    """
+    path = existing(path, "motion file")
+    frames: dict[int, dict[str, list[float]]] = {}
+    for frame, words in _lines(path, last):
+        if frame >= first:
+            frames.setdefault(frame, {})[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    count = (max(frames) if frames else 0) - first + 1
+    if count < 2 or (last is not None and max(frames) < last):
+        found = f"frames up to {max(frames)}" if frames else "no frame in that range"
+        raise InputError(f"{path}: {found}, expected frames {first} to {last or 'the end'}, at least two")
+    needed = [name for name, dofs in skeleton.dofs.items() if dofs]
+    for frame in range(first, first + count):
+        lacking = [name for name in needed if name not in frames.get(frame, {})]
+        if lacking:
+            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (truncated file? trim it)")
+    motion = {name: np.array([frames[frame][name] for frame in range(first, first + count)]) for name in needed}
+    empty = np.flatnonzero(~motion["root"].any(axis=1))
+    if len(empty):
+        raise InputError(f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (trim it)")
+    still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
+    if still.any():
+        frame = first + 1 + int(np.argmax(still))
+        raise InputError(f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen")
+    return motion

@@ -1,0 +1,337 @@
+"""Recordings: forward kinematics against an independent BVH, faults named by file and frame, seamless cycles."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.errors import InputError
+from lowalt.targets import cloud as clouds
+from lowalt.targets import mocap
+from lowalt.targets.mocap_files import read_motion, read_skeleton
+from lowalt.targets.skeleton import LIMBS, NODES, PARENTS, rotation
+from real_inputs import FOLDER, needs_inputs
+
+CHANNELS = {"lfemur": "rx ry rz", "ltibia": "rx", "rfemur": "rx ry rz", "rtibia": "rx", "lhumerus": "rx ry rz"}
+PUBLISHED = {"hgt_m": 1.75}
+
+
+def bvh_joints(path) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    """A BVH file read straight from its definition: parent and positions (F, 3) of every joint, file units."""
+    words = path.read_text().split()
+    stack, offsets, channels, parents = [], {}, [], {}
+    at = 0
+    while words[at] != "MOTION":
+        word = words[at]
+        if word in ("ROOT", "JOINT", "End"):
+            name = words[at + 1] if word != "End" else stack[-1] + "/end"
+            parents[name] = stack[-1] if stack else ""
+            stack.append(name)
+            at += 3
+        elif word == "OFFSET":
+            offsets[stack[-1]] = np.array(words[at + 1 : at + 4], float)
+            at += 4
+        elif word == "CHANNELS":
+            count = int(words[at + 1])
+            channels.append((stack[-1], words[at + 2 : at + 2 + count]))
+            at += 2 + count
+        elif word == "}":
+            stack.pop()
+            at += 1
+        else:
+            at += 1
+    frames = int(words[at + 2])
+    values = np.array(words[at + 6 :], float).reshape(frames, -1)
+    turned, places, column = {}, {}, 0
+    moved = dict(channels)
+    for name in parents:  # joints stand in the file parents first, and so do their channels
+        turn, shift = np.tile(np.eye(3), (frames, 1, 1)), np.zeros((frames, 3))
+        for channel in moved.get(name, []):
+            value = values[:, column]
+            column += 1
+            axis = "XYZ".index(channel[0])
+            if channel.endswith("position"):
+                shift[:, axis] = value
+            else:
+                vector = np.eye(3)[axis] * np.radians(value)[:, None]
+                turn = turn @ rodrigues(vector)
+        parent = parents[name]
+        if parent:
+            places[name] = places[parent] + turned[parent] @ offsets[name]
+            turned[name] = turned[parent] @ turn
+        else:
+            places[name], turned[name] = offsets[name] + shift, turn
+    return parents, places
+
+
+def rodrigues(vector: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix()
+
+
+@needs_inputs
+def test_forward_kinematics_agrees_with_an_independent_conversion():
+    folder = FOLDER / "cmu" / "131"
+    skeleton = read_skeleton(folder / "131.asf")
+    channels = read_motion(folder / "131_01.amc", skeleton)
+    _, joints = bvh_joints(folder / "131_01.bvh")
+    unit = 0.0254 / 0.45
+    same = {
+        "root": "Hips", "lhipjoint": "LeftHip", "lfemur": "LeftKnee", "ltibia": "LeftAnkle", "lfoot": "LeftToe",
+        "ltoes": "LeftToe/end", "rhipjoint": "RightHip", "rfemur": "RightKnee", "rtibia": "RightAnkle",
+        "rfoot": "RightToe", "rtoes": "RightToe/end", "lowerback": "Chest", "upperback": "Chest2",
+    }  # fmt: skip
+    above = {
+        "lowerneck": "Neck", "upperneck": "Head", "head": "Head/end",
+        "lclavicle": "LeftShoulder", "lhumerus": "LeftElbow", "lradius": "LeftWrist",
+        "rclavicle": "RightShoulder", "rhumerus": "RightElbow", "rradius": "RightWrist",
+    }  # fmt: skip
+    positions = mocap.nodes_m(mocap.posed(skeleton, channels, 120)) @ mocap.FROM_FILE
+    assert positions.shape == (994, 31, 3)
+    for node, joint in same.items():
+        assert np.abs(positions[:, NODES.index(node)] - joints[joint] * unit).max() < 5e-5, node
+    # The conversion leaves the bone `thorax` out: without its length what hangs on it agrees too.
+    skeleton.bones[NODES.index("thorax")] = 0
+    positions = mocap.nodes_m(mocap.posed(skeleton, channels, 120)) @ mocap.FROM_FILE
+    for node, joint in (same | above).items():
+        assert np.abs(positions[:, NODES.index(node)] - joints[joint] * unit).max() < 5e-5, node
+
+
+def asf(bones: dict[str, np.ndarray], extra: str = "") -> str:
+    lines = [":version 1.10", ":units", "length 0.45", "angle deg", ":root", "order TX TY TZ RX RY RZ", "axis XYZ"]
+    lines += ["position 0 0 0", "orientation 0 0 0", ":bonedata"]
+    for name in NODES[1:]:
+        x, y, z = bones[name]
+        lines += ["begin", f"name {name}", f"direction {x} {y} {z}", f"length {math.hypot(x, y, z)!r}"]
+        lines += ["axis 0 0 0 XYZ"] + ([f"dof {CHANNELS[name]}"] if name in CHANNELS else []) + ["end"]
+    lines += [":hierarchy", "begin"]
+    for parent in NODES:
+        children = [child for child, above in LIMBS.items() if above == parent]
+        lines += [" ".join([parent, *children])] if children else []
+    return "\n".join([*lines, "end", extra])
+
+
+def walk(frames: int, period: float = 100, turn_deg: float = 0.0, speed: float = 0.2, growth: float = 0.0) -> str:
+    """A made-up walk: sinusoidal angles, growing a frame by `growth`; the root moves along z turned about y."""
+    lines = [":FULLY-SPECIFIED", ":DEGREES"]
+    heading = math.radians(turn_deg)
+    for frame in range(frames):
+        swing = math.sin(2 * math.pi * frame / period) * (1 + growth * frame)
+        way = speed * frame
+        lines += [str(frame + 1)]
+        lines += [
+            f"root {way * math.sin(heading)!r} {16 + 0.3 * swing**2!r} {way * math.cos(heading)!r} 0 {turn_deg!r} 0"
+        ]
+        lines += [f"lfemur {30 * swing!r} 0 0", f"rfemur {-30 * swing!r} 0 0", f"lhumerus {-20 * swing!r} 5 0"]
+        lines += [f"ltibia {20 - 20 * swing!r}", f"rtibia {20 + 20 * swing!r}"]
+    return "\n".join(lines)
+
+
+@pytest.fixture
+def files(tmp_path):
+    rng = np.random.default_rng(5)
+    bones = {name: rng.normal(size=3) for name in LIMBS}
+    bones |= {"lfemur": np.array([0, -7.0, 0]), "rfemur": np.array([0, -7.0, 0]), "ltibia": np.array([0, -7.0, 0])}
+    bones |= {"rtibia": np.array([0, -7.0, 0]), "lfoot": np.array([0, -1.0, 2]), "rfoot": np.array([0, -1.0, 2])}
+    (tmp_path / "s.asf").write_text(asf(bones))
+    (tmp_path / "m.amc").write_text(walk(260))
+    return tmp_path
+
+
+def cloud_of(folder, **changes):
+    record = {
+        "subtype": "Walking Pedestrian 1", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap",
+        "rcs_m2_per_point": 1.0, "points": 30,
+    }  # fmt: skip
+    extra = {"skeleton": "s.asf", "motion": "m.amc"} | changes
+    record = mocap.check_record(record | extra, extra, "record")
+    return clouds.check(mocap.mocap_cloud(record, folder, 3), "cloud")
+
+
+def test_rest_pose_and_one_turned_joint_are_exact(files):
+    skeleton = read_skeleton(files / "s.asf")
+    channels = {"root": np.zeros((2, 6))}
+    channels |= {name: np.zeros((2, len(dofs.split()))) for name, dofs in CHANNELS.items()}
+    channels["root"][1] = [1, 2, 3, 0, 90, 0]
+    channels["lfemur"][1] = [90, 0, 0]
+    positions = mocap.nodes_m(mocap.posed(skeleton, channels, 120)) / (0.0254 / 0.45)
+    # Rest: the sum of the bones; x left, y up, z front becomes -x, z, y.
+    hip, knee = NODES.index("lhipjoint"), NODES.index("lfemur")
+    left, up, ahead = skeleton.bones[hip]
+    assert np.allclose(positions[0, hip], [-left, ahead, up], atol=1e-12)
+    assert np.allclose(positions[0, knee] - positions[0, hip], [0, 0, -7], atol=1e-12)
+    # Root at (1, 2, 3) turned by 90 degrees about up: file z goes to file x, so the hip's bone turns with it.
+    assert np.allclose(positions[1, 0], [-1, 3, 2], atol=1e-12)
+    assert np.allclose(positions[1, hip] - positions[1, 0], [-ahead, -left, up], atol=1e-12)
+    # The thigh turned by 90 degrees about x points along the file's -z, which the root has turned to -x.
+    assert np.allclose(positions[1, knee] - positions[1, hip], [7, 0, 0], atol=1e-12)
+
+
+def test_cycle_is_found_closed_and_rigid(files):
+    cloud = cloud_of(files, scale="none")
+    record, track = cloud.record, cloud.track
+    assert len(track) in (100, 200)  # whole periods of the made-up walk
+    assert record["loop_mismatch_m"] < 1e-9
+    assert record["track_speed_mps"] == pytest.approx(0.2 * 120 * 0.0254 / 0.45)
+    skeleton = read_skeleton(files / "s.asf")
+    lengths = np.linalg.norm(track[:, 1:] - track[:, list(PARENTS[1:])], axis=2)
+    assert np.abs(lengths - np.linalg.norm(skeleton.bones[1:], axis=1) * skeleton.unit_m).max() < 1e-12
+    assert np.abs(track[:, 0].mean(axis=0)).max() < 1e-12
+    assert record["origin_height_m"] == pytest.approx(-track[..., 2].min())
+    assert np.ptp(track[:, 0, 2]) == pytest.approx(0.3 * 0.0254 / 0.45, rel=1e-3)  # the bob is kept
+
+
+@given(turn=st.floats(-180, 180), first=st.integers(1, 60))
+@settings(max_examples=6, deadline=None)
+def test_turning_a_recording_about_the_vertical_changes_nothing(turn, first, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("turned")
+    rng = np.random.default_rng(6)
+    (folder / "s.asf").write_text(asf({name: rng.normal(size=3) for name in LIMBS}))
+    (folder / "m.amc").write_text(walk(230, growth=1e-3))
+    straight = cloud_of(folder, first_frame=first)
+    (folder / "m.amc").write_text(walk(230, turn_deg=turn, growth=1e-3))
+    assert np.abs(cloud_of(folder, first_frame=first).track - straight.track).max() < 1e-9
+
+
+@given(frames=st.integers(8, 140), period=st.floats(60, 130), seed=st.integers(0, 99))
+@settings(max_examples=25, deadline=None)
+def test_any_recording_goes_round_without_a_jump(frames, period, seed):
+    # A smooth motion that does not repeat within the recording, down to 67 ms: the seam must still be smooth.
+    rng = np.random.default_rng(seed)
+    time = np.arange(frames)
+    angle = 0.5 * np.sin(2 * np.pi * time / period + rng.uniform(0, 6)) + 0.1 * np.sin(2 * np.pi * time / 41)
+    turned = rotation("x", angle[:, None] * rng.uniform(-1, 1, len(NODES)))
+    root = np.stack([0 * time, 0.012 * time, 0.03 * np.sin(time / 9)], axis=1)
+    motion = mocap.Motion(root, turned, rng.normal(size=(31, 3)) * 0.1, 120.0)
+    start, end, fade, _ = mocap.find_cycle(motion)
+    cycle, drift = mocap.closed(motion, start, end, fade)
+    track = mocap.nodes_m(cycle)
+    assert drift[1] == pytest.approx(0.012 * 120)
+    # From the last frame to the first the cycle takes the very step that the recording takes at its end.
+    told = mocap.nodes_m(mocap.Motion(root - (time - start)[:, None] * [0, 0.012, 0], turned, motion.bones_m, 120.0))
+    assert np.abs((track[0] - track[-1]) - (told[end] - told[end - 1])).max() < 1e-12
+    # The fade's weights have slope zero at both ends, so the change of speed there stays within their curvature.
+    gap = np.abs(told[end : end + fade] - told[start : start + fade]).max()
+    change = np.abs(np.diff(np.concatenate([track[-2:], track, track[:2]]), n=2, axis=0)).max()
+    usual = np.abs(np.diff(told, n=2, axis=0)).max()
+    speeds = np.abs(np.diff(told, axis=0)).max()
+    assert change <= usual + 8 * gap / fade**2 + 6 * speeds / fade + 8 * gap**2 + 1e-12
+
+
+def broken(folder, old, new, count=1):
+    text = (folder / "m.amc").read_text()
+    assert old in text
+    (folder / "m.amc").write_text(text.replace(old, new, count))
+
+
+def test_faults_are_named_by_file_and_frame(files):
+    good = (files / "m.amc").read_text()
+
+    def refused(names, text=None, **changes):
+        (files / "m.amc").write_text(text if text is not None else good)
+        with pytest.raises(InputError, match=names) as error:
+            cloud_of(files, **changes)
+        assert "m.amc" in str(error.value)
+
+    cut = good[: good.rindex("ltibia")]
+    refused(r"frame 260 lacks \['ltibia', 'rtibia'\]", cut)
+    assert len(cloud_of(files, last_frame=259).track) >= 100  # trimmed by the record
+    zero = "\n".join(
+        "root 0 0 0 0 0 0" if w.startswith("root") and i < 20 else w for i, w in enumerate(good.split("\n"))
+    )
+    refused("frame 1 has an all-zero root", zero)
+    assert cloud_of(files, first_frame=5).record["frames_used"][0] >= 5
+    (files / "m.amc").write_text(good)
+    frame = good.split("\n100\n")
+    refused("frame 100.*nan", frame[0] + "\n100\nltibia nan\n" + frame[1])
+    refused("frame 100.*'hello 1'", frame[0] + "\n100\nhello 1\n" + frame[1])
+    refused("frame 100.*2 finite|frame 100.*1 finite", frame[0] + "\n100\nltibia 1 2\n" + frame[1])
+    refused("frame 102 follows frame 100", good.replace("\n101\n", "\n102\n"))
+    still = frame[0] + "\n100\n" + frame[0].split("\n99\n")[1] + "\n101\n" + frame[1].split("\n101\n")[1]
+    refused("frame 100 repeats frame 99", still)
+    at = frame[1].split("\n")
+    spiked = [
+        line.replace("ltibia ", "ltibia 9") if line.startswith("ltibia") and n < 8 else line
+        for n, line in enumerate(at)
+    ]
+    refused("frame 100: l(foot|toes) accelerates", frame[0] + "\n100\n" + "\n".join(spiked))
+    refused("expected frames 1 to 300", last_frame=300)
+    refused("no frame in that range", first_frame=400)
+    refused("expected an AMC motion", "not a motion at all")
+    refused("no frame", "")
+    refused("moves 0.000 m/s", walk(200, speed=0.0))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "names"),
+    [
+        ("angle deg", "angle rad", "angle"), (":hierarchy", ":family", ":hierarchy"),
+        ("lfemur ltibia", "lfemur", "ltibia"),
+        ("length 0.45", "length x", "0.45|'x'"), ("order TX TY TZ RX RY RZ", "order RX RY RZ", "root order"),
+        ("name lfemur", "name thigh", "lfemur"), ("dof rx ry rz", "dof rx ry rq", "dof"),
+        ("axis 0 0 0 XYZ", "axis 0 0 0 ZYX", "ZYX"), ("position 0 0 0", "position 0 1 0", "offset"),
+    ],
+)  # fmt: skip
+def test_bad_skeletons_are_refused_by_file(files, old, new, names):
+    text = (files / "s.asf").read_text()
+    assert old in text
+    (files / "s.asf").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError, match=names) as error:
+        read_skeleton(files / "s.asf")
+    assert "s.asf" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"motion": "/abs/m.amc"}, "inside the folder"), ({"first_frame": 0}, "first_frame"),
+        ({"rate_hz": "fast"}, "rate_hz"), ({"last_frame": 1}, "last_frame"), ({"scale": 2}, "scale"),
+        ({"units": "inch"}, "units"), ({"motion": "n.amc"}, "n.amc"),
+    ],
+)  # fmt: skip
+def test_bad_records_are_refused_by_name(files, changes, names):
+    with pytest.raises(InputError, match=names):
+        cloud_of(files, **changes)
+
+
+def test_height_is_the_published_one_unless_the_record_says_none(files):
+    scaled, plain = cloud_of(files), cloud_of(files, scale="none")
+    factor = PUBLISHED["hgt_m"] / plain.record["recorded_stature_m"]
+    assert np.allclose(scaled.track, plain.track * factor, atol=1e-12)
+    assert scaled.record["track_speed_mps"] == pytest.approx(plain.record["track_speed_mps"] * factor)
+
+
+@needs_inputs
+def test_known_faults_of_real_recordings_are_refused_and_trimmed():
+    faults = {
+        "07/07_12": ("frame 245 lacks .'ltoes'", {"last_frame": 244}),
+        "09/09_10": ("frame 1 has an all-zero root", {"first_frame": 5}),
+        "35/35_01": ("frame (99|100|101): .*(foot|toes|tibia) accelerates", {"first_frame": 104}),
+    }
+    for name, (message, trim) in faults.items():
+        subject = name.split("/")[0]
+        record = {"skeleton": f"cmu/{subject}/{subject}.asf", "motion": f"cmu/{name}.amc"}
+        with pytest.raises(InputError, match=message) as error:
+            cloud_of(FOLDER, **record)
+        assert f"{name}.amc" in str(error.value)
+        cloud = cloud_of(FOLDER, **record, **trim)
+        assert 0.7 < cloud.record["track_speed_mps"] < 4.5
+        assert cloud.record["loop_mismatch_m"] < 0.1
+        assert cloud.record["stance_foot_speed_mps"] < 1.0
+
+
+@needs_inputs
+def test_every_real_recording_that_walks_or_runs_becomes_a_cloud():
+    trims = {"07_12": {"last_frame": 244}, "09_10": {"first_frame": 5}, "35_01": {"first_frame": 104}}
+    paths = sorted((FOLDER / "cmu").glob("*/*.amc"))
+    assert len(paths) >= 15
+    for path in paths:
+        subject = path.parent.name
+        record = {"skeleton": f"cmu/{subject}/{subject}.asf", "motion": f"cmu/{subject}/{path.name}"}
+        track = cloud_of(FOLDER, **record, **trims.get(path.stem, {})).track
+        ahead = track[:, NODES.index("ltoes"), 1] - track[:, NODES.index("ltibia"), 1]
+        assert ahead.mean() > 0 and track[:, NODES.index("lhipjoint"), 0].mean() < 0  # faces front, left is left
+        assert track[:, NODES.index("head"), 2].mean() > 0.5
