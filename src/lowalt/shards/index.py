@@ -4,6 +4,7 @@ It merges the headers of the shards' tables; the shards themselves are not read.
 SHA-256 stay in its shard's table, whose SHA-256 stands in the index: one checksum of the index covers everything.
 """
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -41,9 +42,16 @@ def build(shards: list[str | Path], render: dict, out: str | Path) -> dict:
         "render": render,
         "shards": sorted(entries, key=lambda entry: entry["name"]),
     }
+    index["sha256"] = _checksum(index)
     with replacing(out) as temporary:
         temporary.write_text(json.dumps(index, indent=1, sort_keys=True) + "\n")
     return index
+
+
+def _checksum(index: dict) -> str:
+    """SHA-256 of everything in an index but the checksum itself."""
+    content = {name: value for name, value in index.items() if name != "sha256"}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _relative(shard: Path, index: Path) -> str:
@@ -61,9 +69,11 @@ def load(path: str | Path) -> dict:
     existing(path, "index")
     try:
         index = json.loads(Path(path).read_text())
-        good = index["format"] == FORMAT
+        found, checksum = index["format"], index["sha256"]
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not an index of shards ({error})") from error
-    if not good:
-        raise InputError(f"{path}: format {index['format']!r}, expected {FORMAT!r}")
+    if found != FORMAT:
+        raise InputError(f"{path}: format {found!r}, expected {FORMAT!r}")
+    if checksum != _checksum(index):
+        raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
     return index

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.errors import InputError
+from lowalt.files import existing, sha256
 from lowalt.network import Network
 from lowalt.plan import GROUPS
 from lowalt.shards.index import load
@@ -45,27 +46,38 @@ class ShardSet:
         self.kind = self.index["kind"]
         self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
-        self._maps: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+        self._tables: dict[int, np.ndarray] = {}
+        self._maps: dict[int, np.ndarray] = {}
 
     def __len__(self) -> int:
         return int(self._ends[-1])
 
     def __getstate__(self) -> dict:
-        return {k: v for k, v in self.__dict__.items() if k not in ("_maps", "renderer")} | {"_maps": {}}
+        kept = {name: value for name, value in self.__dict__.items() if name != "renderer"}
+        return {**kept, "_tables": {}, "_maps": {}}
 
-    def _open(self, shard: int) -> tuple[np.ndarray, np.ndarray]:
-        """Tables and bytes of a shard, mapped at first use."""
+    def _path(self, shard: int) -> Path:
+        return self.index_path.parent / self.shards[shard]["path"]
+
+    def _table(self, shard: int) -> np.ndarray:
+        """The rows of a shard's table, checked and mapped at first use."""
+        if shard not in self._tables:
+            path, entry = table_path(self._path(shard)), self.shards[shard]
+            samples = map_samples(path)
+            if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
+                raise InputError(f"{path.name}: the table is damaged or another one (SHA-256 differs)")
+            self._tables[shard] = samples
+        return self._tables[shard]
+
+    def _data(self, shard: int) -> np.ndarray:
+        """The bytes of a shard, mapped at first use."""
         if shard not in self._maps:
-            entry = self.shards[shard]
-            path = self.index_path.parent / entry["path"]
-            samples = map_samples(table_path(path))
-            try:
-                data = np.memmap(path, np.uint8, "r")
-            except (OSError, ValueError) as error:
-                raise InputError(f"{path}: cannot be read ({error})") from error
-            if len(samples) != entry["samples"] or len(data) != entry["bytes"]:
-                raise InputError(f"{path}: {len(data)} bytes, {len(samples)} samples; the index says otherwise")
-            self._maps[shard] = samples, data
+            path, expected = self._path(shard), self.shards[shard]["bytes"]
+            # A map of a file that is too short would end the process, not raise.
+            found = existing(path, "shard").stat().st_size
+            if found != expected:
+                raise InputError(f"{path.name}: {found} bytes, expected {expected}")
+            self._maps[shard] = np.memmap(path, np.uint8, "r")
         return self._maps[shard]
 
     def _locate(self, number: int) -> tuple[int, int]:
@@ -78,8 +90,7 @@ class ShardSet:
     def _bytes(self, number: int, member: str) -> bytes:
         """The bytes of a member of a sample, after the sample's check."""
         shard, place = self._locate(number)
-        samples, data = self._open(shard)
-        row = samples[place]
+        row, data = self._table(shard)[place], self._data(shard)
         start, size = int(row["offset"]), int(row["size"])
         if self.check and hashlib.sha256(data[start : start + size]).digest() != row["sha256"].tobytes():
             name = self.shards[shard]["name"]
@@ -88,7 +99,7 @@ class ShardSet:
         return data[first : first + int(row[f"{member}_size"])].tobytes()
 
     def _column(self, name: str) -> np.ndarray:
-        parts = [self._open(shard)[0][name] for shard in range(len(self.shards))]
+        parts = [self._table(shard)[name] for shard in range(len(self.shards))]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     @functools.cached_property

@@ -1,0 +1,308 @@
+"""Shards: bytes, order, records, index, damage, reading by us and by webdataset."""
+
+import hashlib
+import io
+import json
+import math
+import pickle
+import shutil
+import tarfile
+
+import numpy as np
+import pytest
+import webdataset
+from PIL import Image
+
+from lowalt.errors import InputError
+from lowalt.motion import COLUMNS, write_table
+from lowalt.network import Network
+from lowalt.shards import ShardSet, faults
+from lowalt.shards.__main__ import main
+from lowalt.shards.record import geometry, record, sample_key, snr_label
+from lowalt.shards.table import map_samples
+from lowalt.splits import fold
+from lowalt.tiles import decode, encode, files, split
+from test_tiles import IMAGES, NETWORK, SPECTRA, echoes, renderer
+
+RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+SPLIT = {"by": "motion", "train": 2, "val": 1, "test": 1}
+SNRS = [3, "inf"]
+SEED = 11
+TARGETS = {"seen": [("DJI Mavic 3", "UAV"), ("Crow", "Bird")], "unseen": [("Model Y", "Vehicle")]}
+
+
+def motion_rows(group, models=4):
+    rng = np.random.default_rng(len(group))
+    rows = []
+    for model in range(models):
+        for subtype, category in TARGETS[group]:
+            row = dict.fromkeys(COLUMNS, math.nan)
+            row.update(subtype=subtype, category=category, group=group, model=model, rate_hz=rng.uniform(1, 99))
+            for name in ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"):
+                row[name] = rng.uniform(1, 90)
+            rows.append(row)
+    return rows
+
+
+def write_settings(kind):
+    block = {"seed": SEED, "network": NETWORK, "snr_db": SNRS, "split": SPLIT, "shards": {"kind": kind}}
+    return json.dumps(block)
+
+
+def build(folder, kind):
+    """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group."""
+    shards = []
+    for group in TARGETS:
+        rows = motion_rows(group)
+        write_table(folder / f"{group}.csv", rows)
+        signals = np.stack([echoes(seed) for seed in range(2 * len(rows))]).reshape(len(rows), 2, 3, 400)
+        np.save(folder / f"{group}.npy", signals)
+        tiles = renderer()
+        pngs = [encode(tiles.tile(sample), tiles.images.palette) for model in signals for sample in model]
+        files.write(folder / f"{group}.tiles.npz", pngs)
+        for name in ("train", "val", "test"):
+            shards.append(str(folder / f"{group}-{name}-00000.tar"))
+            inputs = ["--motion", f"{folder}/{group}.csv", "--signals", f"{folder}/{group}.npy"]
+            inputs += ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
+            main(["write", "--settings", write_settings(kind), *inputs, "--fold", name, "--out", shards[-1]])
+    main(["index", "--settings", json.dumps(RENDER), "--shards", *shards, "--out", str(folder / "index.json")])
+    return folder
+
+
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("images"), "image")
+
+
+@pytest.fixture(scope="module")
+def signals(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("signals"), "signal")
+
+
+@pytest.fixture
+def copy(images, tmp_path):
+    """A copy of the image shards to do harm to."""
+    return shutil.copytree(images, tmp_path / "copy")
+
+
+def test_tar_bytes_are_those_of_webdatasets_writer(images):
+    path = images / "seen-train-00000.tar"
+    buffer = io.BytesIO()
+    writer = webdataset.TarWriter(buffer, encoder=False, mtime=0)
+    for sample in webdataset.WebDataset(str(path), shardshuffle=False):
+        writer.write({name: value for name, value in sample.items() if name in ("__key__", "json", "png")})
+    writer.close()
+    assert path.read_bytes() == buffer.getvalue()
+
+
+@pytest.mark.parametrize("kind", ["image", "signal"])
+def test_equal_inputs_give_equal_bytes(images, signals, kind, tmp_path):
+    old = {"image": images, "signal": signals}[kind]
+    new = build(tmp_path, kind)
+    for path in sorted(old.iterdir()):
+        assert (new / path.name).read_bytes() == path.read_bytes(), path.name
+
+
+def test_every_sample_stands_once_in_the_fold_that_is_its_own(images):
+    found = []
+    for group in TARGETS:
+        for name in ("train", "val", "test"):
+            for sample in webdataset.WebDataset(str(images / f"{group}-{name}-00000.tar"), shardshuffle=False):
+                entry = json.loads(sample["json"])
+                found.append((entry["subtype"], entry["model"], float(entry["snr_db"])))
+                assert sample["__key__"] == entry["key"] and "." not in entry["key"]
+                assert entry["fold"] == name == fold(SPLIT, SEED, entry["subtype"], entry["model"])
+                assert entry["group"] == group
+    expected = [(row["subtype"], row["model"], float(snr)) for g in TARGETS for row in motion_rows(g) for snr in SNRS]
+    assert sorted(found) == sorted(expected)
+
+
+def test_shards_open_with_plain_webdataset_and_pillow(images):
+    data = webdataset.WebDataset(str(images / "unseen-test-00000.tar"), shardshuffle=False).decode("pil")
+    count = 0
+    for sample in data:
+        assert sample["png"].size == (768, 768)
+        tile, palette = decode(png_of(images, sample["__key__"]))
+        np.testing.assert_array_equal(np.asarray(sample["png"].convert("RGB")), palette[tile])
+        assert isinstance(sample["png"], Image.Image)
+        count += 1
+    assert count == 2
+
+
+def png_of(folder, key):
+    """The PNG of a sample by plain tarfile."""
+    for path in folder.glob("*.tar"):
+        with tarfile.open(path) as archive:
+            if f"{key}.png" in archive.getnames():
+                return archive.extractfile(f"{key}.png").read()
+    raise KeyError(key)
+
+
+def test_order_depends_on_names_alone(images, tmp_path):
+    """With another SNR in the data set, the samples there were keep their order."""
+    rows = motion_rows("seen")
+    noisy = np.stack([echoes(seed) for seed in range(3 * len(rows))]).reshape(len(rows), 3, 3, 400)
+    np.save(tmp_path / "seen.npy", noisy)
+    write_table(tmp_path / "seen.csv", rows[::-1])
+    block = {**json.loads(write_settings("signal")), "snr_db": ["inf", 8, 3]}
+    inputs = ["--motion", f"{tmp_path}/seen.csv", "--signals", f"{tmp_path}/seen.npy", "--fold", "train"]
+    main(["write", "--settings", json.dumps(block), *inputs, "--out", f"{tmp_path}/seen-train-00000.tar"])
+    before = map_samples(images / "seen-train-00000.npz")["key"].tolist()
+    after = map_samples(tmp_path / "seen-train-00000.npz")["key"].tolist()
+    assert [key for key in after if not key.endswith(b"snr008")] == before
+    assert before != sorted(before)
+
+
+def test_record_tells_motion_geometry_and_versions():
+    row = motion_rows("seen")[0]
+    row.update(x_m=30.0, y_m=40.0, z_m=25.0, vx_mps=3.0, vy_mps=4.0, vz_mps=7.0)
+    network = Network.from_settings(NETWORK)
+    entry = json.loads(record(row, math.inf, "val", SEED, network))
+    assert entry["key"] == "dji-mavic-3-000000-snrinf"
+    assert (entry["label"], entry["category"], entry["snr_db"], entry["seed"]) == (0, "UAV", "inf", SEED)
+    assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] is None
+    seen = entry["geometry"]["A"]
+    # Station A stands at (0, 0, 25): range 50 m, level, receding at 5 m/s.
+    assert seen["range_m"] == 50 and seen["omega"] == 0
+    assert seen["radial_mps"] == pytest.approx(5)
+    assert seen["psi"] == pytest.approx(-math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8)
+    assert {"lowalt", "numpy", "numba"} <= set(entry["versions"])
+
+
+def test_geometry_above_a_station_is_finite():
+    row = {**motion_rows("seen")[0], "x_m": 0.0, "y_m": 0.0, "z_m": 25.0}
+    assert geometry(row, Network.from_settings(NETWORK))["A"] == {
+        "range_m": 0.0, "psi": 0.0, "omega": 0.0, "radial_mps": 0.0,
+    }  # fmt: skip
+
+
+def test_keys_are_unique_and_without_dots():
+    snrs = [3, 3.5, -60, 200, 0.25, math.inf, 13, -3.5]
+    keys = {sample_key("EH216-S", 7, snr) for snr in snrs}
+    assert len(keys) == len(snrs)
+    assert not any("." in key or "/" in key for key in keys)
+    assert snr_label(3) == snr_label(3.0) == "snr003"
+
+
+def test_index_has_counts_and_checksums(images):
+    index = json.loads((images / "index.json").read_text())
+    assert index["samples"] == 24
+    for entry in index["shards"]:
+        data = (images / entry["path"]).read_bytes()
+        assert (len(data), hashlib.sha256(data).hexdigest()) == (entry["bytes"], entry["sha256"])
+        samples = map_samples((images / entry["path"]).with_suffix(".npz"))
+        assert len(samples) == entry["samples"]
+        for row in samples:
+            span = data[row["offset"] : row["offset"] + row["size"]]
+            assert hashlib.sha256(span).digest() == row["sha256"].tobytes()
+
+
+def test_shard_set_reads_any_sample(images):
+    shards = ShardSet(images / "index.json", ["seen"], ["train", "val"])
+    assert len(shards) == 2 * 3 * 2
+    folds = [shards.record(number)["fold"] for number in range(len(shards))]
+    assert sorted(folds) == ["train"] * 8 + ["val"] * 4
+    for number in (0, len(shards) - 1):
+        entry = shards.record(number)
+        assert shards.keys[number].decode() == entry["key"]
+        assert (shards.labels[number], shards.models[number]) == (entry["label"], entry["model"])
+        assert shards.snrs_db[number] == float(entry["snr_db"])
+        tile, palette = decode(shards.png(number))
+        np.testing.assert_array_equal(shards.images(number), split(tile))
+        np.testing.assert_array_equal(shards.palette, palette)
+    with pytest.raises(IndexError):
+        shards.record(len(shards))
+
+
+def test_both_kinds_give_the_same_images(images, signals):
+    by_image, by_signal = (ShardSet(folder / "index.json") for folder in (images, signals))
+    np.testing.assert_array_equal(by_image.keys, by_signal.keys)
+    again = pickle.loads(pickle.dumps(by_signal))
+    for number in range(0, len(by_image), 5):
+        np.testing.assert_array_equal(by_image.images(number), by_signal.images(number))
+        np.testing.assert_array_equal(by_signal.signal(number), again.signal(number))
+    with pytest.raises(InputError, match="signal"):
+        by_image.signal(0)
+    with pytest.raises(InputError, match="image"):
+        by_signal.png(0)
+
+
+def test_verify_is_silent_on_whole_shards(images, capsys):
+    main(["verify", "--index", str(images / "index.json")])
+    assert capsys.readouterr().out == ""
+
+
+def test_every_fault_is_found_and_named(copy, images):
+    """Single bytes and cuts at random places: verify names the shard and the sample, reading never passes them."""
+    rng = np.random.default_rng(3)
+    paths = sorted(copy.glob("*.tar"))
+    for _ in range(40):
+        path = paths[rng.integers(len(paths))]
+        whole = (images / path.name).read_bytes()
+        samples = map_samples(images / path.with_suffix(".npz").name)
+        place = int(rng.integers(len(whole)))
+        hit = [r["key"].decode() for r in samples if r["offset"] <= place < r["offset"] + r["size"]]
+        if rng.random() < 0.5:
+            damaged = bytearray(whole)
+            damaged[place] ^= int(rng.integers(1, 256))
+            path.write_bytes(damaged)
+        else:
+            path.write_bytes(whole[:place])
+        lines = list(faults(copy / "index.json"))
+        assert lines and all(line.startswith(path.name) for line in lines)
+        assert all(any(key in line for line in lines) for key in hit)
+        shards = ShardSet(copy / "index.json")
+        if hit:
+            number = shards.keys.tolist().index(hit[0].encode())
+            with pytest.raises(InputError, match=path.name):
+                shards.images(number)
+        path.write_bytes(whole)
+    assert list(faults(copy / "index.json")) == []
+
+
+def test_damage_beside_the_shards_is_not_read_over(copy):
+    """A flipped label in a table, or a changed floor in the index, is refused as well."""
+    table = copy / "seen-train-00000.npz"
+    data = bytearray(table.read_bytes())
+    data[data.index(b"crow-") + 96] ^= 1
+    table.write_bytes(data)
+    assert list(faults(copy / "index.json")) == ["seen-train-00000.npz: the table is damaged (SHA-256 differs)"]
+    with pytest.raises(InputError, match=r"seen-train-00000\.npz"):
+        print(ShardSet(copy / "index.json").labels)
+    text = (copy / "index.json").read_text()
+    (copy / "index.json").write_text(text.replace('"floor_db": 40.0', '"floor_db": 41.0'))
+    with pytest.raises(InputError, match=r"index\.json"):
+        ShardSet(copy / "index.json")
+
+
+def test_missing_and_exchanged_files_are_faults(copy):
+    shutil.copy(copy / "seen-val-00000.tar", copy / "seen-test-00000.tar")
+    (copy / "unseen-val-00000.tar").unlink()
+    (copy / "seen-train-00000.npz").write_bytes(b"nothing")
+    lines = list(faults(copy / "index.json"))
+    assert any(line.startswith("seen-test-00000.tar: sample") for line in lines)
+    assert "unseen-val-00000.tar: missing" in lines
+    assert any(line.startswith("seen-train-00000.npz") for line in lines)
+    with pytest.raises(SystemExit, match="1"):
+        main(["verify", "--index", str(copy / "index.json")])
+
+
+def test_wrong_input_is_refused_by_name(images, tmp_path):
+    inputs = ["--motion", f"{images}/seen.csv", "--signals", f"{images}/seen.npy"]
+    out = ["--fold", "train", "--out", f"{tmp_path}/x.tar"]
+    tiles = ["--tiles", f"{images}/seen.tiles.npz"]
+    block = json.loads(write_settings("image"))
+    for change, given, named in [
+        ({}, [*inputs, *out], "--tiles"),
+        ({"shards": {"kind": "sound"}}, [*inputs, *tiles, *out], "sound"),
+        ({"snr_db": [3]}, [*inputs, *tiles, *out], "seen.npy"),
+        ({}, [*inputs, "--tiles", f"{images}/unseen.tiles.npz", *out], "unseen.tiles.npz"),
+        ({}, [*inputs, *tiles, "--fold", "trial", "--out", f"{tmp_path}/x.tar"], "trial"),
+    ]:
+        with pytest.raises(InputError, match=named):
+            main(["write", "--settings", json.dumps({**block, **change}), *given])
+    assert list(tmp_path.iterdir()) == []
+    with pytest.raises(InputError, match="tests"):
+        ShardSet(images / "index.json", ["seen"], ["tests"])
+    with pytest.raises(InputError, match="expected one of"):
+        main(["pack"])
