@@ -40,8 +40,8 @@ def main(arguments: list[str]) -> None:
     """Write one cloud."""
     line = parser("lowalt.targets", "One subtype's record to its calibration point cloud.")
     folder = os.environ.get("LOWALT_INPUTS")
-    line.add_argument("--inputs", type=Path, default=folder and Path(folder),
-                      help="folder of the meshes and recordings the record names (default: $LOWALT_INPUTS)")  # fmt: skip
+    help_text = "folder of the meshes and recordings the record names (default: $LOWALT_INPUTS)"
+    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
     line.add_argument("--out", required=True, type=Path, help="cloud file to write (.npz)")
     given = line.parse_args(arguments)
     seed, record = pick(given.settings, "seed", "record")

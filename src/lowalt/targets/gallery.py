@@ -10,12 +10,12 @@ from lowalt.files import replacing
 from lowalt.targets.cloud import CATEGORIES, Cloud, read
 
 COLUMNS = 5
-VIEWS = {"UAV": (160.0, 55.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
+VIEWS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
 """Azimuth from the front towards the right and elevation of the viewer (degrees): where each category shows best."""
 
 BODY_COLOUR = "#52525b"
 PART_COLOURS = ("#d1495b", "#0077b6", "#e09f1f", "#2a9d8f", "#8e44ad", "#5f8a1f", "#e76f51", "#264653")
-FAINT = 0.22
+FAINT = 0.3
 """Opacity of points that face away from the viewer."""
 
 
@@ -38,7 +38,9 @@ def colours(cloud: Cloud) -> np.ndarray:
     """Return one colour a point, RGBA (L, 4): grey for the body, the parts in turn, faint where it faces away."""
     from matplotlib.colors import to_rgba
 
-    names = [BODY_COLOUR if kind == "body" else PART_COLOURS[i % len(PART_COLOURS)] for i, kind in enumerate(cloud.kinds)]
+    names = [
+        BODY_COLOUR if kind == "body" else PART_COLOURS[i % len(PART_COLOURS)] for i, kind in enumerate(cloud.kinds)
+    ]
     result = np.array([to_rgba(name) for name in names])[cloud.part]
     toward = cloud.normals @ axes_of(cloud.category)[2]
     # Points without a normal compare false and stay full.
@@ -69,26 +71,39 @@ def _lineup(axes, clouds: list[Cloud]) -> None:
     axes.set_title(f"{clouds[0].category}: one scale", fontsize=9, loc="left")
 
 
+def _panel(axes, cloud: Cloud, aspect: float) -> None:
+    """One cloud filling its panel, which is `aspect` times as high as wide."""
+    width, height = np.ptp(shown(cloud), axis=0)[:2]
+    half = max(width, height / aspect) / 2 * 1.06
+    draw(axes, cloud, 9.0)
+    axes.set(xlim=(-half, half), ylim=(-half * aspect, half * aspect), xticks=[], yticks=[], aspect="equal")
+    size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
+    axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {cloud.record['source']}, {size} m", fontsize=7)
+    for spine in axes.spines.values():
+        spine.set_color("#d4d4d8")
+
+
 def figure(clouds: list[Cloud]):
     """Return the matplotlib figure: for each category a line-up at one scale, then every cloud filling its panel."""
     from matplotlib.figure import Figure
 
     groups = [members for name in CATEGORIES if (members := [c for c in clouds if c.category == name])]
     rows = [-(-len(members) // COLUMNS) for members in groups]
-    result = Figure(figsize=(2.5 * COLUMNS, sum(1.5 + 2.6 * count for count in rows)), dpi=110, layout="constrained")
-    blocks = result.subfigures(len(groups), 1, squeeze=False, height_ratios=[1.5 + 2.6 * count for count in rows])[:, 0]
-    for block, members, count in zip(blocks, groups, rows, strict=True):
-        grid = block.add_gridspec(count + 1, COLUMNS, height_ratios=[1.5] + [2.6] * count)
+    spans = [np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members]) for members in groups]
+    # Every panel of a category has the same shape, that of its tallest cloud.
+    aspects = [float(np.clip((span[:, 1] / span[:, 0]).max(), 0.3, 2.0)) for span in spans]
+    lineups = [2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum() + 0.5 for span in spans]
+    panels = [2.6 * aspect + 0.45 for aspect in aspects]
+    heights = [top + panel * count for top, panel, count in zip(lineups, panels, rows, strict=True)]
+    result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=110, layout="constrained")
+    blocks = result.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
+    for block, members, count, top, panel, aspect in zip(
+        blocks, groups, rows, lineups, panels, aspects, strict=True
+    ):  # fmt: skip
+        grid = block.add_gridspec(count + 1, COLUMNS, height_ratios=[top] + [panel] * count)
         _lineup(block.add_subplot(grid[0, :]), members)
         for index, cloud in enumerate(members):
-            axes = block.add_subplot(grid[1 + index // COLUMNS, index % COLUMNS])
-            draw(axes, cloud, 7.0)
-            half = np.ptp(shown(cloud), axis=0)[:2].max() / 2 * 1.06
-            axes.set(xlim=(-half, half), ylim=(-half, half), xticks=[], yticks=[], aspect="equal")
-            source = cloud.record["source"]
-            axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {source}, {2 * half:.2g} m wide", fontsize=7)
-            for spine in axes.spines.values():
-                spine.set_color("#d4d4d8")
+            _panel(block.add_subplot(grid[1 + index // COLUMNS, index % COLUMNS]), cloud, aspect)
     return result
 
 

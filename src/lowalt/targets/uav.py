@@ -69,7 +69,7 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
 
 
 def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
-    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, the first blade square to its arm."""
+    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, first blade square to its arm."""
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))

@@ -34,12 +34,15 @@ def _lower(length: float, width: float, height: float, f: dict) -> Surface:
     half = width / 2
     lift = 0.06 * height
     rows = [
-        (0.0, 0.72, floor + lift, nose), (0.02, 0.86, floor + 0.5 * lift, 0.3 * nose + 0.7 * hood),
-        (0.08, 0.96, floor, hood), (0.18, 1.0, floor, hood + 0.25 * (belt - hood)), (f["windshield_base"], 1.0, floor, belt),
-        (f["rear_glass_base"], 1.0, floor, max(belt, deck)), (0.97, 0.93, floor + 0.5 * lift, deck),
+        (0.0, 0.72, floor + lift, nose),
+        (0.02, 0.86, floor + 0.5 * lift, 0.3 * nose + 0.7 * hood),
+        (0.08, 0.96, floor, hood),
+        (0.18, 1.0, floor, hood + 0.25 * (belt - hood)),
+        (f["windshield_base"], 1.0, floor, belt),
+        (min(f["rear_glass_base"], 0.94), 1.0, floor, max(belt, deck)),
+        (0.97, 0.93, floor + 0.5 * lift, deck),
         (1.0, 0.82, floor + lift, max(tail, deck - 0.12 * height)),
-    ]  # fmt: skip
-    rows = sorted({round(row[0], 9): row for row in rows}.values())
+    ]
     return hull([(length * (0.5 - s), w * half, low, high) for s, w, low, high in rows], exponent=4.5, sides=32)
 
 
