@@ -18,6 +18,7 @@ up +z. Every point belongs to one part; every part but the body moves.
 """
 
 import json
+import zipfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -156,6 +157,6 @@ def read(path: str | Path) -> Cloud:
         kinds = tuple(str(value) for value in arrays.pop("kinds"))
         names = tuple(str(value) for value in arrays.pop("names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
-    except (OSError, ValueError, KeyError, TypeError, EOFError) as error:
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a cloud file ({error})") from error
     return check(cloud, str(path))

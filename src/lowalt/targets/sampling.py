@@ -28,7 +28,7 @@ def sample_surface(
     """Return `count` points (count, 3) spread over the triangles by area and their unit normals (count, 3).
 
     `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls into each of
-    `count` equal slices of the running area, so a face of area a gets count * a / total to within one point.
+    `count` equal slices of the running area, so a face of area a gets count * a / total points to within two.
     Degenerate triangles get none.
     Raises: InputError where the surface has no area or the area is not finite.
     Source: Osada et al. 2002 (uniform point in a triangle), systematic sampling over the faces.

@@ -1,0 +1,39 @@
+"""Validator of cloud files: one line a file, what it holds or what is wrong with it."""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.targets.cloud import Cloud, read
+
+
+def summary(cloud: Cloud) -> str:
+    """Return one line on a cloud: subtype, source, points, extent in metres, parts and normals."""
+    kinds = [f"{len(cloud.parts_of(kind))} {kind}" for kind in dict.fromkeys(cloud.kinds)]
+    extent = " x ".join(f"{value:.3f}" for value in np.ptp(cloud.points, axis=0))
+    normals = np.isfinite(cloud.normals).all(1).mean()
+    return (
+        f"{cloud.subtype} ({cloud.category}, {cloud.record['source']}): {len(cloud.points)} points, {extent} m, "
+        f"{', '.join(kinds)}, normals on {normals:.0%}, checksum {cloud.record['checksum'][:12]}"
+    )
+
+
+def main(arguments: list[str]) -> int:
+    """Print a line a file and return the number of files that break the contract."""
+    line = argparse.ArgumentParser(prog="python -m lowalt.targets.validate", description=__doc__)
+    line.add_argument("files", nargs="+", type=Path, help="cloud files (.npz)")
+    wrong = 0
+    for path in line.parse_args(arguments).files:
+        try:
+            print(f"{path}: {summary(read(path))}")
+        except InputError as error:
+            wrong += 1
+            print(f"wrong: {error}")
+    return wrong
+
+
+if __name__ == "__main__":
+    raise SystemExit(min(main(sys.argv[1:]), 1))
