@@ -95,3 +95,22 @@ def chunk_echoes(wildcards):
     """The stations' clean echoes of a chunk, in the order of the stations."""
     stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
     return [f"{stem}/{station}.npy" for station in STATIONS]
+
+
+def shard_tiles(wildcards):
+    """A chunk's tiles, where shards hold images; signal shards need none, so none are rendered."""
+    if config["shards"]["kind"] == "signal":
+        return {}
+    return {"tiles": f"results/{wildcards.run}/tiles/{wildcards.group}-{wildcards.part}.npz"}
+
+
+def shard_settings(wildcards):
+    return canonical(
+        {
+            "seed": config["seed"],
+            "network": config["network"],
+            "snr_db": config["noise"]["snr_db"],
+            "split": config["split"],
+            "shards": config["shards"],
+        }
+    )

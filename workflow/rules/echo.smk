@@ -10,12 +10,12 @@ rule echo:
         clouds=group_clouds,
     output:
         "results/{run}/echo/{group}-{part}/{station}.npy",
-    params:
-        settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
     log:
         "results/{run}/logs/echo/{group}-{part}-{station}.log",
     benchmark:
         "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
+    params:
+        settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
     shell:
         "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " --station {wildcards.station} --out {output:q} 2> {log:q}"

@@ -9,13 +9,13 @@ rule motion:
         clouds=group_clouds,
     output:
         "results/{run}/motion/{group}-{part}.csv",
-    params:
-        settings=motion_settings,
-        span=motion_span,
     log:
         "results/{run}/logs/motion/{group}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/motion/{group}-{part}.jsonl"
+    params:
+        settings=motion_settings,
+        span=motion_span,
     shell:
         "python -m lowalt.motion --settings {params.settings:q} --clouds {input.clouds:q}"
         " --group {wildcards.group} {params.span} --out {output:q} 2> {log:q}"

@@ -10,12 +10,12 @@ rule noise:
         echoes=chunk_echoes,
     output:
         "results/{run}/noisy/{group}-{part}.npy",
-    params:
-        settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
     log:
         "results/{run}/logs/noise/{group}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/noise/{group}-{part}.jsonl"
+    params:
+        settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
     shell:
         "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
         " --echoes {input.echoes:q} --out {output:q} 2> {log:q}"

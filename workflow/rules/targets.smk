@@ -9,14 +9,14 @@ rule cloud:
         files=record_files,
     output:
         "results/{run}/clouds/{subtype}.npz",
-    params:
-        settings=cloud_settings,
     log:
         "results/{run}/logs/cloud/{subtype}.log",
     benchmark:
         "results/{run}/benchmarks/cloud/{subtype}.jsonl"
     resources:
         mem_mb=2000,
+    params:
+        settings=cloud_settings,
     shell:
         "python -m lowalt.targets --settings {params.settings:q} --out {output:q} 2> {log:q}"
 

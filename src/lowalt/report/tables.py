@@ -1,0 +1,62 @@
+"""Reading and pivoting the run's small CSV tables for the page; no drawing, no HTML."""
+
+import csv
+import json
+from collections import defaultdict
+from collections.abc import Iterable
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+
+
+def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
+    """Return a CSV file's rows as dicts of text.
+
+    Raises: InputError naming the file and the columns it lacks.
+    """
+    with existing(path, "table").open(newline="") as file:
+        reader = csv.DictReader(file)
+        missing = set(needed) - set(reader.fieldnames or ())
+        if missing:
+            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
+        return list(reader)
+
+
+def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return accuracy in percent as protocol -> scheme -> SNR label -> value, in the order of the rows."""
+    result: dict = defaultdict(lambda: defaultdict(dict))
+    for row in rows:
+        result[row["protocol"]][row["scheme"]][row["snr_db"]] = float(row["accuracy_percent"])
+    return {protocol: dict(schemes) for protocol, schemes in result.items()}
+
+
+def stage_times(paths: Iterable[str | Path]) -> list[dict]:
+    """Return what each rule took, from Snakemake's benchmark files (JSON lines, extended), in order of first sight.
+
+    One dict a rule: rule, jobs, wall_s and cpu_s (sums over jobs), peak_mib (largest job; sampled, so a short peak
+    can be missed).
+    Raises: InputError for a file that is no benchmark.
+    """
+    rules: dict[str, dict] = {}
+    for path in paths:
+        try:
+            last = json.loads(existing(path, "benchmark").read_text().splitlines()[-1])
+            name, wall, cpu, memory = last["rule_name"], last["s"], last["cpu_time"], last["max_rss"]
+        except (ValueError, IndexError, KeyError) as error:
+            raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
+        entry = rules.setdefault(name, {"rule": name, "jobs": 0, "wall_s": 0.0, "cpu_s": 0.0, "peak_mib": 0.0})
+        entry["jobs"] += 1
+        entry["wall_s"] += float(wall)
+        # Jobs under Snakemake's sampling interval have no CPU or memory reading; it writes null or "NA".
+        entry["cpu_s"] += float(cpu) if isinstance(cpu, (int, float)) else 0.0
+        entry["peak_mib"] = max(entry["peak_mib"], float(memory) if isinstance(memory, (int, float)) else 0.0)
+    return list(rules.values())
+
+
+def confusion(rows: Iterable[dict[str, str]]) -> dict[tuple[str, str], dict[tuple[str, str], int]]:
+    """Return counts as (protocol, scheme) -> (true category, predicted category) -> samples."""
+    result: dict = defaultdict(lambda: defaultdict(int))
+    for row in rows:
+        result[row["protocol"], row["scheme"]][row["category"], row["predicted"]] += int(row["samples"])
+    return {key: dict(counts) for key, counts in result.items()}

@@ -1,0 +1,52 @@
+# Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples beside it, and one index.
+# REQUIRED INPUTS: motion table and noisy signals of a chunk; its tiles, unless the shards hold signals
+# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json
+
+
+rule shard:
+    input:
+        unpack(shard_tiles),
+        code=code("lowalt.shards"),
+        motion="results/{run}/motion/{group}-{part}.csv",
+        signals="results/{run}/noisy/{group}-{part}.npy",
+    output:
+        tar="results/{run}/shards/{group}-{fold}-{part}.tar",
+        table="results/{run}/shards/{group}-{fold}-{part}.npz",
+    log:
+        "results/{run}/logs/shard/{group}-{fold}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/shard/{group}-{fold}-{part}.jsonl"
+    params:
+        settings=shard_settings,
+        tiles=lambda wildcards, input: f"--tiles {input.tiles}" if "tiles" in input.keys() else "",
+    shell:
+        "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
+        " --signals {input.signals:q} {params.tiles} --fold {wildcards.fold} --out {output.tar:q} 2> {log:q}"
+
+
+rule index:
+    input:
+        code=code("lowalt.shards"),
+        tars=expand("results/{{run}}/shards/{shard}.tar", shard=PLAN.shards),
+        tables=expand("results/{{run}}/shards/{shard}.npz", shard=PLAN.shards),
+    output:
+        "results/{run}/shards/index.json",
+    log:
+        "results/{run}/logs/index.log",
+    benchmark:
+        "results/{run}/benchmarks/index.jsonl"
+    params:
+        settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
+    shell:
+        "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q} --out {output:q} 2> {log:q}"
+
+
+rule configuration:
+    output:
+        "results/{run}/config.yaml",
+    log:
+        "results/{run}/logs/configuration.log",
+    params:
+        settings=canonical(config),
+    shell:
+        "python -m lowalt.config --settings {params.settings:q} --out {output:q} 2> {log:q}"
