@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo import answers
+from lowalt.echo import answers, ladder
 from lowalt.echo.motion import Rigid, Scene, check
 from lowalt.echo.precise import reference
 from lowalt.echo.radar import Radar, radar
@@ -55,12 +55,15 @@ def echo_signal(
     Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
     """
     scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
-    count = len(scene.translation)
-    values, cells = np.empty(count, np.complex128), np.empty(count, np.int64)
-    ties, computed = np.empty(count, np.bool_), np.empty(count, np.int64)
-    fault = answers.signal(scene, radio, refs, np.arange(count), aims, *ways, values, cells, ties, computed)
-    _check_fault(fault, scene, station, sample)
-    return EchoResult(values, cells, int(ties.sum()))
+    if paths is None:
+        found, again = ladder.climb(scene, radio, refs, aims, tolerance)
+    else:
+        found, again = ladder.Found.empty(len(refs)), np.arange(len(refs))
+    if len(again):
+        computed = np.empty(len(refs), np.int64)
+        fault = answers.signal(scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, computed)
+        _check_fault(fault, scene, station, sample)
+    return EchoResult(found.values, found.cells, int(found.ties.sum()))
 
 
 def range_cells(

@@ -1,0 +1,148 @@
+"""The fast kernel: short loops over a tile of symbols and points that the compiler turns into vector instructions.
+
+A tile's arrays stay in the first-level cache. Every smooth factor is a polynomial whose degree the plan has chosen
+by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
+Sums may be reordered and products fused; nothing here depends on the order of roundings.
+"""
+
+import numpy as np
+from numba import njit
+
+FLAGS = {"contract", "reassoc", "nsz"}
+TILE = 512
+"""Points in a tile: some twenty arrays of 4 kB fit the first-level cache."""
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def horner(x, c, degree, out, size):
+    """out[:size] = sum of c[k] x^k for k up to `degree`, four orders a pass over the tile."""
+    k = degree
+    top = c[degree]
+    first = degree & 3
+    if first == 0:
+        for l in range(size):
+            out[l] = top
+    elif first == 1:
+        c0 = c[degree - 1]
+        for l in range(size):
+            out[l] = top * x[l] + c0
+    elif first == 2:
+        c0, c1 = c[degree - 1], c[degree - 2]
+        for l in range(size):
+            t = x[l]
+            out[l] = (top * t + c0) * t + c1
+    else:
+        c0, c1, c2 = c[degree - 1], c[degree - 2], c[degree - 3]
+        for l in range(size):
+            t = x[l]
+            out[l] = ((top * t + c0) * t + c1) * t + c2
+    k = degree - first
+    while k > 0:
+        c0, c1, c2, c3 = c[k - 1], c[k - 2], c[k - 3], c[k - 4]
+        for l in range(size):
+            t = x[l]
+            out[l] = (((out[l] * t + c0) * t + c1) * t + c2) * t + c3
+        k -= 4
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def place_part(px, py, pz, low, high, m, at, ex, ey, ez):
+    """Fill the tile from `at` with points low..high of a part; m: 12 numbers, matrix rows then offset, per r_ref."""
+    m0, m1, m2, m3, m4, m5 = m[0], m[1], m[2], m[3], m[4], m[5]
+    m6, m7, m8, m9, m10, m11 = m[6], m[7], m[8], m[9], m[10], m[11]
+    for l in range(high - low):
+        x, y, z = px[low + l], py[low + l], pz[low + l]
+        ex[at + l] = m0 * x + m1 * y + m2 * z + m9
+        ey[at + l] = m3 * x + m4 * y + m5 * z + m10
+        ez[at + l] = m6 * x + m7 * y + m8 * z + m11
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def relative_excess(ex, ey, ez, at, size, hx, hy, hz, eps):
+    """eps = r^2 / r_ref^2 - 1 from offsets per r_ref and twice the unit vector (hx, hy, hz) to the reference."""
+    for l in range(at, at + size):
+        eps[l] = ex[l] * (hx + ex[l]) + ey[l] * (hy + ey[l]) + ez[l] * (hz + ez[l])
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def arguments(at, size, k, eps, inverse, excess, ey, ez, amplitude, first, psi, omega, u, turn, amp):
+    """From the two polynomials: arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2], amplitude.
+
+    k: the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u, turns per
+    excess, per psi and per omega, the reference's turn, 1 / r_ref^2.
+    """
+    hy, hz, sp, cp, so, co, su, cu = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
+    te, tp, to, t0, inverse_r2 = k[8], k[9], k[10], k[11], k[12]
+    for l in range(size):
+        i = at + l
+        s = inverse[i]
+        d = eps[i] * excess[i]
+        p = (hy + ey[i]) * s * sp - cp
+        o = (hz + ez[i]) * s * so - co
+        psi[i] = p
+        omega[i] = o
+        u[i] = d * su + cu
+        t = te * d + tp * p + to * o + t0
+        turn[i] = t - np.rint(t)
+        amp[i] = amplitude[first + l] * s * s * inverse_r2
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def waves(size, amp, gain_h, gain_v, cosine, sine, turn, real, imag):
+    """real, imag = amplitude times gains times (cosine, sine); `sine` comes divided by the turn."""
+    for l in range(size):
+        a = amp[l] * gain_h[l] * gain_v[l]
+        real[l] = a * cosine[l]
+        imag[l] = a * sine[l] * turn[l]
+        amp[l] = abs(a)
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def squares(size, turn, square):
+    """square = turn^2."""
+    for l in range(size):
+        square[l] = turn[l] * turn[l]
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def weigh(at, size, weight, real, imag):
+    """Sums of weight * real and weight * imag over part of the tile."""
+    re, im = weight[0] * real[0] * 0, weight[0] * imag[0] * 0
+    for l in range(at, at + size):
+        re += weight[l] * real[l]
+        im += weight[l] * imag[l]
+    return re, im
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def far_sums(at, size, sine, u, real, imag, amp):
+    """Sums of c, c u and |z| with c = z sin(pi u), for the bound on far cells."""
+    zero = real[0] * 0
+    a, b, c, d, total = zero, zero, zero, zero, zero
+    for l in range(at, at + size):
+        x, y, t = real[l] * sine[l], imag[l] * sine[l], u[l]
+        a += x
+        b += y
+        c += x * t
+        d += y * t
+        total += amp[l]
+    return a, b, c, d, total
+
+
+@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+def distant_cell(at, size, j, scale, shift, count, sine, u, real, imag):
+    """Sum over part of the tile in cell j, which no point is near: c / (M sin(pi (j - u) / M)).
+
+    u: on [-1, 1], cells = scale u + shift. |pi x / M| must stay below 1.6, for the polynomial of the sine.
+    """
+    re, im = real[0] * 0, real[0] * 0
+    step = np.pi / count
+    for l in range(at, at + size):
+        x = (j - shift - scale * u[l]) * step
+        q = x * x
+        s = x * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880 + q * (
+            -1 / 39916800 + q * (1 / 6227020800 + q * (-1 / 1307674368000))))))))  # fmt: skip
+        w = sine[l] / s
+        re += w * real[l]
+        im += w * imag[l]
+    return re / count, im / count

@@ -1,0 +1,73 @@
+"""Which precision and which polynomials a sample gets: a bound of the error first, then the cheapest that keeps it."""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo.fits import array_rule, cell_rule, smooth
+from lowalt.echo.radar import Radar
+
+SPREAD_LIMIT = 0.22
+"""Largest target radius over range that the fast kernel takes; nearer targets go to the general kernel."""
+FINEST = 1e-15
+"""Accuracy asked of every polynomial in the exact mode."""
+
+
+class Plan(NamedTuple):
+    """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
+    relative to the sum of amplitudes and to the sum of peak amplitudes; `single`: float32 after the phase."""
+
+    fit: float
+    share: float
+    peak: float
+    single: bool
+    fits: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def rules(radar: Radar):
+    """Cosine sums of the horizontal and vertical gain and the cell kernel, for `fast.run`."""
+    return (
+        *array_rule(radar.transmit_h, radar.receive_h, radar.kappa),
+        *array_rule(radar.transmit_v, radar.receive_v, radar.kappa),
+        *cell_rule(radar.subcarriers),
+    )
+
+
+def _round_up(value: float) -> float:
+    """Next power of the square root of two, so that few polynomials serve all samples."""
+    return 2.0 ** (math.ceil(2 * math.log2(max(value, 1e-9))) / 2)
+
+
+def plan(radar: Radar, spread: float, size_m: float, points: int, error: float) -> Plan:
+    """Return the cheapest plan whose bound is about `error` relative to the sum of amplitudes.
+
+    spread: largest target radius over range; size_m: largest radius (m). `error` below FINEST means the exact mode.
+    """
+    return _plan(
+        radar.turns, radar.kappa, radar.transmit_h + radar.receive_h - 2, radar.transmit_v + radar.receive_v - 2,
+        min(0.5, _round_up(2.01 * spread + spread * spread)), _round_up(size_m), -(-points // 512),
+        2.0 ** math.floor(math.log2(max(error, FINEST))),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=4096)
+def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
+    wave = 2 * np.pi * turns * 2 * size_m
+    array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
+    unit = 2.0**-53
+    single = 600 * 2.0**-24 < error
+    coarse = 2.0**-24 if single else unit
+    part = error / 8
+    inverse, inverse_error = smooth("inverse", reach, part / (2 + 2 * array_phase))
+    excess, excess_error = smooth("excess", reach, part / max(wave, 1.0))
+    cosine, cosine_error = smooth("cosine", 0.25, part)
+    sine, sine_error = smooth("sine", 0.25, part)
+    rounding = (8 * wave + 8 * array_phase + 30) * unit + (300 + 80) * coarse + tiles * unit + 4 * np.pi * coarse
+    share = (
+        wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
+    )  # fmt: skip
+    kind = np.float32 if single else np.float64
+    fits = (inverse, excess, cosine.astype(kind), sine.astype(kind))
+    return Plan(max(part, FINEST), share, array_phase * inverse_error + 80 * coarse, single, fits)

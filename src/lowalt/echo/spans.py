@@ -1,0 +1,90 @@
+"""Where every symbol's points can lie, before any is computed: bounds from the parts' poses alone."""
+
+import math
+
+import numpy as np
+from numba import njit
+
+PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
+"""Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
+
+
+@njit(cache=True)
+def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
+    """Fill out (N, 5) and return the largest SPREAD.
+
+    A part's points lie within its matrix's norm (bounded by Frobenius and, for rotations, by 1 plus rounding) times
+    its radius of its translation.
+    """
+    worst = 0.0
+    for n in range(len(refs)):
+        r = refs[n, 3]
+        size = 0.0
+        if rotation.shape[0] == 0:
+            for p in range(translation.shape[1]):
+                x = translation[n, p, 0] - translation[n, first, 0]
+                y = translation[n, p, 1] - translation[n, first, 1]
+                z = translation[n, p, 2] - translation[n, first, 2]
+                size = max(size, x * x + y * y + z * z)
+            size = math.sqrt(size)
+        else:
+            for run in range(len(parts)):
+                p = parts[run]
+                x = translation[n, p, 0] - translation[n, first, 0]
+                y = translation[n, p, 1] - translation[n, first, 1]
+                z = translation[n, p, 2] - translation[n, first, 2]
+                size = max(size, math.sqrt(x * x + y * y + z * z) + norm(rotation[n, p]) * radii[run])
+        size *= 1.0 + 1e-12
+        out[n, PSI] = (cosine * refs[n, 1] - sine * refs[n, 0]) / r if r > 0.0 else 0.0
+        out[n, OMEGA] = refs[n, 2] / r if r > 0.0 else 0.0
+        out[n, CELL] = refs[n, 5] + refs[n, 6]
+        out[n, SPREAD] = size / r if r > 0.0 else np.inf
+        out[n, SIZE] = size
+        worst = max(worst, out[n, SPREAD])
+    return worst
+
+
+@njit(cache=True, inline="always")
+def norm(m):
+    """Bound of a 3 x 3 matrix's norm: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
+    a = m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2]
+    b = m[1, 0] * m[1, 0] + m[1, 1] * m[1, 1] + m[1, 2] * m[1, 2]
+    c = m[2, 0] * m[2, 0] + m[2, 1] * m[2, 1] + m[2, 2] * m[2, 2]
+    d = abs(m[0, 0] * m[1, 0] + m[0, 1] * m[1, 1] + m[0, 2] * m[1, 2])
+    e = abs(m[0, 0] * m[2, 0] + m[0, 1] * m[2, 1] + m[0, 2] * m[2, 2])
+    f = abs(m[1, 0] * m[2, 0] + m[1, 1] * m[2, 1] + m[1, 2] * m[2, 2])
+    return math.sqrt(max(a + d + e, b + d + f, c + e + f))
+
+
+@njit(cache=True)
+def segments(span, cells_per_m, rate_h, rate_v, longest, out):
+    """Cut the symbols into runs over which gains and cell kernels stay short polynomials.
+
+    Fills out (N, 8): first symbol, end, centre and half-width of psi, of omega and of the range cell (relative to no
+    base). Returns how many runs there are. A single symbol may be wider than the limits; the plan looks at that.
+    """
+    count = 0
+    n = 0
+    while n < len(span):
+        low = np.array([np.inf, np.inf, np.inf])
+        high = np.array([-np.inf, -np.inf, -np.inf])
+        end = n
+        while end < len(span) and end - n < longest:
+            d = span[end, SPREAD]
+            turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
+            deep = span[end, SIZE] * cells_per_m
+            a, b, c = span[end, PSI], span[end, OMEGA], span[end, CELL]
+            l0, l1, l2 = min(low[0], a - turn), min(low[1], b - turn), min(low[2], c - deep)
+            h0, h1, h2 = max(high[0], a + turn), max(high[1], b + turn), max(high[2], c + deep)
+            wide = max((h0 - l0) * rate_h / 4.0, (h1 - l1) * rate_v / 4.0, (h2 - l2) / 1.3)
+            if end > n and wide > 1.0:
+                break
+            low[0], low[1], low[2], high[0], high[1], high[2] = l0, l1, l2, h0, h1, h2
+            end += 1
+        out[count, 0], out[count, 1] = n, end
+        for i in range(3):
+            out[count, 2 + 2 * i] = 0.5 * (low[i] + high[i])
+            out[count, 3 + 2 * i] = 0.5 * (high[i] - low[i]) * (1.0 + 1e-9) + 1e-9
+        count += 1
+        n = end
+    return count
