@@ -1,5 +1,7 @@
 """Surface sampling and thinning: exact counts, areas, and the laws of farthest-point sampling."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -75,7 +77,7 @@ def test_thinning_is_exact_unique_and_even(seed, size, data):
     free = range(max(len(keep), 1), count)
     gaps = [distance[chosen[k], chosen[:k]].min() for k in free]
     assert all(gap >= covered - 1e-12 for gap in gaps)
-    assert all(later <= earlier + 1e-12 for earlier, later in zip(gaps, gaps[1:], strict=False))
+    assert all(later <= earlier + 1e-12 for earlier, later in itertools.pairwise(gaps))
 
 
 def test_same_seed_same_choice():

@@ -14,7 +14,7 @@ import numpy as np
 
 from lowalt.errors import InputError
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.sampling import sample_surface, thin
+from lowalt.targets.sampling import face_normals, sample_surface, thin
 from lowalt.targets.surfaces import Surface, inside, merged
 
 CANDIDATES_PER_POINT = 12
@@ -55,47 +55,42 @@ def allot(parts: list[Part], count: int, moving_share: float) -> list[int]:
     return counts
 
 
-def _vertex_normals(surface: Surface) -> np.ndarray:
-    """Area-weighted unit normals of the vertices (V, 3)."""
-    a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
-    cross = np.cross(b - a, c - a)
-    total = np.zeros_like(surface.vertices)
-    for corner in range(3):
-        np.add.at(total, surface.faces[:, corner], cross)
-    return total / np.linalg.norm(total, axis=1, keepdims=True)
+def _tips(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """The outermost points along each axis (up to 6, 3) and their normals, each just inside its largest face."""
+    unit, areas = face_normals(surface.vertices, surface.faces)
+    points, normals = [], []
+    for vertex in np.unique(np.concatenate([surface.vertices.argmin(0), surface.vertices.argmax(0)])):
+        # On a face, not at the vertex: there the normal is that of a surface.
+        face = np.argmax(np.where((surface.faces == vertex).any(1), areas, -1.0))
+        corner, middle = surface.vertices[vertex], surface.vertices[surface.faces[face]].mean(0)
+        points.append(corner + 1e-4 * (middle - corner))
+        normals.append(unit[face])
+    return np.array(points), np.array(normals)
 
 
-def _exposed(points: np.ndarray, owner: np.ndarray, part: Part) -> np.ndarray:
-    """Whether each point (L, 3) of the shell `owner` (L,) is outside every other shell and every cut."""
+def _exposed(points: np.ndarray, normals: np.ndarray, part: Part) -> np.ndarray:
+    """Whether each point (L, 3), a hair along its normal, is outside all of the part's shells and its cuts."""
+    # A millionth of the part's size clears the point's own shell and no other.
+    outward = points + 1e-6 * np.ptp(points) * normals
     hidden = np.zeros(len(points), bool)
-    for index, shell in enumerate(part.shells):
-        other = owner != index
-        hidden[other] |= inside(shell, points[other])
-    for cut in part.cuts:
-        hidden |= inside(cut, points)
+    for shell in (*part.shells, *part.cuts):
+        hidden |= inside(shell, outward)
     return ~hidden
 
 
 def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` points (count, 3) on the part's outer skin and their unit normals (count, 3).
 
-    The outermost vertices along each axis are kept first, so that a cloud is as large as its model.
+    The outermost points along each axis are kept first, so that a cloud is as large as its model.
     """
     whole = merged(part.shells)
     points, normals = sample_surface(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
-    owner_of_face = np.repeat(np.arange(len(part.shells)), [len(shell.faces) for shell in part.shells])
-    # The sampler walks the faces in order, so running areas give back the shell of each sample.
-    a, b, c = np.moveaxis(whole.vertices[whole.faces], 1, 0)
-    running = np.cumsum(np.bincount(owner_of_face, np.linalg.norm(np.cross(b - a, c - a), axis=1)))
-    slices = (np.arange(len(points)) + 0.5) / len(points) * running[-1]
-    owner = np.searchsorted(running, slices).clip(max=len(part.shells) - 1)
-    tips = np.unique(np.concatenate([whole.vertices.argmin(0), whole.vertices.argmax(0)]))
-    owner_of_vertex = np.repeat(np.arange(len(part.shells)), [len(shell.vertices) for shell in part.shells])
-    points = np.concatenate([whole.vertices[tips], points])
-    normals = np.concatenate([_vertex_normals(whole)[tips], normals])
-    seen = _exposed(points, np.concatenate([owner_of_vertex[tips], owner]), part)
-    points, normals, kept = points[seen], normals[seen], int(seen[: len(tips)].sum())
-    chosen = thin(points, count, rng, keep=range(min(kept, count)))
+    tips, facing = _tips(whole)
+    points, normals = np.concatenate([tips, points]), np.concatenate([facing, normals])
+    seen = _exposed(points, normals, part)
+    kept = min(int(seen[: len(tips)].sum()), count)
+    points, normals = points[seen], normals[seen]
+    chosen = thin(points, count, rng, keep=range(kept))
     return points[chosen], normals[chosen]
 
 

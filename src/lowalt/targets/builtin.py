@@ -73,6 +73,9 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     flap = extra.get("flap", {})
     if not isinstance(flap, dict) or set(flap) - set(bird.FLAP):
         raise InputError(f"{where}: flap is {flap!r}, expected some of {sorted(bird.FLAP)} in degrees")
+    for key, value in flap.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= 180:
+            raise InputError(f"{where}: flap.{key} is {value!r}, expected degrees between -180 and 180")
     wanted, figures = layouts[extra["model"]], extra.get("figures", {})
     wrong = sorted(set(wanted) ^ set(figures))
     if wrong:

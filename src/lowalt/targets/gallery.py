@@ -92,7 +92,7 @@ def figure(clouds: list[Cloud]):
     spans = [np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members]) for members in groups]
     # Every panel of a category has the same shape, that of its tallest cloud.
     aspects = [float(np.clip((span[:, 1] / span[:, 0]).max(), 0.3, 2.0)) for span in spans]
-    lineups = [2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum() + 0.5 for span in spans]
+    lineups = [min(3.0, 2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum()) + 0.5 for span in spans]
     panels = [2.6 * aspect + 0.45 for aspect in aspects]
     heights = [top + panel * count for top, panel, count in zip(lineups, panels, rows, strict=True)]
     result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=110, layout="constrained")

@@ -75,9 +75,12 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     a, b = grid[:-1], np.roll(grid[:-1], -1, 1)
     c, d = np.roll(grid[1:], -1, 1), grid[1:]
     first, last = rows * sides, rows * sides + 1
+    # The two halves of a loop are split along mirrored diagonals, or upper and lower side of a twisted blade would
+    # cut through each other at its thin edge.
+    half = np.arange(sides)[None, :, None] < sides // 2
     faces = [
-        np.stack([a, b, c], -1).reshape(-1, 3),
-        np.stack([a, c, d], -1).reshape(-1, 3),
+        np.where(half, np.stack([a, b, c], -1), np.stack([a, b, d], -1)).reshape(-1, 3),
+        np.where(half, np.stack([a, c, d], -1), np.stack([b, c, d], -1)).reshape(-1, 3),
         np.stack([np.full(sides, first), np.roll(grid[0], -1), grid[0]], -1),
         np.stack([np.full(sides, last), grid[-1], np.roll(grid[-1], -1)], -1),
     ]
@@ -163,21 +166,19 @@ def ring(profile: np.ndarray, sides: int = 32) -> Surface:
     return surface if volume(surface) > 0 else Surface(surface.vertices, faces[:, ::-1])
 
 
-def airfoil(chord: float, thickness: float, sides: int = 12) -> np.ndarray:
-    """Return a symmetric section (sides, 2) of (along chord, across), leading edge at +chord/4, as a loop.
+def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
+    """Return a symmetric section (2 panels + 1, 2) of (along chord, across), leading edge at +chord/4, as a loop.
 
-    `thickness` is the largest thickness over the chord.
-    Source: NACA four-digit thickness distribution with closed trailing edge, Abbott & von Doenhoff 1959.
+    `thickness` is the largest thickness over the chord; the trailing edge is blunt, a fiftieth of that thick.
+    Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
-    half = sides // 2
-    x = (1 - np.cos(np.pi * np.arange(half + 1) / half)) / 2
-    y = 5 * thickness * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1036 * x**4)
-    upper, lower = np.stack([x, y], 1), np.stack([x, -y], 1)[-2:0:-1]
-    loop = np.concatenate([upper, lower]) * chord
+    x = (1 - np.cos(np.pi * np.arange(panels + 1) / panels)) / 2
+    y = 5 * thickness * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1015 * x**4)
+    loop = np.concatenate([np.stack([x, y], 1), np.stack([x, -y], 1)[:0:-1]]) * chord
     return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
 
 
-def foil(stations: Iterable[tuple], thickness: float = 0.12, sides: int = 12) -> Surface:
+def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
     """Return a wing or blade along +x from stations (x, y, z, chord, twist): airfoil sections, closed ends.
 
     (x, y, z) is the quarter-chord point, the chord lies along y (leading edge at +y), a positive twist (rad) raises
@@ -185,8 +186,8 @@ def foil(stations: Iterable[tuple], thickness: float = 0.12, sides: int = 12) ->
     """
     sections = []
     for x, y, z, chord, twist in stations:
-        loop = airfoil(chord, thickness, sides)
+        loop = airfoil(chord, thickness)
         c, s = np.cos(twist), np.sin(twist)
         along, across = loop[:, 0] * c - loop[:, 1] * s, loop[:, 0] * s + loop[:, 1] * c
-        sections.append(np.stack([np.full(sides, float(x)), y + along, z + across], 1))
+        sections.append(np.stack([np.full(len(loop), float(x)), y + along, z + across], 1))
     return loft(np.array(sections))

@@ -1,0 +1,141 @@
+"""Records: what is merged, what overrides what, and every fault refused by file, subtype, key and value."""
+
+import copy
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.errors import InputError
+from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, slug, source_files
+
+CONFIG = Path(__file__).parents[1] / "config"
+TABLE = CONFIG / "targets.csv"
+FILES = [CONFIG / "targets" / f"{name}.yaml" for name in ("uav", "bird", "vehicle", "pedestrian")]
+
+
+@pytest.fixture(scope="module")
+def written():
+    """The records of all files as written."""
+    return {name: record for file in FILES for name, record in read_records(file).items()}
+
+
+def load(tmp_path, records):
+    """The merged records of one overriding file after the embedded ones."""
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(records, sort_keys=False))
+    return load_records(TABLE, [*FILES, tmp_path / "mine.yaml"])
+
+
+def test_all_forty_in_the_tables_order_with_their_published_values():
+    records = load_records(TABLE, FILES)
+    assert list(records) == list(load_table(TABLE)) and len(records) == 40
+    mini = records["DJI Mini 2"]
+    assert mini["published"]["size_m"] == 0.2192 and mini["published"]["n_rotors_or_wings"] == 4
+    assert mini["published"]["len_m"] is None and mini["published"]["freq_hi_hz"] == 256.0
+    assert (mini["category"], mini["group"], mini["points"], mini["rcs_m2_per_point"]) == ("UAV", "seen", 171, 1.0)
+    assert mini["figures"]["propeller_diameter"]["si"] == pytest.approx(0.11938)
+    assert records["EH 216 S"]["group"] == "unseen"
+    assert missing_inputs(records, None) == [] and source_files(mini, None) == []
+
+
+def test_a_later_file_replaces_whole_records(tmp_path, written):
+    mine = copy.deepcopy(written["Crow"]) | {"points": 50}
+    del mine["sources"]
+    mine["figures"]["length"][2] = mine["figures"]["span"][2] = "estimate"
+    records = load(tmp_path, {"Crow": mine})
+    assert records["Crow"]["points"] == 50 and "sources" not in records["Crow"]
+    assert records["Eagle"]["points"] == 134
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"source": "clay"}, r"Crow: source is 'clay', expected one of"),
+        ({"colour": "black"}, r"Crow: unknown keys \['colour'\], expected some of"),
+        ({"points": 0}, r"Crow: points is 0, expected a positive whole number"),
+        ({"points": 12.5}, r"Crow: points is 12\.5"),
+        ({"points": True}, r"Crow: points is True"),
+        ({"rcs_m2_per_point": -1}, r"Crow: rcs_m2_per_point is -1, expected square metres >= 0"),
+        ({"model": "plane"}, r"Crow: model is 'plane', expected one of \['bird'\]"),
+        ({"size_is": "weight"}, r"Crow: size_is is 'weight', expected one of"),
+        ({"moving_share": 1.0}, r"Crow: moving_share is 1\.0, expected a number between 0 and 1"),
+        ({"flap": {"speed": 3}}, r"Crow: flap is .*expected some of"),
+        ({"flap": {"mean_deg": "up"}}, r"Crow: flap\.mean_deg is 'up', expected degrees"),
+        ({"figures": {"length": [46, "cm", "reference"]}}, r"Crow: figures \[.*missing or unknown"),
+        ({"coaxial": True}, r"Crow: unknown keys \['coaxial'\]"),
+    ],
+)
+def test_wrong_records_are_refused_by_key_and_value(tmp_path, written, change, message):
+    with pytest.raises(InputError, match=message) as refusal:
+        load(tmp_path, {"Crow": written["Crow"] | change})
+    assert "mine.yaml" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("figure", "message"),
+    [
+        (
+            [46, "furlong", "reference"],
+            r"figures\.length: unit is 'furlong', expected one of \['mm', 'cm', 'm', 'in'\]",
+        ),
+        ([46, 1, "reference"], r"figures\.length: unit is '1'"),
+        ([-46, "cm", "reference"], r"figures\.length: value is -46, expected a positive number"),
+        ([float("nan"), "cm", "reference"], r"figures\.length: value is nan"),
+        ([46, "cm", "hearsay"], r"figures\.length: source is 'hearsay', expected 'estimate' or one of \['reference'\]"),
+        (46, r"figures\.length is 46, expected \[value, unit, source\]"),
+    ],
+)
+def test_wrong_figures_are_refused(tmp_path, written, figure, message):
+    record = copy.deepcopy(written["Crow"])
+    record["figures"]["length"] = figure
+    with pytest.raises(InputError, match=message):
+        load(tmp_path, {"Crow": record})
+
+
+def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected one of"):
+        load(tmp_path, {"Dodo": {"source": "builtin"}})
+    with pytest.raises(InputError, match=r"no record for \['AITO M9 2024'"):
+        load_records(TABLE, [file for file in FILES if file.stem != "vehicle"])
+    twice = tmp_path / "twice.yaml"
+    twice.write_text("Crow: {source: builtin}\nOwl: {source: builtin}\nCrow: {source: gait}\n")
+    with pytest.raises(InputError, match=r"twice\.yaml: 'Crow' is named twice \(line 3\)"):
+        read_records(twice)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("- Crow", "expected a mapping"),
+        ("Crow: 3", "expected a mapping"),
+        ("Crow: {", "not YAML"),
+        ("Crow: {source: gait, source: mesh}", "'source' is named twice"),
+        ("", "expected a mapping"),
+    ],
+)
+def test_files_that_hold_no_records_are_refused(tmp_path, text, message):
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_records(tmp_path / "bad.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("size_m", "size", r"columns \['size', 'size_m'\] missing or unknown"),
+        ("0.2192", "-1", r"DJI Mini 2: size_m is '-1', expected a positive number"),
+        ("0.2192", "big", r"DJI Mini 2: size_m is 'big'"),
+        ("UAV,1,", "Boat,1,", r"DJI Mini 2: category 'Boat'"),
+        ("DJI Mini 4 Pro", "DJI Mini 2", r"DJI Mini 2: named twice"),
+    ],
+)
+def test_wrong_tables_are_refused(tmp_path, old, new, message):
+    (tmp_path / "table.csv").write_text(TABLE.read_text().replace(old, new))
+    with pytest.raises(InputError, match=message):
+        load_table(tmp_path / "table.csv")
+
+
+def test_slugs_are_file_names_and_unique():
+    names = list(load_table(TABLE))
+    assert slug("Ramphastidae (toucan)") == "ramphastidae-toucan" and slug("EH 216 S") == "eh-216-s"
+    assert len({slug(name) for name in names}) == len(names)

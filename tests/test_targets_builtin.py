@@ -1,0 +1,317 @@
+"""The built-in models: published sizes, exact counts, closed surfaces, and parts that turn the right way."""
+
+import hashlib
+import itertools
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from lowalt.errors import InputError
+from lowalt.targets.assemble import allot, turn
+from lowalt.targets.builtin import MODULES, builtin_cloud
+from lowalt.targets.cloud import check, read, write
+from lowalt.targets.dimensions import rows as dimension_rows
+from lowalt.targets.gallery import main as gallery
+from lowalt.targets.records import load_table, merge, read_records, slug
+from lowalt.targets.surfaces import inside
+from lowalt.targets.uav import hubs, motor_diagonal
+
+CONFIG = Path(__file__).parents[1] / "config"
+TABLE = load_table(CONFIG / "targets.csv")
+WRITTEN = {
+    name: record
+    for file in ("uav", "bird", "vehicle")
+    for name, record in read_records(CONFIG / "targets" / f"{file}.yaml").items()
+}
+RECORDS = {name: merge(TABLE[name], record, name) for name, record in WRITTEN.items()}
+UAVS, BIRDS, CARS = (
+    [name for name, row in TABLE.items() if row["category"] == category] for category in ("UAV", "Bird", "Vehicle")
+)
+NAMES = [*UAVS, *BIRDS, *CARS]
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    """All thirty clouds of seed 1, by name."""
+    return {name: builtin_cloud(RECORDS[name], 1) for name in NAMES}
+
+
+def rotated(cloud, part, angle):
+    """The points of one part turned by `angle` about its hinge, by scipy."""
+    points = cloud.points[cloud.part == part] - cloud.hinges[part]
+    return Rotation.from_rotvec(angle * cloud.axes[part]).apply(points) + cloud.hinges[part]
+
+
+def variant(name, **changes):
+    """The cloud of a record with some keys changed as a user's file would."""
+    return builtin_cloud(merge(TABLE[name], WRITTEN[name] | changes, name), 1)
+
+
+def test_every_published_craft_bird_and_car_has_a_record():
+    assert list(WRITTEN) == NAMES and len(NAMES) == 30
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_counts_are_the_published_ones_and_the_cloud_keeps_the_contract(clouds, name):
+    cloud = check(clouds[name], name)
+    assert len(cloud.points) == TABLE[name]["points_in_published_cloud_approx"]
+    assert (
+        cloud.record["checksum"]
+        == hashlib.sha256(json.dumps(RECORDS[name], sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+    )
+    assert set(np.unique(cloud.part)) == set(range(len(cloud.kinds)))
+    assert (cloud.rcs_m2 == 1).all()
+    for part, count in enumerate(np.bincount(cloud.part)):
+        assert cloud.record["points_by_part"][cloud.names[part]] == count
+
+
+@pytest.mark.parametrize("name", UAVS)
+def test_craft_have_their_published_size(clouds, name):
+    cloud, size = clouds[name], TABLE[name]["size_m"]
+    rotors = cloud.parts_of("rotor")
+    places = cloud.hinges[rotors]
+    across = np.linalg.norm(places[:, None] - places[None], axis=2).max()
+    meaning = cloud.record["size_is"]
+    if meaning == "motor diagonal":
+        assert across == pytest.approx(size, rel=1e-12)
+    elif meaning == "span over rotors":
+        reach = [np.linalg.norm(cloud.points[cloud.part == p] - cloud.hinges[p], axis=1).max() for p in rotors]
+        assert across + 2 * max(reach) == pytest.approx(size, rel=0.02)
+    else:
+        plan = cloud.points[:, :2]
+        diagonal = max(np.ptp(plan @ [1, 1]), np.ptp(plan @ [1, -1])) / np.sqrt(2)
+        assert diagonal == pytest.approx(size, rel=0.02)
+
+
+@pytest.mark.parametrize("name", BIRDS)
+def test_birds_have_their_published_length_and_their_species_span(clouds, name):
+    cloud, figure = clouds[name], WRITTEN[name]["figures"]
+    width, length, _ = np.ptp(cloud.points, axis=0)
+    assert length == pytest.approx(TABLE[name]["size_m"], rel=0.02)
+    assert width / length == pytest.approx(figure["span"][0] / figure["length"][0], rel=0.02)
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_cars_have_their_published_sizes_and_stand_on_the_ground(clouds, name):
+    cloud, row = clouds[name], TABLE[name]
+    np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [row["wid_m"], row["len_m"], row["hgt_m"]], rtol=0.02)
+    figure = RECORDS[name]["figures"]
+    wheels = cloud.parts_of("wheel")
+    assert len(wheels) == 4
+    base = np.ptp(cloud.hinges[wheels, 1])
+    assert base == pytest.approx(figure["wheel_base"]["si"], rel=1e-12)
+    assert np.ptp(cloud.hinges[wheels, 0]) == pytest.approx(figure["track"]["si"], rel=0.02)
+    for wheel in wheels:
+        points = cloud.points[cloud.part == wheel]
+        assert points[:, 2].min() == pytest.approx(-cloud.record["origin_height_m"], abs=1e-5)
+        away = np.linalg.norm((points - cloud.hinges[wheel])[:, 1:], axis=1)
+        assert 2 * away.max() == pytest.approx(row["wheel_diam_m"], rel=1e-5)
+    assert cloud.record["wheel_diameter_m"] == row["wheel_diam_m"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_models_are_closed_surfaces(name):
+    parts, _ = MODULES[RECORDS[name]["category"]].parts(RECORDS[name])
+    for name_of, shell in ((part.name, shell) for part in parts for shell in part.shells):
+        mesh = trimesh.Trimesh(shell.vertices, shell.faces, process=False)
+        assert mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0, name_of
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_points_lie_on_the_outer_skin_and_normals_point_out(clouds, name):
+    cloud = clouds[name]
+    parts, _ = MODULES[cloud.category].parts(RECORDS[name])
+    step = 1e-8 * np.ptp(cloud.points)
+    for index, part in enumerate(parts):
+        # Of equal copies the first lies on the shells as modelled.
+        mine = np.flatnonzero(cloud.part == index)[: (cloud.part == index).sum() // part.copies]
+        points, normals = cloud.points[mine], cloud.normals[mine]
+        behind = np.zeros(len(mine), bool)
+        for shell in part.shells:
+            assert not inside(shell, points + step * normals).any()
+            behind |= inside(shell, points - step * normals)
+        assert behind.all()
+
+
+@pytest.mark.parametrize("name", UAVS)
+def test_neighbouring_rotors_turn_against_each_other_and_clear_each_other(clouds, name):
+    cloud = clouds[name]
+    rotors = cloud.parts_of("rotor")
+    assert len(rotors) == TABLE[name]["n_rotors_or_wings"]
+    around = sorted(rotors, key=lambda part: np.arctan2(cloud.hinges[part, 1], cloud.hinges[part, 0]))
+    diameter = RECORDS[name]["figures"]["propeller_diameter"]["si"]
+    for part, following in zip(around, [*around[1:], around[0]], strict=True):
+        assert cloud.axes[part] @ cloud.axes[following] == -1
+        assert np.linalg.norm(cloud.hinges[part] - cloud.hinges[following]) > diameter
+        away = np.linalg.norm((cloud.points[cloud.part == part] - cloud.hinges[part])[:, :2], axis=1)
+        assert 2 * away.max() == pytest.approx(diameter, rel=0.02)
+
+
+@pytest.mark.parametrize("name", UAVS)
+def test_blades_are_equal_and_lead_with_their_raised_edge(clouds, name):
+    cloud = clouds[name]
+    blades = RECORDS[name]["figures"]["blade_count"]["value"]
+    parts, _ = MODULES["UAV"].parts(RECORDS[name])
+    for part in cloud.parts_of("rotor"):
+        points = cloud.points[cloud.part == part]
+        turned = rotated(cloud, part, 2 * np.pi / blades)
+        gaps = np.linalg.norm(points[:, None] - turned[None], axis=2).min(1)
+        assert gaps.max() < 1e-12
+        # Where the blade moves to, its surface is higher than where it comes from: the rotor lifts.
+        vertices = parts[part].shells[0].vertices - cloud.hinges[part]
+        out = vertices[np.argmax(np.linalg.norm(vertices, axis=1))]
+        ahead = np.cross(cloud.axes[part], out)
+        slope = np.cov(vertices @ ahead, vertices[:, 2])[0, 1]
+        assert slope > 0
+
+
+@pytest.mark.parametrize("name", BIRDS)
+def test_a_positive_angle_raises_both_wing_tips(clouds, name):
+    cloud = clouds[name]
+    wings = cloud.parts_of("wing")
+    assert [cloud.kinds[p] for p in range(5)] == ["body", "wing", "wing", "wing", "wing"]
+    for inner, outer in zip(wings[::2], wings[1::2], strict=True):
+        assert cloud.parents[inner] == -1 and cloud.parents[outer] == inner
+        tip = np.argmax(abs(cloud.points[cloud.part == outer][:, 0]))
+        rest = cloud.points[cloud.part == outer][tip]
+        assert rotated(cloud, outer, 0.2)[tip, 2] > rest[2]
+        side = np.argmax(abs(cloud.points[cloud.part == inner][:, 0]))
+        assert rotated(cloud, inner, 0.2)[side, 2] > cloud.points[cloud.part == inner][side, 2]
+        # The segments meet at the second hinge, and the first is nearer the body.
+        reach = abs(cloud.points[cloud.part == inner][:, 0]).max()
+        assert reach == pytest.approx(abs(cloud.hinges[outer, 0]), rel=1e-3)
+        assert abs(cloud.hinges[inner, 0]) < abs(cloud.hinges[outer, 0])
+    left, right = (cloud.points[cloud.part == p][:, 0] for p in (wings[3], wings[1]))
+    assert left.max() < 0 < right.min()
+    assert cloud.record["flap"] == {"mean_deg": 15, "amplitude_deg": 40, "fold_amplitude_deg": 30, "fold_lag_deg": 90}
+
+
+@pytest.mark.parametrize("name", CARS)
+def test_a_positive_angle_rolls_the_car_forward(clouds, name):
+    cloud = clouds[name]
+    radius = cloud.record["wheel_diameter_m"] / 2
+    for wheel in cloud.parts_of("wheel"):
+        contact = cloud.hinges[wheel] - [0, 0, radius]
+        angle = 1e-6
+        moved = turn(cloud.axes[wheel], angle) @ (contact - cloud.hinges[wheel]) + cloud.hinges[wheel]
+        # Rolling forward by radius * angle, the point on the ground stands still.
+        assert moved[1] - contact[1] + radius * angle == pytest.approx(0, abs=1e-12)
+
+
+def test_names_and_hinges_are_where_they_belong(clouds):
+    for name in CARS:
+        cloud = clouds[name]
+        for wheel in cloud.parts_of("wheel"):
+            end, side, _ = cloud.names[wheel].split()
+            assert (cloud.hinges[wheel, 1] > 0) == (end == "front")
+            assert (cloud.hinges[wheel, 0] > 0) == (side == "right")
+    for name in BIRDS:
+        cloud = clouds[name]
+        assert all((cloud.hinges[p, 0] > 0) == cloud.names[p].startswith("right") for p in cloud.parts_of("wing"))
+
+
+def test_equal_seeds_give_equal_bytes_and_other_seeds_other_points(tmp_path, clouds):
+    for name in ("DJI Avata", "Owl", "NIO ET5T 2023"):
+        write(tmp_path / "first.npz", clouds[name])
+        write(tmp_path / "again.npz", builtin_cloud(RECORDS[name], 1))
+        assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
+        assert not np.array_equal(builtin_cloud(RECORDS[name], 2).points, clouds[name].points)
+
+
+def test_subtypes_differ_physically():
+    def signature(name):
+        figures = {figure: entry["si"] for figure, entry in RECORDS[name]["figures"].items()}
+        table = {key: TABLE[name][key] for key in ("size_m", "n_rotors_or_wings", "len_m", "wid_m", "hgt_m")}
+        return RECORDS[name]["model"], *sorted((figures | table).items())
+
+    for first, second in itertools.combinations(NAMES, 2):
+        if TABLE[first]["category"] == TABLE[second]["category"]:
+            differing = set(signature(first)) ^ set(signature(second))
+            assert len(differing) >= 8, (first, second)
+
+
+def test_allotment_gives_moving_parts_their_share_in_whole_blades():
+    for name in NAMES:
+        record = RECORDS[name]
+        parts, _ = MODULES[record["category"]].parts(record)
+        counts = allot(parts, record["points"], record["moving_share"])
+        assert sum(counts) == record["points"]
+        moving = sum(count for part, count in zip(parts, counts, strict=True) if part.kind != "body")
+        blades = sum(part.copies for part in parts if part.kind != "body")
+        assert abs(moving - record["moving_share"] * record["points"]) <= blades / 2 + 4
+        assert all(count % part.copies == 0 and count >= part.copies for part, count in zip(parts, counts, strict=True))
+
+
+def test_too_few_points_are_refused():
+    with pytest.raises(InputError, match="8 points for 5 parts leave none for the body"):
+        variant("DJI Mini 2", points=8)
+
+
+@pytest.mark.parametrize("points", [20, 1000])
+def test_any_sensible_count_is_met(points):
+    for name in ("DJI Mini 2", "Wild goose", "Audi A6L 2019"):
+        assert len(variant(name, points=points).points) == points
+
+
+def test_the_eh216_may_fly_sixteen_rotors_in_coaxial_pairs():
+    cloud = variant("EH 216 S", coaxial=True)
+    rotors = cloud.parts_of("rotor")
+    assert len(rotors) == 16 and len(cloud.points) == 396
+    for upper, lower in zip(rotors[::2], rotors[1::2], strict=True):
+        apart = cloud.hinges[upper] - cloud.hinges[lower]
+        assert apart[2] > 0.3 and abs(apart[:2]).max() < 1e-12
+        assert cloud.axes[upper] @ cloud.axes[lower] == -1
+    assert 2 * motor_diagonal(RECORDS["EH 216 S"]) > 5
+    assert len(hubs(RECORDS["EH 216 S"], None)) == 8
+
+
+def test_wheels_may_have_their_rolling_diameter():
+    cloud = variant("Xiaomi SU7 2024", wheel_size="rolling")
+    assert cloud.record["wheel_diameter_m"] == 0.703
+    for wheel in cloud.parts_of("wheel"):
+        assert cloud.points[cloud.part == wheel][:, 2].min() == pytest.approx(-0.7, abs=1e-5)
+
+
+def test_flap_and_cross_section_may_be_set():
+    cloud = variant("Crow", flap={"mean_deg": 5.0}, rcs_m2_per_point=0.01)
+    assert cloud.record["flap"]["mean_deg"] == 5.0 and cloud.record["flap"]["amplitude_deg"] == 40.0
+    assert (cloud.rcs_m2 == 0.01).all()
+
+
+def test_command_line_makes_the_same_cloud(tmp_path, clouds):
+    settings = tmp_path / "settings.json"
+    settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"]}))
+    out = tmp_path / "seagull.npz"
+    command = [sys.executable, "-m", "lowalt.targets", "--settings", f"@{settings}", "--out", str(out)]
+    subprocess.run(command, check=True, capture_output=True)
+    np.testing.assert_array_equal(read(out).points, clouds["Seagull"].points)
+    settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"] | {"source": "clay"}}))
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert refused.returncode == 2 and "record.source is 'clay'" in refused.stderr
+
+
+def test_gallery_draws_every_cloud(tmp_path, clouds):
+    names = ["DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"]
+    for name in names:
+        write(tmp_path / f"{slug(name)}.npz", clouds[name])
+    out = tmp_path / "gallery.png"
+    gallery(["--clouds", *(str(tmp_path / f"{slug(name)}.npz") for name in names), "--out", str(out)])
+    from PIL import Image
+
+    picture = np.asarray(Image.open(out).convert("RGB"))
+    assert picture.shape[1] > 1000 and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20
+
+
+def test_every_figure_has_a_source_or_the_mark_estimate():
+    table = dimension_rows(RECORDS)
+    assert {row[0] for row in table} == set(NAMES)
+    published = ("size_m", "len_m", "wid_m", "hgt_m", "wheel_diam_m")
+    sizes = sum(record["published"][column] is not None for record in RECORDS.values() for column in published)
+    assert len(table) == sizes + sum(len(record["figures"]) for record in RECORDS.values())
+    assert all(row[-1] == "estimate" or len(row[-1]) > 12 for row in table)
