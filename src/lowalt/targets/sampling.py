@@ -22,10 +22,10 @@ def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
     return unit, length / 2
 
 
-def sample_surface(
+def sample_faces(
     vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return `count` points (count, 3) spread over the triangles by area and their unit normals (count, 3).
+    """Return `count` points (count, 3) spread over the triangles by area and the triangle (count,) each lies on.
 
     `vertices` (V, 3), `faces` (F, 3) indices, `rng` the only source of randomness. One point falls into each of
     `count` equal slices of the running area, so a face of area a gets count * a / total points to within two.
@@ -33,7 +33,7 @@ def sample_surface(
     Raises: InputError where the surface has no area or the area is not finite.
     Source: Osada et al. 2002 (uniform point in a triangle), systematic sampling over the faces.
     """
-    normals, areas = face_normals(vertices, faces)
+    _, areas = face_normals(vertices, faces)
     running = np.cumsum(areas)
     total = running[-1] if len(running) else 0.0
     if not (np.isfinite(total) and total > 0):
@@ -44,7 +44,18 @@ def sample_surface(
     corners = np.asarray(vertices, float)[np.asarray(faces)[face]]
     root, along = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
     points = (1 - root) * corners[:, 0] + root * ((1 - along) * corners[:, 1] + along * corners[:, 2])
-    return points, normals[face]
+    return points, face
+
+
+def sample_surface(
+    vertices: np.ndarray, faces: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `count` points (count, 3) spread over the triangles by area and their unit normals (count, 3).
+
+    Arguments, order and errors are those of `sample_faces`.
+    """
+    points, face = sample_faces(vertices, faces, count, rng)
+    return points, face_normals(vertices, np.asarray(faces)[face])[0]
 
 
 def thin(points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndarray | tuple = ()) -> np.ndarray:
