@@ -1,0 +1,174 @@
+"""`python -m lowalt.recognition COMMAND`: from shards to models, predictions and tables."""
+
+import json
+import sys
+from pathlib import Path
+
+from lowalt.command import parser, pick, run
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.recognition.protocols import folds
+from lowalt.recognition.schemes import PROTOCOLS, Scheme, named, read
+
+SCHEMES = "config/schemes.csv"
+
+
+def _views(arguments: list[str]) -> None:
+    """Write the cache of views of one shard. Settings: size."""
+    from lowalt.recognition.views import cache_shard
+
+    line = parser("lowalt.recognition views", _views.__doc__)
+    line.add_argument("--index", required=True, help="index of the shards (.json)")
+    line.add_argument("--shard", required=True, help="name of the shard, {group}-{fold}-{part}")
+    line.add_argument("--out", required=True, help="views to write (.npz)")
+    given = line.parse_args(arguments)
+    (size,) = pick(given.settings, "size")
+    print(f"{given.out}: {cache_shard(given.index, given.shard, size, given.out)} samples", file=sys.stderr)
+
+
+def _freeze(arguments: list[str]) -> None:
+    """Write the checksums of files, or check them. Settings: none ({})."""
+    from lowalt.recognition import freeze
+
+    line = parser("lowalt.recognition freeze", _freeze.__doc__)
+    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
+    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
+    given = line.parse_args(arguments)
+    pick(given.settings)
+    if given.files:
+        freeze.freeze(given.files, given.out)
+    print(f"{given.out}: {freeze.verify(given.out)} files as frozen", file=sys.stderr)
+
+
+def _sources(line) -> None:
+    line.add_argument("--views", nargs="+", help="caches of views (.npz)")
+    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
+    line.add_argument("--frozen", help="SHA256SUMS of clouds and motion tables, checked first")
+
+
+def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
+    """Return the samples of some (group, fold) pairs from the source the command line names."""
+    from lowalt.recognition.samples import ViewSamples
+    from lowalt.recognition.views import ShardSamples
+
+    if (given.views is None) == (given.index is None):
+        raise InputError("expected either --views or --index")
+    if given.views is None:
+        return ShardSamples(given.index, scheme.columns, pairs, size, placed)
+    found = ViewSamples(given.views, scheme.columns, pairs)
+    if found.size != size:
+        raise InputError(f"--views: images of {found.size} pixels, settings say {size}")
+    return found
+
+
+def _train(arguments: list[str]) -> None:
+    """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation."""
+    from lowalt.recognition.freeze import verify
+    from lowalt.recognition.runs import train
+
+    line = parser("lowalt.recognition train", _train.__doc__)
+    _sources(line)
+    line.add_argument("--protocol", required=True, choices=PROTOCOLS)
+    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
+    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
+    given = line.parse_args(arguments)
+    if given.frozen:
+        verify(given.frozen)
+    scheme = named(given.schemes, given.scheme)
+    size = given.settings.get("size")
+    samples = {
+        part: _open(given, folds(given.protocol, part), scheme, size, placed=False) for part in ("train", "validation")
+    }
+    train(samples, scheme, given.protocol, given.settings, Path(given.out))
+
+
+def _evaluate(arguments: list[str]) -> None:
+    """Predict every validation and test sample of a trained model's protocol. Settings: batch, threads, precision."""
+    from lowalt.recognition.freeze import verify
+    from lowalt.recognition.runs import evaluate, load
+
+    line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
+    _sources(line)
+    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--out", required=True, help="predictions to write (.csv), with the run's record beside (.json)")
+    given = line.parse_args(arguments)
+    if given.frozen:
+        verify(given.frozen)
+    trained = load(given.model)
+    parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
+    pairs = set().union(*(folds(trained.protocol, part) for part in parts))
+    evaluate(trained, _open(given, pairs, trained.scheme, trained.size, placed=True), given.settings, given.out)
+
+
+def _tables(arguments: list[str]) -> None:
+    """Write accuracy.csv and its companions from prediction files. Settings: seed."""
+    from lowalt.recognition import tables
+
+    line = parser("lowalt.recognition tables", _tables.__doc__)
+    line.add_argument("--predictions", nargs="+", required=True, help="prediction files (.csv), records beside them")
+    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--out", required=True, help="folder for the tables")
+    given = line.parse_args(arguments)
+    (seed,) = pick(given.settings, "seed")
+    tables.write([tables.Run(path) for path in given.predictions], list(read(given.schemes)), given.out, seed)
+
+
+def _score(arguments: list[str]) -> None:
+    """Score anyone's predictions on a protocol's test part, against the shards' own labels. Settings: none ({})."""
+    from lowalt.recognition.score import score
+
+    line = parser("lowalt.recognition score", _score.__doc__)
+    line.add_argument("--predictions", required=True, help="prediction file: key and four probabilities are enough")
+    line.add_argument("--index", required=True, help="index of the shards")
+    line.add_argument("--protocol", required=True, choices=PROTOCOLS)
+    line.add_argument("--out", required=True, help="scores to write (.json)")
+    given = line.parse_args(arguments)
+    pick(given.settings)
+    with replacing(given.out) as temporary:
+        found = score(given.predictions, given.index, given.protocol)
+        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+
+
+def _predict(arguments: list[str]) -> None:
+    """Print class probabilities of signals or a tile as JSON. Settings: network, spectra, images."""
+    from lowalt.recognition.runs import load, predict
+
+    line = parser("lowalt.recognition predict", _predict.__doc__)
+    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--input", required=True, help="signals (stations, symbols) complex64 (.npy) or a tile (.png)")
+    given = line.parse_args(arguments)
+    print(json.dumps(predict(load(given.model), existing(given.input, "input"), given.settings)))
+
+
+def _export(arguments: list[str]) -> None:
+    """Write a trained model as a torch.export program (.pt2) or ONNX (.onnx). Settings: none ({})."""
+    from lowalt.recognition.export import export
+    from lowalt.recognition.runs import load
+
+    line = parser("lowalt.recognition export", _export.__doc__)
+    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--out", required=True, help="file to write, .pt2 or .onnx")
+    given = line.parse_args(arguments)
+    pick(given.settings)
+    export(load(given.model), given.out)
+
+
+COMMANDS = {
+    "views": _views, "freeze": _freeze, "train": _train, "evaluate": _evaluate, "tables": _tables, "score": _score,
+    "predict": _predict, "export": _export,
+}  # fmt: skip
+
+
+def main(arguments: list[str]) -> None:
+    """Run one command of the stage.
+
+    Raises: InputError for an unknown command.
+    """
+    if not arguments or arguments[0] not in COMMANDS:
+        raise InputError(f"command {arguments[:1]}: expected one of {list(COMMANDS)}")
+    COMMANDS[arguments[0]](arguments[1:])
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,70 @@
+"""Checkpoints: written at once or not at all, and refused by name where they are damaged or of another run.
+
+A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity is all that
+decides the weights (settings, scheme, protocol, samples); a file of another identity is never resumed.
+"""
+
+import hashlib
+import json
+import pickle
+from pathlib import Path
+
+import torch
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+
+
+def _digest(state: object) -> str:
+    hasher = hashlib.sha256()
+
+    def walk(value: object) -> None:
+        if isinstance(value, torch.Tensor):
+            raw = value.detach().cpu().contiguous()
+            hasher.update(f"{raw.dtype}{tuple(raw.shape)}".encode())
+            hasher.update(raw.flatten().view(torch.uint8).numpy().tobytes())
+        elif isinstance(value, dict):
+            for key, entry in value.items():
+                hasher.update(repr(key).encode())
+                walk(entry)
+        elif isinstance(value, (list, tuple)):
+            for entry in value:
+                walk(entry)
+        else:
+            hasher.update(repr(value).encode())
+
+    walk(state)
+    return hasher.hexdigest()
+
+
+def identity(**parts: object) -> str:
+    """Return the JSON text that names a run; equal parts give equal text."""
+    return json.dumps(parts, sort_keys=True)
+
+
+def save(path: str | Path, name: str, state: dict) -> None:
+    """Write `state` (tensors, numbers, text, nested dicts and lists) of the run `name`."""
+    with replacing(path) as temporary:
+        torch.save({"identity": name, "digest": _digest(state), "state": state}, temporary)
+
+
+def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
+    """Return the identity and the state of a checkpoint.
+
+    name: the identity it must have, or None for any.
+    Raises: InputError naming the file where it is missing, damaged, or of another run (with the parts that differ).
+    """
+    existing(path, "checkpoint")
+    try:
+        # Only tensors and plain values: a checkpoint from elsewhere runs no code.
+        content = torch.load(path, map_location="cpu", weights_only=True)
+        found, digest, state = content["identity"], content["digest"], content["state"]
+    except (OSError, RuntimeError, ValueError, KeyError, TypeError, EOFError, pickle.UnpicklingError) as error:
+        raise InputError(f"{path}: not a checkpoint ({str(error)[:200]})") from error
+    if _digest(state) != digest:
+        raise InputError(f"{path}: checkpoint is damaged, its values do not match their SHA-256")
+    if name is not None and found != name:
+        theirs, ours = json.loads(found), json.loads(name)
+        differs = sorted(key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key))
+        raise InputError(f"{path}: checkpoint of another run, its {', '.join(differs)} differ")
+    return found, state

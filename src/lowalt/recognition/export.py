@@ -1,0 +1,45 @@
+"""A trained model for other programs: index images in, class probabilities out, as torch.export or ONNX."""
+
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.recognition.runs import Trained
+
+
+class Probabilities(nn.Module):
+    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B, 4)."""
+
+    def __init__(self, model: nn.Module) -> None:
+        """model: a Recogniser in evaluation mode."""
+        super().__init__()
+        self.model = model
+
+    def forward(self, index: torch.Tensor) -> torch.Tensor:
+        """Index images of the scheme's views, station-major -> class probabilities."""
+        return self.model(index).softmax(1)
+
+
+def export(trained: Trained, out: str | Path) -> None:
+    """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size.
+
+    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not installed.
+    """
+    suffix = Path(out).suffix
+    if suffix not in (".pt2", ".onnx"):
+        raise InputError(f"--out {out}: expected a name ending in .pt2 or .onnx")
+    model = Probabilities(trained.model).eval()
+    # Two samples, since a batch of one would be taken for a constant.
+    example = torch.zeros(2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8)
+    dynamic = {"index": {0: torch.export.Dim("batch")}}
+    with torch.no_grad(), replacing(out) as temporary:
+        if suffix == ".pt2":
+            torch.export.save(torch.export.export(model, (example,), dynamic_shapes=dynamic), temporary)
+            return
+        try:
+            torch.onnx.export(model, (example,), temporary, dynamic_shapes=dynamic, dynamo=True, external_data=False)
+        except ImportError as error:
+            raise InputError(f"--out {out}: ONNX needs the packages onnx and onnxscript ({error})") from error

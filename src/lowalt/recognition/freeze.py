@@ -1,0 +1,43 @@
+"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and held to after it.
+
+The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our code.
+"""
+
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing, sha256
+
+
+def freeze(paths: list[str | Path], out: str | Path) -> None:
+    """Write the SHA-256 of every file, sorted by name; paths are relative to the folder of `out`.
+
+    Raises: InputError for a missing file, one given twice, or one outside that folder.
+    """
+    folder = Path(out).resolve().parent
+    lines = []
+    for path in paths:
+        full = existing(path, "file to freeze").resolve()
+        if not full.is_relative_to(folder):
+            raise InputError(f"{path}: not below {folder}, where {Path(out).name} is to stand")
+        lines.append(f"{sha256(full)}  {full.relative_to(folder).as_posix()}\n")
+    if len(set(lines)) < len(lines):
+        raise InputError(f"{out}: a file was given twice")
+    with replacing(out) as temporary:
+        temporary.write_text("".join(sorted(lines, key=lambda line: line[66:])))
+
+
+def verify(sums: str | Path) -> int:
+    """Check every file of a checksum list and return how many there are.
+
+    Raises: InputError naming the first file that is missing or has changed since it was frozen.
+    """
+    folder = existing(sums, "checksums").resolve().parent
+    lines = Path(sums).read_text().splitlines()
+    for number, line in enumerate(lines, start=1):
+        digest, gap, name = line[:64], line[64:66], line[66:]
+        if gap != "  " or not name:
+            raise InputError(f"{sums} line {number}: {line!r}, expected a SHA-256, two spaces and a path")
+        if sha256(existing(folder / name, "frozen file")) != digest:
+            raise InputError(f"{folder / name}: has changed since it was frozen in {sums}")
+    return len(lines)

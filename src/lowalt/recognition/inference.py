@@ -1,0 +1,80 @@
+"""Class probabilities from a network, on one machine or over ranks: every rank count gives the same bits."""
+
+import contextlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import distributed, nn
+
+from lowalt.recognition.samples import ViewSamples
+
+
+@dataclass(frozen=True)
+class Machine:
+    """Where torch runs: device, precision, and this process's place among the ranks of torchrun."""
+
+    device: torch.device
+    precision: str
+    rank: int = 0
+    ranks: int = 1
+
+    @classmethod
+    def here(cls, precision: str) -> "Machine":
+        """Return this process's machine: a GPU where there is one; gloo (CPU) or nccl (GPU) under torchrun."""
+        gpu = torch.cuda.is_available()
+        ranks = int(os.environ.get("WORLD_SIZE", "1"))
+        device = torch.device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}" if gpu else "cpu")
+        if ranks > 1 and not distributed.is_initialized():
+            distributed.init_process_group("nccl" if gpu else "gloo")
+        return cls(device, precision, int(os.environ.get("RANK", "0")), ranks)
+
+    def autocast(self) -> contextlib.AbstractContextManager:
+        """Return the context of mixed precision (bfloat16), or none for fp32."""
+        if self.precision == "fp32":
+            return contextlib.nullcontext()
+        return torch.autocast(self.device.type, torch.bfloat16)
+
+    def parallel(self, model: nn.Module) -> nn.Module:
+        """Return the model, wrapped for gradient exchange where there are several ranks."""
+        return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
+
+    @property
+    def hardware(self) -> str:
+        """Name of the processor or GPU, and how many threads or ranks were used."""
+        if self.device.type == "cuda":
+            return f"{self.ranks} x {torch.cuda.get_device_name(self.device)}"
+        names = [
+            line.partition(":")[2].strip()
+            for line in Path("/proc/cpuinfo").read_text().splitlines()
+            if line.startswith("model name")
+        ]
+        threads = torch.get_num_threads()
+        return f"{names[0] if names else 'CPU'}, {self.ranks} x {threads} thread{'s' if threads > 1 else ''}"
+
+
+@torch.inference_mode()
+def probabilities(
+    model: nn.Module, samples: ViewSamples, numbers: np.ndarray, machine: Machine, batch: int
+) -> np.ndarray:
+    """Return class probabilities (len(numbers), 4) float64 of the samples `numbers`.
+
+    Whole batches are dealt to the ranks, never parts of one, so that sums do not depend on the number of ranks.
+    """
+    model.eval()
+    result = torch.zeros(len(numbers), 4, dtype=torch.float64)
+    for index, start in enumerate(range(0, len(numbers), batch)):
+        if index % machine.ranks != machine.rank:
+            continue
+        images = torch.from_numpy(samples.views(numbers[start : start + batch])).to(machine.device)
+        with machine.autocast():
+            logits = model(images)
+        result[start : start + batch] = logits.double().softmax(1).cpu()
+    if machine.ranks > 1:
+        # Every entry is non-zero on one rank only: the sum is exact.
+        result = result.to(machine.device)
+        distributed.all_reduce(result)
+        result = result.cpu()
+    return result.numpy()

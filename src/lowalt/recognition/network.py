@@ -1,0 +1,160 @@
+"""The fusion network of the paper on any timm backbone: images of several stations and spectra to four classes.
+
+Axes of every tensor: B samples, K stations, V spectra of a station, then channels, rows, columns. The same code
+serves any subset of stations and spectra; a view is a (station, spectrum) pair, station-major.
+
+Settings of this module, the block `recognition.network`:
+    backbone      timm model name ("test_resnet", "swin_base_patch4_window7_224", ...)
+    weights       "none", "hub" (the name's default tag) or the path of a .pth or .safetensors file
+    intra_depth   layers of the encoder over a station's spectra
+    inter_depth   layers of the encoder over the stations
+    heads         attention heads; must divide the backbone's features
+    feed_forward  width of the encoders' hidden layer, in features
+    dropout       in the encoders and the classifier, 0..1
+    hidden        width of the classifier's hidden layer; 0 for one linear layer
+"""
+
+from pathlib import Path
+
+import numpy as np
+import timm
+import torch
+from torch import nn
+
+from lowalt.command import pick
+from lowalt.errors import InputError
+from lowalt.recognition.schemes import SPECTRA, Scheme
+
+CLASSES = 4
+KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
+
+
+def backbone(name: str, weights: str, size: int) -> nn.Module:
+    """Return the timm model `name` as a feature extractor for size x size RGB images.
+
+    weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
+    Raises: InputError for an unknown name, a missing file, or weights that do not fit.
+    """
+    if not timm.is_model(name):
+        raise InputError(f"network: backbone {name!r} is not a timm model (timm {timm.__version__})")
+    options: dict = {"num_classes": 0}
+    if weights not in ("none", "hub"):
+        if not Path(weights).is_file():
+            raise InputError(f"network: weights {weights!r}, expected 'none', 'hub' or an existing file")
+        options["pretrained_cfg_overlay"] = {"file": weights}
+    options["pretrained"] = weights != "none"
+    for extra in ({"img_size": size}, {}):
+        try:
+            return timm.create_model(name, **options, **extra)
+        except TypeError:
+            # Convolutional models take any size and refuse the argument.
+            continue
+        except (RuntimeError, OSError, ValueError) as error:
+            raise InputError(f"network: backbone {name!r} with weights {weights!r}: {error}") from error
+    raise InputError(f"network: timm cannot build {name!r} without its classifier")
+
+
+class Palettes(nn.Module):
+    """Index images to normalised RGB by one table a spectrum, so that colour never has to be stored.
+
+    table (spectra, 256, 3) float32: colours in 0..1 less the backbone's channel mean over its deviation.
+    """
+
+    def __init__(self, palettes: np.ndarray, spectra: tuple[int, ...], mean: tuple, std: tuple) -> None:
+        """palettes (3, 256, 3) uint8 by SPECTRA; mean, std: per channel, on colours in 0..1."""
+        super().__init__()
+        if np.shape(palettes) != (len(SPECTRA), 256, 3):
+            raise InputError(f"palettes have shape {np.shape(palettes)}, expected ({len(SPECTRA)}, 256, 3)")
+        colours = torch.as_tensor(np.asarray(palettes, dtype=np.float32)[list(spectra)] / 255)
+        self.register_buffer("table", (colours - torch.tensor(mean)) / torch.tensor(std))
+        self.register_buffer("offset", torch.arange(len(spectra), dtype=torch.int32) * 256, persistent=False)
+
+    def forward(self, index: torch.Tensor) -> torch.Tensor:
+        """Index images (B, K, V, rows, columns) uint8 -> (B, K, V, 3, rows, columns) float, channels last."""
+        shifted = index.int() + self.offset[:, None, None]
+        colour = nn.functional.embedding(shifted, self.table.flatten(0, 1))
+        return colour.movedim(-1, -3)
+
+
+def _encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
+    if depth == 0:
+        return nn.Identity()
+    layer = nn.TransformerEncoderLayer(
+        width, heads, round(width * feed_forward), dropout, activation="gelu", batch_first=True, norm_first=True
+    )
+    # Pre-norm layers leave their sum unnormalised: the stack needs a norm of its own.
+    return nn.TransformerEncoder(layer, depth, norm=nn.LayerNorm(width), enable_nested_tensor=False)
+
+
+class AttentionFusion(nn.Module):
+    """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and max pool."""
+
+    def __init__(self, width: int, spectra: int, block: dict) -> None:
+        """width: features of a token; spectra: views a station; block: the network's settings."""
+        super().__init__()
+        self.modality = nn.Parameter(torch.empty(spectra, width))
+        nn.init.trunc_normal_(self.modality, std=0.02)
+        shape = (block["heads"], block["feed_forward"], block["dropout"])
+        self.intra = _encoder(width, block["intra_depth"], *shape)
+        self.inter = _encoder(width, block["inter_depth"], *shape)
+
+    def forward(self, tokens: torch.Tensor) -> torch.Tensor:
+        """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F."""
+        samples, stations = tokens.shape[:2]
+        tokens = tokens + self.modality
+        station = self.intra(tokens.flatten(0, 1)).mean(dim=1)
+        return self.inter(station.unflatten(0, (samples, stations))).amax(dim=1)
+
+
+class MeanFusion(nn.Module):
+    """The paper's baseline: the mean of all tokens."""
+
+    def forward(self, tokens: torch.Tensor) -> torch.Tensor:
+        """Tokens (B, K, V, features) -> their mean (B, features)."""
+        return tokens.mean(dim=(1, 2))
+
+
+class Recogniser(nn.Module):
+    """Index images of a scheme's views to four logits: palettes, shared backbone, fusion, classifier."""
+
+    def __init__(self, scheme: Scheme, block: dict, size: int, palettes: np.ndarray) -> None:
+        """scheme: views and fusion; block: `recognition.network`; size: pixels; palettes (3, 256, 3) uint8.
+
+        Raises: InputError for an unknown or missing key, a backbone timm does not have, or heads that do not fit.
+        """
+        super().__init__()
+        pick(block, *KEYS)
+        self.backbone = backbone(scheme.backbone or block["backbone"], block["weights"], size)
+        width = self.backbone.num_features
+        if scheme.fusion == "attention" and width % block["heads"]:
+            raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")
+        pre = self.backbone.pretrained_cfg
+        self.palettes = Palettes(palettes, scheme.spectra, pre["mean"], pre["std"])
+        self.shape = (len(scheme.stations), len(scheme.spectra))
+        mean = scheme.fusion == "mean"
+        self.fusion = MeanFusion() if mean else AttentionFusion(width, len(scheme.spectra), block)
+        if block["hidden"]:
+            self.classifier = nn.Sequential(
+                nn.Linear(width, block["hidden"]), nn.GELU(), nn.Dropout(block["dropout"]),
+                nn.Linear(block["hidden"], CLASSES),
+            )  # fmt: skip
+        else:
+            self.classifier = nn.Linear(width, CLASSES)
+
+    def tokens(self, index: torch.Tensor) -> torch.Tensor:
+        """Index images (B, K * V, rows, columns) uint8 -> tokens (B, K, V, features)."""
+        samples, views = index.shape[:2]
+        stations, spectra = views // self.shape[1], self.shape[1]
+        images = self.palettes(index.unflatten(1, (stations, spectra)))
+        # All views go through at once: batch norm must see every kind of view in one batch.
+        features = self.backbone(images.flatten(0, 2))
+        return features.view(samples, stations, spectra, -1)
+
+    def forward(self, index: torch.Tensor) -> torch.Tensor:
+        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, 4)."""
+        return self.classifier(self.fusion(self.tokens(index)))
+
+
+def parameters(model: nn.Module) -> int:
+    """Return the number of trainable values."""
+    return sum(value.numel() for value in model.parameters() if value.requires_grad)

@@ -1,0 +1,128 @@
+"""The prediction file: what a model says of every sample, in a form that other people's models can write too.
+
+A CSV table, one row a sample, any order; the first four columns after `key` may be left to `score`, which fills them
+from the data set. Probabilities are not negative and sum to one within 1e-3.
+
+    key            the sample's key in the shards
+    subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
+    range_m        distance of the nearest station the model used, aspect_deg the aspect seen from it; may be empty
+    p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities
+"""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.recognition.samples import Facts
+
+CLASSES = ("p_uav", "p_bird", "p_vehicle", "p_pedestrian")
+COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg", *CLASSES)
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """Columns of a prediction file; `probabilities` (samples, 4), everything else (samples,)."""
+
+    key: np.ndarray
+    subtype: np.ndarray
+    group: np.ndarray
+    fold: np.ndarray
+    model: np.ndarray
+    snr_db: np.ndarray
+    label: np.ndarray
+    range_m: np.ndarray
+    aspect_deg: np.ndarray
+    probabilities: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.key)
+
+    @property
+    def guesses(self) -> np.ndarray:
+        """Most probable class, (samples,)."""
+        return self.probabilities.argmax(1)
+
+    @property
+    def correct(self) -> np.ndarray:
+        """Whether the most probable class is the true one, (samples,) bool."""
+        return self.guesses == self.label
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Name of each sample's motion model, (samples,) text."""
+        return np.char.add(np.char.add(self.subtype, "/"), self.model.astype(str))
+
+    def take(self, numbers: np.ndarray) -> "Predictions":
+        """Return the rows `numbers` (indices or a mask)."""
+        return Predictions(**{name: value[numbers] for name, value in vars(self).items()})
+
+    def of(self, pairs: set[tuple[str, str]]) -> "Predictions":
+        """Return the rows whose (group, fold) is among `pairs`, sorted by key so that schemes align."""
+        inside = [pair in pairs for pair in zip(self.group.tolist(), self.fold.tolist(), strict=True)]
+        rows = np.flatnonzero(inside)
+        return self.take(rows[np.argsort(self.key[rows], kind="stable")])
+
+
+def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:
+    """Return predictions for samples with these facts; range and aspect are the nearest of `stations`."""
+    ranges = facts.range_m[:, list(stations)]
+    nearest = np.where(np.isnan(ranges), math.inf, ranges).argmin(1)
+    rows = np.arange(len(facts))
+    aspects = np.degrees(facts.aspect_rad[:, list(stations)][rows, nearest])
+    same = {name: getattr(facts, name) for name in ("key", "subtype", "group", "fold", "model", "snr_db", "label")}
+    return Predictions(**same, range_m=ranges[rows, nearest], aspect_deg=aspects, probabilities=probabilities)
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else repr(float(value))
+
+
+def write(path: str | Path, found: Predictions) -> None:
+    """Write a prediction file; equal predictions give equal bytes."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for row in range(len(found)):
+            writer.writerow([
+                found.key[row], found.subtype[row], found.group[row], found.fold[row], int(found.model[row]),
+                _number(found.snr_db[row]), int(found.label[row]), _number(found.range_m[row]),
+                _number(found.aspect_deg[row]), *(repr(float(value)) for value in found.probabilities[row]),
+            ])  # fmt: skip
+
+
+def read(path: str | Path) -> Predictions:
+    """Read and check a prediction file.
+
+    Raises: InputError naming the file, the line and what is wrong.
+    """
+    rows = []
+    with existing(path, "predictions").open(newline="") as file:
+        reader = csv.DictReader(file)
+        if tuple(reader.fieldnames or ()) != COLUMNS:
+            raise InputError(f"{path}: columns {reader.fieldnames}, expected {list(COLUMNS)}")
+        for line, row in enumerate(reader, start=2):
+            try:
+                rows.append((
+                    row["key"], row["subtype"], row["group"], row["fold"], int(row["model"]), float(row["snr_db"]),
+                    int(row["label"]), float(row["range_m"] or "nan"), float(row["aspect_deg"] or "nan"),
+                    [float(row[name]) for name in CLASSES],
+                ))  # fmt: skip
+            except (TypeError, ValueError) as error:
+                raise InputError(f"{path} line {line}: {error}") from error
+    if not rows:
+        raise InputError(f"{path}: no predictions")
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    found = Predictions(*columns)
+    sums = found.probabilities.sum(1)
+    bad = ~((found.probabilities >= 0).all(1) & (np.abs(sums - 1) <= 1e-3))
+    if bad.any():
+        line = int(np.argmax(bad))
+        raise InputError(f"{path} line {line + 2}: probabilities {rows[line][-1]}, expected four >= 0 with sum 1")
+    if len(np.unique(found.key)) != len(found):
+        raise InputError(f"{path}: a key stands twice, expected one row a sample")
+    return found

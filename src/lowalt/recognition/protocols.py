@@ -1,0 +1,24 @@
+"""The two protocols: which (group, fold) pairs train, validate and test."""
+
+from lowalt.errors import InputError
+
+_SEEN_FOLDS = {part: {("seen", fold), ("unseen", fold)} for part, fold in
+               (("train", "train"), ("validation", "val"), ("test", "test"))}  # fmt: skip
+_UNSEEN_FOLDS = {
+    "train": {("seen", "train")},
+    "validation": {("seen", "val")},
+    "test": {("unseen", "train"), ("unseen", "val"), ("unseen", "test")},
+    "seen_test": {("seen", "test")},
+}
+FOLDS = {"seen": _SEEN_FOLDS, "unseen": _UNSEEN_FOLDS}
+
+
+def folds(protocol: str, part: str) -> set[tuple[str, str]]:
+    """Return the (group, fold) pairs of a protocol's part: "train", "validation", "test" or ("unseen") "seen_test".
+
+    Raises: InputError for an unknown protocol or part. Source: paper, section V-A.
+    """
+    try:
+        return FOLDS[protocol][part]
+    except KeyError:
+        raise InputError(f"protocol {protocol!r} has no part {part!r}, expected one of {FOLDS}") from None

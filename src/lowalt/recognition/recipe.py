@@ -1,0 +1,116 @@
+"""The recipe of a training run: its settings and their ranges, learning rate over time, optimiser, fixed randomness.
+
+Settings of this module, the block `recognition.training`:
+    steps            at most this many, so that runs on few and on many samples cost the same
+    batch            samples a step, over all ranks
+    snrs_per_model   SNRs of each motion model visited an epoch, 0 for all
+    rate             largest learning rate (AdamW)
+    backbone_rate    factor on it for the backbone
+    weight_decay     of matrices; norms, biases and the modality embedding have none
+    warmup           share of the steps in which the rate rises linearly; then it falls as a cosine to 0
+    clip             largest norm of the gradient
+    label_smoothing  0..1
+    ema              largest decay of the moving average of the weights (it rises with the steps); 0 for none
+    precision        bf16 (autocast) | fp32
+    channels_last    memory layout of images and convolutions
+    compile          torch.compile the network
+    validate_every   steps between validations
+    patience         validations without a better accuracy before stopping; 0 never stops
+    checkpoint_s     seconds between checkpoints
+    threads          CPU threads; fixed, since their number moves the last bits
+    workers          processes that read shards; 0 reads in the training process
+"""
+
+import contextlib
+import ctypes
+import math
+import os
+
+import torch
+from torch import nn
+
+from lowalt.command import pick
+from lowalt.errors import InputError
+from lowalt.streams import digest
+
+KEYS = (
+    "steps", "batch", "snrs_per_model", "rate", "backbone_rate", "weight_decay", "warmup", "clip",
+    "label_smoothing", "ema", "precision", "channels_last", "compile", "validate_every", "patience",
+    "checkpoint_s", "threads", "workers",
+)  # fmt: skip
+
+
+WHOLE = {"steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "patience": 0, "threads": 1, "workers": 0}
+"""Smallest value of every whole number."""
+REAL = {
+    "rate": math.inf, "backbone_rate": math.inf, "weight_decay": math.inf, "warmup": 1, "clip": math.inf,
+    "label_smoothing": 1, "ema": 1, "checkpoint_s": math.inf,
+}  # fmt: skip
+"""Largest value of every real number; the smallest is 0."""
+
+
+def check(block: dict) -> dict:
+    """Return the block if every key is there and in range.
+
+    Raises: InputError naming the key and value.
+    """
+    pick(block, *KEYS)
+    for key, least in WHOLE.items():
+        if not isinstance(block[key], int) or isinstance(block[key], bool) or block[key] < least:
+            raise InputError(f"training: {key} is {block[key]!r}, expected a whole number >= {least}")
+    for key, most in REAL.items():
+        value = block[key]
+        if not isinstance(value, (int, float)) or isinstance(value, bool) or not 0 <= value <= most:
+            raise InputError(f"training: {key} is {value!r}, expected a number in 0..{most}")
+    if block["precision"] not in ("bf16", "fp32"):
+        raise InputError(f"training: precision is {block['precision']!r}, expected 'bf16' or 'fp32'")
+    return block
+
+
+def schedule(share: float, warmup: float) -> float:
+    """Factor on the learning rate after `share` (0..1) of all steps: linear up to `warmup`, then a cosine to 0."""
+    if share < warmup:
+        return share / warmup
+    return 0.5 * (1 + math.cos(math.pi * (share - warmup) / (1 - warmup))) if warmup < 1 else 1.0
+
+
+def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
+    """Return AdamW with four groups: backbone or not, matrix (decayed) or not."""
+    groups = []
+    named = list(model.named_parameters())
+    for ours in (True, False):
+        for matrix in (True, False):
+            members = [
+                value
+                for name, value in named
+                if name.startswith("backbone.") == ours and (value.ndim > 1 and "modality" not in name) == matrix
+            ]
+            factor = block["backbone_rate"] if ours else 1.0
+            decay = block["weight_decay"] if matrix else 0.0
+            if members:
+                groups.append({"params": members, "factor": factor, "weight_decay": decay})
+    return torch.optim.AdamW(groups, lr=block["rate"], fused=True)
+
+
+def keep_freed_memory() -> None:
+    """Let the C library keep large freed blocks instead of returning each to the system.
+
+    Activations are allocated and freed every step; mapping them afresh costs 15 % of a small network's step in page
+    faults. Only where the C library is glibc; elsewhere nothing changes.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        mallopt = ctypes.CDLL(None).mallopt
+        mmap_threshold, trim_threshold = -3, -1
+        mallopt(mmap_threshold, 1 << 30)
+        mallopt(trim_threshold, (1 << 31) - 1)
+
+
+def seeded(seed: int, keys: tuple, threads: int) -> None:
+    """Fix everything torch draws from or sums with: seed of the run, thread count, deterministic algorithms."""
+    keep_freed_memory()
+    torch.manual_seed(int.from_bytes(digest(seed, "recognition-torch", *keys)[:8], "little") >> 1)
+    torch.set_num_threads(threads)
+    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
+    torch.use_deterministic_algorithms(True)
+    # Filling every new tensor is for finding reads of unset memory; this code has none and it costs a tenth.
+    torch.utils.deterministic.fill_uninitialized_memory = False

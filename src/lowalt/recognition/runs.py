@@ -1,0 +1,164 @@
+"""From settings to files: build a network and train it, read it back, evaluate it, predict with it.
+
+`model.pt` carries everything a model needs to be used again: scheme, protocol, network settings, image size and
+palettes beside the weights.
+"""
+
+import json
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import timm
+import torch
+
+from lowalt.command import pick
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.hardware import describe
+from lowalt.recognition import augment, checkpoint, network, predictions, recipe
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
+from lowalt.recognition.training import Trainer
+from lowalt.recognition.views import ShardSamples, shrink
+from lowalt.targets.cloud import CATEGORIES
+from lowalt.tiles import colour_map
+
+Samples = ViewSamples | ShardSamples
+
+
+def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path) -> None:
+    """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
+
+    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training, augmentation}.
+    Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
+    """
+    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")
+    block = recipe.check(settings["training"])
+    augment.check(settings["augmentation"])
+    palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
+    kept = {"checkpoint_s": None, "workers": None}
+    name = checkpoint.identity(
+        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
+        samples={part: len(source.facts) for part, source in samples.items()}, torch=torch.__version__,
+    )  # fmt: skip
+    keys = (protocol, scheme.name)
+    recipe.seeded(settings["seed"], keys, block["threads"])
+    machine = Machine.here(block["precision"])
+    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes)
+    trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
+    resumed = trainer.resume()
+    if resumed and machine.rank == 0:
+        print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
+    start, steps = time.monotonic(), trainer.at.steps
+    at = trainer.fit()
+    seconds = time.monotonic() - start
+    trainer.finish({
+        "scheme": asdict(scheme), "protocol": protocol, "network": settings["network"], "size": settings["size"],
+        "seed": settings["seed"], "colour_map": settings["colour_map"],
+    })  # fmt: skip
+    if machine.rank == 0:
+        _record(folder / "run.json", {
+            "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
+            "backbone": scheme.backbone or settings["network"]["backbone"], "weights": settings["network"]["weights"],
+            "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
+            "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
+            "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
+            "ranks": machine.ranks, "torch": torch.__version__, "timm": timm.__version__,
+        })  # fmt: skip
+
+
+def _record(path: Path, content: dict) -> None:
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
+
+
+@dataclass(frozen=True)
+class Trained:
+    """A trained model read back: the network with its weights, what it sees, and where it came from."""
+
+    model: network.Recogniser
+    scheme: Scheme
+    protocol: str
+    size: int
+    seed: int
+    path: Path
+
+
+def load(path: str | Path) -> Trained:
+    """Return the trained model of a `model.pt`.
+
+    Raises: InputError where the file is missing, damaged or not a model of this project.
+    """
+    _, state = checkpoint.load(path)
+    try:
+        block = {**state["network"], "weights": "none"}
+        scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
+        palettes = np.stack([colour_map(state["colour_map"])] * len(SPECTRA))
+        model = network.Recogniser(scheme, block, state["size"], palettes)
+        model.load_state_dict(state["weights"])
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
+    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path))
+
+
+def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path) -> None:
+    """Write the predictions for all samples of a source, and beside them the run's record (.json).
+
+    settings: {batch, threads, precision}. Under torchrun the ranks share the work and rank 0 writes.
+    """
+    batch, threads, precision = pick(settings, "batch", "threads", "precision")
+    recipe.seeded(trained.seed, ("evaluate",), threads)
+    machine = Machine.here(precision)
+    model = trained.model.to(machine.device)
+    start = time.monotonic()
+    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch)
+    seconds = time.monotonic() - start
+    if machine.rank:
+        return
+    predictions.write(out, predictions.from_facts(samples.facts, trained.scheme.stations, found))
+    side = trained.path.with_name("run.json")
+    known = json.loads(side.read_text()) if side.exists() else {}
+    _record(Path(out).with_suffix(".json"), {
+        **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
+        "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
+    })  # fmt: skip
+
+
+def images_of(path: Path, settings: dict) -> np.ndarray:
+    """Return the nine index images (9, S, S) uint8 of a signal file or a tile.
+
+    path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
+    Raises: InputError for another kind of file or a shape that does not fit.
+    """
+    from lowalt.network import Network
+    from lowalt.spectra import Spectra
+    from lowalt.tiles import Images, Renderer, decode, split
+
+    if path.suffix == ".png":
+        return split(decode(path.read_bytes())[0])
+    if path.suffix != ".npy":
+        raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
+    try:
+        signals = np.load(path, allow_pickle=False)
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: not an array file ({error})") from error
+    blocks = pick(settings, "network", "spectra", "images")
+    net, spectra, images = (
+        cls.from_settings(block) for cls, block in zip((Network, Spectra, Images), blocks, strict=True)
+    )
+    return split(Renderer(net, spectra, images).tile(signals))
+
+
+def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
+    """Return the probability of each category for one signal file or tile, in full precision."""
+    images = images_of(path, settings)
+    if len(images) != len(STATIONS) * len(SPECTRA):
+        raise InputError(f"{path}: {len(images)} images, expected {len(STATIONS) * len(SPECTRA)}")
+    views = shrink(images, trained.size)[trained.scheme.columns]
+    with torch.inference_mode():
+        found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]
+    return dict(zip(CATEGORIES, found.tolist(), strict=True))

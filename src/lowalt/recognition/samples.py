@@ -1,0 +1,107 @@
+"""Samples for the network: index images with labels and records, from a cache of views or straight from shards.
+
+Both sources answer the same calls: `facts` (labels and what is known of each sample) and
+`views(numbers, columns)`, uint8 index images of the scheme's size. No torch here.
+
+A cache file (.npz) holds, for the samples of one shard in its order,
+    views   (samples, 9, size, size) uint8, station-major, index images averaged over areas
+    one array (samples,) for every name of FACTS
+"""
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+
+STATIONS = ("A", "B", "C")
+VIEWS = 9
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of each sample, one entry a sample; range_m and aspect_rad have a column a station."""
+
+    key: np.ndarray
+    subtype: np.ndarray
+    model: np.ndarray
+    snr_db: np.ndarray
+    group: np.ndarray
+    fold: np.ndarray
+    label: np.ndarray
+    range_m: np.ndarray
+    aspect_rad: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.key)
+
+    def take(self, numbers: np.ndarray) -> "Facts":
+        """Return the facts of the samples `numbers` (indices or a mask)."""
+        return Facts(*(getattr(self, name)[numbers] for name in FACTS))
+
+
+FACTS = tuple(entry.name for entry in fields(Facts))
+
+
+def joined(parts: list[Facts]) -> Facts:
+    """Return the facts of several sources one after the other."""
+    return Facts(*(np.concatenate([getattr(part, name) for part in parts]) for name in FACTS))
+
+
+class ViewSamples:
+    """Samples held in memory, read from cache files; the scheme's columns only."""
+
+    def __init__(self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]) -> None:
+        """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
+
+        Raises: InputError naming a file that is no cache, differs in size, or where nothing is left.
+        """
+        images, facts = [], []
+        for path in sorted(map(Path, paths)):
+            found = _load(path, columns, folds)
+            if found is not None:
+                images.append(found[0])
+                facts.append(found[1])
+        if not images:
+            raise InputError(f"views: none of the {len(paths)} files has samples of {sorted(folds)}")
+        sizes = {array.shape[2:] for array in images}
+        if len(sizes) > 1:
+            raise InputError(f"views: image sizes {sorted(sizes)}, expected one size")
+        # Filled in place: a concatenation would hold every image twice for a while.
+        self.images = np.empty((sum(map(len, images)), *images[0].shape[1:]), dtype=np.uint8)
+        start = 0
+        for number, array in enumerate(images):
+            self.images[start : start + len(array)] = array
+            start += len(array)
+            images[number] = None
+        self.facts = joined(facts)
+        self.size = self.images.shape[-1]
+
+    def views(self, numbers: np.ndarray) -> np.ndarray:
+        """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
+        return self.images[numbers]
+
+
+def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:
+    existing(path, "views")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            facts = Facts(*(data[name] for name in FACTS))
+            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
+            keep = np.array([pair in folds for pair in pairs], dtype=bool)
+            if not keep.any():
+                return None
+            images = data["views"]
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise InputError(f"{path}: not a views file ({error})") from error
+    if images.ndim != 4 or images.shape[:2] != (len(facts), VIEWS) or images.dtype != np.uint8:
+        raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {VIEWS}, S, S)")
+    return images[keep][:, columns], facts.take(keep)
+
+
+def write(path: str | Path, views: np.ndarray, facts: Facts) -> None:
+    """Write a cache file; equal samples give equal bytes."""
+    with replacing(path) as temporary:
+        np.savez(temporary, views=views, **{name: getattr(facts, name) for name in FACTS})

@@ -1,0 +1,108 @@
+"""A scheme: which stations and spectra the network sees, how they are fused, on which backbone.
+
+The paper's rows stand in `config/schemes.csv`, one line a scheme:
+
+    scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
+    stations    letters of the stations, in the order of the network's table
+    spectra     spectra joined by "+"
+    fusion      attention (the paper's proposal) | mean (its baseline)
+    backbone    timm name, or empty for the configuration's own backbone
+    protocols   protocols of the paper's tables that hold this row, joined by "+"
+"""
+
+import csv
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+
+STATIONS = ("A", "B", "C")
+SPECTRA = ("VRP", "TRP", "VT")
+FUSIONS = ("attention", "mean")
+PROTOCOLS = ("seen", "unseen")
+COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """One row: `stations` and `spectra` are index tuples into STATIONS and SPECTRA."""
+
+    name: str
+    stations: tuple[int, ...]
+    spectra: tuple[int, ...]
+    fusion: str = "attention"
+    backbone: str = ""
+    protocols: tuple[str, ...] = PROTOCOLS
+
+    @property
+    def slug(self) -> str:
+        """File name of the scheme: lower case, every run of other characters a hyphen."""
+        return slug(self.name)
+
+    @property
+    def columns(self) -> list[int]:
+        """Positions of the scheme's views among the nine of a sample, station-major."""
+        return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
+
+
+def slug(name: str) -> str:
+    """Return `name` in lower case with each run of other characters than letters and digits as one hyphen."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
+
+
+def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, where: str) -> tuple[int, ...]:
+    if not parts or len(set(parts)) != len(parts) or not set(parts) <= set(known):
+        raise InputError(f"{where}: {what} {text!r}, expected some of {known}, each once")
+    return tuple(sorted(known.index(part) for part in parts))
+
+
+def scheme(row: dict, where: str) -> Scheme:
+    """Return the scheme of one table row (all values are strings).
+
+    Raises: InputError naming `where`, the column and the value.
+    """
+    if set(row) != set(COLUMNS):
+        raise InputError(f"{where}: columns {sorted(map(str, row))}, expected {list(COLUMNS)}")
+    if row["fusion"] not in FUSIONS:
+        raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
+    protocols = tuple(row["protocols"].split("+"))
+    _indices(row["protocols"], list(protocols), PROTOCOLS, "protocols", where)
+    return Scheme(
+        name=row["scheme"],
+        stations=_indices(row["stations"], list(row["stations"]), STATIONS, "stations", where),
+        spectra=_indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
+        fusion=row["fusion"],
+        backbone=row["backbone"],
+        protocols=protocols,
+    )
+
+
+def read(path: str | Path) -> dict[str, Scheme]:
+    """Return all schemes of a table by name, in its order.
+
+    Raises: InputError naming the file, the line and what is wrong, or a name that stands twice.
+    """
+    found: dict[str, Scheme] = {}
+    with existing(path, "schemes").open(newline="") as file:
+        for number, row in enumerate(csv.DictReader(file), start=2):
+            entry = scheme(row, f"{path} line {number}")
+            if entry.name in found or entry.slug in {other.slug for other in found.values()}:
+                raise InputError(f"{path} line {number}: scheme {entry.name!r} stands twice")
+            found[entry.name] = entry
+    if not found:
+        raise InputError(f"{path}: no schemes, expected at least one row")
+    return found
+
+
+def named(path: str | Path, name: str) -> Scheme:
+    """Return the scheme called `name` (or with that slug) from a table.
+
+    Raises: InputError naming the schemes there are.
+    """
+    table = read(path)
+    for entry in table.values():
+        if name in (entry.name, entry.slug):
+            return entry
+    raise InputError(f"scheme {name!r}: not in {path}, which has {list(table)}")

@@ -1,0 +1,61 @@
+"""The scorer for other people's predictions: truth comes from the shards, never from the file that is scored."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+from lowalt.recognition.predictions import CLASSES
+from lowalt.recognition.protocols import folds
+from lowalt.recognition.statistics import accuracy_by, calibration, confusion
+from lowalt.recognition.views import facts_of
+from lowalt.shards import ShardSet
+
+
+def _probabilities(path: str | Path) -> dict[str, list[float]]:
+    found: dict[str, list[float]] = {}
+    with existing(path, "predictions").open(newline="") as file:
+        reader = csv.DictReader(file)
+        missing = {"key", *CLASSES} - set(reader.fieldnames or ())
+        if missing:
+            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
+        for line, row in enumerate(reader, start=2):
+            try:
+                values = [float(row[name]) for name in CLASSES]
+            except (TypeError, ValueError) as error:
+                raise InputError(f"{path} line {line}: {error}") from error
+            if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
+                raise InputError(f"{path} line {line}: probabilities {values}, expected four >= 0 with sum 1")
+            if row["key"] in found:
+                raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
+            found[row["key"]] = values
+    return found
+
+
+def score(path: str | Path, index: str | Path, protocol: str) -> dict:
+    """Return accuracies, confusion and calibration of a prediction file on a protocol's test part.
+
+    The file needs the columns `key` and the four probabilities; rows of other samples are ignored.
+    Raises: InputError where a test sample has no prediction, or a row is malformed.
+    """
+    pairs = folds(protocol, "test")
+    shards = ShardSet(index, sorted({group for group, _ in pairs}), sorted({fold for _, fold in pairs}), check=False)
+    facts = facts_of(shards, np.arange(len(shards)), placed=False)
+    given = _probabilities(path)
+    missing = [key for key in facts.key.tolist() if key not in given]
+    if missing:
+        raise InputError(f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}")
+    probabilities = np.array([given[key] for key in facts.key.tolist()])
+    correct = probabilities.argmax(1) == facts.label
+    by_snr = accuracy_by(facts.snr_db, correct)
+    return {
+        "protocol": protocol,
+        "samples": len(facts),
+        "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
+        "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
+        "by_subtype_percent": {name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()},
+        "confusion": confusion(facts.label, probabilities.argmax(1)).tolist(),
+        **calibration(probabilities, facts.label),
+    }

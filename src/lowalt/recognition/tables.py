@@ -1,0 +1,209 @@
+"""From prediction files to the paper's tables and what stands behind them, as CSV; test data chooses nothing.
+
+Files written, each with the columns `protocol, scheme` first:
+    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged
+    seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
+    seeds.csv        seed, accuracy_percent on average over the SNRs
+    confusion.csv    category, predicted, samples
+    subtypes.csv     category, subtype, accuracy_percent, samples
+    ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
+    aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
+    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test
+    calibration.csv  calibration error, Brier score, cross entropy on test
+    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit, McNemar's test
+"""
+
+import csv
+import json
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.recognition import predictions
+from lowalt.recognition.predictions import Predictions
+from lowalt.recognition.protocols import folds
+from lowalt.recognition.statistics import (
+    accuracy_by,
+    alarm_rates,
+    bootstrap,
+    calibration,
+    confusion,
+    mcnemar,
+    threshold,
+)
+from lowalt.streams import stream
+from lowalt.targets.cloud import CATEGORIES
+
+DETECTIONS = (0.9, 0.95, 0.99)
+CLAIMS = (
+    *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
+    *(("ABC:VRP+TRP+VT", f"{one}:VRP+TRP+VT", "three stations over one") for one in "ABC"),
+    *(("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
+      for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
+)  # fmt: skip
+"""The paper's claims: the scheme said to be better, the other, and the claim's name."""
+
+
+class Run:
+    """One trained and evaluated scheme: its predictions and what is known of the run."""
+
+    def __init__(self, path: str | Path) -> None:
+        """path: the prediction file; the JSON file beside it holds protocol, scheme, seed and hardware.
+
+        Raises: InputError where either is missing or the test part is empty.
+        """
+        side = existing(Path(path).with_suffix(".json"), "run record")
+        try:
+            about = json.loads(side.read_text())
+            self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
+            self.hardware = about["hardware"]
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{side}: not a run record ({error!r})") from error
+        self.all = predictions.read(path)
+        self.test = self.part("test")
+        if not len(self.test):
+            raise InputError(f"{path}: no predictions for the test part of the {self.protocol} protocol")
+
+    def part(self, name: str) -> Predictions:
+        """Return the predictions of a part of the run's protocol."""
+        return self.all.of(folds(self.protocol, name))
+
+
+def snr_text(snr_db: float) -> str:
+    """Return an SNR as the tables write it: "3", "2.5", "inf"."""
+    return f"{snr_db:g}"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.4f}"
+
+
+def accuracy_rows(runs: list[Run], part: str) -> Iterable[list]:
+    """Yield rows [snr_db, accuracy_percent, samples, hardware] of one scheme's runs (its seeds), averaged."""
+    parts = [run.part(part) for run in runs]
+    tables = [accuracy_by(found.snr_db, found.correct) for found in parts]
+    for snr in tables[0]:
+        mean = np.mean([table[snr][0] for table in tables])
+        yield [snr_text(snr), _percent(mean), tables[0][snr][1], runs[0].hardware]
+    average = np.mean([[share for share, _ in table.values()] for table in tables])
+    yield ["avg", _percent(average), len(parts[0]), runs[0].hardware]
+
+
+def seed_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [seed, accuracy_percent] on average over the SNRs."""
+    for run in runs:
+        shares = [share for share, _ in accuracy_by(run.test.snr_db, run.test.correct).values()]
+        yield [run.seed, _percent(np.mean(shares))]
+
+
+def confusion_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [category, predicted, samples], summed over the seeds."""
+    counts = sum(confusion(run.test.label, run.test.guesses) for run in runs)
+    for true, name in enumerate(CATEGORIES):
+        for guess, other in enumerate(CATEGORIES):
+            yield [name, other, counts[true, guess]]
+
+
+def subtype_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [category, subtype, accuracy_percent, samples], the worst of each category first."""
+    test = runs[0].test
+    category = {name: CATEGORIES[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
+    correct = np.mean([run.test.correct for run in runs], axis=0)
+    table = accuracy_by(test.subtype, correct)
+    for name in sorted(table, key=lambda name: (CATEGORIES.index(category[name]), table[name][0], name)):
+        yield [category[name], name, _percent(table[name][0]), table[name][1]]
+
+
+def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
+    """Yield rows [from, to, accuracy_percent, samples] over bands of a value; samples without one are left out."""
+    test = runs[0].test
+    found = values(test)
+    known = ~np.isnan(found)
+    correct = np.mean([run.test.correct for run in runs], axis=0)
+    for band, (share, count) in accuracy_by(np.floor(found[known] / width), correct[known]).items():
+        yield [f"{band * width:g}", f"{(band + 1) * width:g}", _percent(share), count]
+
+
+def alarm_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [asked, threshold, detected, bird, vehicle, pedestrian] in percent; thresholds from validation."""
+    for run in runs[:1]:
+        validation = run.part("validation")
+        for asked in DETECTIONS if (validation.label == 0).any() else ():
+            level = threshold(validation.probabilities[:, 0], validation.label, asked)
+            detected, alarms = alarm_rates(run.test.probabilities[:, 0], run.test.label, level)
+            yield [_percent(asked), repr(level), _percent(detected), *map(_percent, alarms)]
+
+
+def calibration_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
+    for run in runs[:1]:
+        yield [f"{value:.6f}" for value in calibration(run.test.probabilities, run.test.label).values()]
+
+
+def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[list]:
+    """Yield rows [unit, difference, low, high, only_first, only_second, p] of two schemes on the same samples.
+
+    Differences in percentage points. Raises: InputError where the schemes were tested on different samples.
+    """
+    one, other = first[0].test, second[0].test
+    if not np.array_equal(one.key, other.key):
+        raise InputError(f"{first[0].scheme} and {second[0].scheme} were tested on different samples")
+    gain = np.mean([run.test.correct for run in first], axis=0) - np.mean([run.test.correct for run in second], axis=0)
+    discordant = mcnemar(one.correct, other.correct)
+    for unit, clusters in (("motion model", one.motion), ("subtype", one.subtype)):
+        generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme, unit)
+        interval = bootstrap(clusters, gain, generator)
+        yield [unit, *map(_percent, interval), *discordant[:2], f"{discordant[2]:.6g}"]
+
+
+def _write(path: Path, columns: list[str], rows: list[list]) -> None:
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["protocol", "scheme", *columns])
+        writer.writerows(rows)
+
+
+def write(runs: list[Run], order: list[str], folder: str | Path, seed: int) -> None:
+    """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
+
+    seed: of the bootstrap. Raises: InputError for a scheme outside `order` or the same run twice.
+    """
+    groups: dict[tuple[str, str], list[Run]] = {}
+    for run in sorted(runs, key=lambda run: run.seed):
+        if run.scheme not in order:
+            raise InputError(f"scheme {run.scheme!r}: not in the table of schemes, which has {order}")
+        group = groups.setdefault((run.protocol, run.scheme), [])
+        if any(other.seed == run.seed for other in group):
+            raise InputError(f"{run.protocol} {run.scheme}: two prediction files of seed {run.seed}")
+        group.append(run)
+    keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
+    share = ["accuracy_percent", "samples"]
+    bands = ["from", "to", *share]
+    alarm = ["asked_percent", "threshold", "detected_percent", "bird_percent", "vehicle_percent", "pedestrian_percent"]
+    tables = {
+        "accuracy": (["snr_db", *share, "hardware"], lambda group: accuracy_rows(group, "test")),
+        "seeds": (["seed", "accuracy_percent"], seed_rows),
+        "confusion": (["category", "predicted", "samples"], confusion_rows),
+        "subtypes": (["category", "subtype", *share], subtype_rows),
+        "ranges": (bands, lambda group: band_rows(group, lambda found: found.range_m, 50)),
+        "aspects": (bands, lambda group: band_rows(group, lambda found: found.aspect_deg, 30)),
+        "alarms": (alarm, alarm_rows),
+        "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
+    }
+    for name, (columns, rows) in tables.items():
+        _write(Path(folder) / f"{name}.csv", columns, [[*key, *row] for key in keys for row in rows(groups[key])])
+    seen = [[*key, *row] for key in keys if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
+            for row in accuracy_rows(groups[key], "seen_test")]  # fmt: skip
+    _write(Path(folder) / "seen_test.csv", ["snr_db", *share, "hardware"], seen)
+    compared = [
+        [protocol, better, other, claim, *row]
+        for protocol in ("seen", "unseen")
+        for better, other, claim in CLAIMS
+        if (protocol, better) in groups and (protocol, other) in groups
+        for row in comparison_rows(groups[protocol, better], groups[protocol, other], seed)
+    ]
+    columns = ["over", "claim", "unit", "difference_points", "low", "high", "only_first", "only_second", "mcnemar_p"]
+    _write(Path(folder) / "comparisons.csv", columns, compared)

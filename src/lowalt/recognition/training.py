@@ -1,0 +1,204 @@
+"""Training in plain torch: deterministic order, exact resume, early stopping on validation, a NaN stopped by name.
+
+Plain torch because a loop library hides what an exact resume needs (the order of samples and every random state),
+and the loop is one page without it. The settings are those of `lowalt.recognition.recipe`.
+"""
+
+import csv
+import math
+import sys
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from timm.utils import ModelEmaV3
+from torch import nn
+
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.recognition import checkpoint
+from lowalt.recognition.augment import augment
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.recipe import check, optimiser, schedule
+from lowalt.recognition.statistics import cross_entropy
+from lowalt.streams import stream
+
+HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
+
+
+@dataclass
+class Progress:
+    """Where a run stands; everything in it goes into the checkpoint."""
+
+    epoch: int = 0
+    batch: int = 0
+    steps: int = 0
+    loss_sum: float = 0.0
+    loss_steps: int = 0
+    skipped: int = 0
+    best: float = -1.0
+    since_best: int = 0
+    history: list = field(default_factory=list)
+    done: bool = False
+
+
+class Trainer:
+    """One training run: `fit` ends with the best averaged weights in `model.pt` and the history in `history.csv`."""
+
+    def __init__(self, model, samples, columns, settings, keys, name, folder, machine: Machine) -> None:
+        """model: a Recogniser; samples: {"train": ..., "validation": ...} sources; columns: views of the scheme.
+
+        settings: {"seed", "training", "augmentation"}; keys: what names the run's random streams; name: the run's
+        identity, which its checkpoints carry; folder: where its files go.
+        """
+        self.block = check(settings["training"])
+        self.augmentation, self.seed = settings["augmentation"], settings["seed"]
+        self.train, self.validation = samples["train"], samples["validation"]
+        self.columns, self.keys, self.name, self.folder, self.machine = columns, keys, name, Path(folder), machine
+        missing = set(range(4)) - set(np.unique(self.train.facts.label).tolist())
+        if missing:
+            raise InputError(f"training: no training sample of class {sorted(missing)}, expected all of 0..3")
+        layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
+        self.model = model.to(machine.device, memory_format=layout)
+        self.ema = ModelEmaV3(self.model, decay=self.block["ema"], use_warmup=True)
+        self.optimiser = optimiser(self.model, self.block)
+        self.criterion = nn.CrossEntropyLoss(label_smoothing=self.block["label_smoothing"])
+        self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
+        self.best_weights: dict = {}
+        self.at = Progress()
+
+    def _order(self, epoch: int) -> np.ndarray:
+        return epoch_order(self.train.facts, self.seed, self.keys, epoch, self.block["snrs_per_model"])
+
+    def save(self) -> None:
+        """Write the checkpoint; refuses to write weights that are not finite."""
+        self._finite()
+        if self.machine.rank == 0:
+            checkpoint.save(self.folder / "checkpoint.pt", self.name, self._state())
+
+    def _state(self) -> dict:
+        return {
+            "model": self.model.state_dict(), "ema": self.ema.module.state_dict(), "best": self.best_weights,
+            "optimiser": self.optimiser.state_dict(), "at": vars(self.at), "random": torch.get_rng_state(),
+        }  # fmt: skip
+
+    def resume(self) -> bool:
+        """Take up the checkpoint of this run, if there is one; says whether there was."""
+        path = self.folder / "checkpoint.pt"
+        if not path.exists():
+            return False
+        _, state = checkpoint.load(path, self.name)
+        self.model.load_state_dict(state["model"])
+        self.ema.module.load_state_dict(state["ema"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.best_weights = state["best"]
+        self.at = Progress(**state["at"])
+        torch.set_rng_state(state["random"])
+        return True
+
+    def _finite(self) -> None:
+        if not math.isfinite(self.at.loss_sum):
+            raise InputError(
+                f"training: loss is {self.at.loss_sum} in epoch {self.at.epoch} at step {self.at.steps}; "
+                f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
+            )
+
+    def _step(self, numbers: np.ndarray) -> None:
+        self.step_model.train()
+        mine = numbers[self.machine.rank :: self.machine.ranks]
+        generator = stream(self.seed, "recognition-augment", *self.keys, self.at.steps, self.machine.rank)
+        images = augment(self.train.views(mine), self.columns, self.augmentation, generator)
+        images = torch.from_numpy(images).to(self.machine.device, non_blocking=True)
+        labels = torch.from_numpy(self.train.facts.label[mine]).long().to(self.machine.device)
+        rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
+        for group in self.optimiser.param_groups:
+            group["lr"] = rate * group["factor"]
+        with self.machine.autocast():
+            logits = self.step_model(images)
+        loss = self.criterion(logits.float(), labels)
+        loss.backward()
+        norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
+        self.at.loss_sum += float(loss.detach())
+        self.at.loss_steps += 1
+        self._finite()
+        if math.isfinite(float(norm)):
+            self.optimiser.step()
+            self.at.skipped = 0
+        else:
+            # A gradient can overflow where the loss does not; one is survived, a row of them is not.
+            self.at.skipped += 1
+            print(f"training: gradient is {float(norm)} at step {self.at.steps}, step left out", file=sys.stderr)
+            if self.at.skipped >= 10:
+                raise InputError(f"training: ten gradients in a row were not finite, last at step {self.at.steps}")
+        self.optimiser.zero_grad(set_to_none=True)
+        self.at.steps += 1
+        if self.block["ema"]:
+            self.ema.update(self.model, step=self.at.steps)
+        else:
+            self.ema.set(self.model)
+
+    def _validate(self) -> None:
+        facts = self.validation.facts
+        everything = np.arange(len(facts))
+        found = probabilities(self.ema.module, self.validation, everything, self.machine, self.block["batch"])
+        accuracy = float(np.mean(found.argmax(1) == facts.label))
+        rate = self.block["rate"] * schedule(self.at.steps / self.block["steps"], self.block["warmup"])
+        row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], rate,
+               self.at.loss_sum / self.at.loss_steps, float(cross_entropy(found, facts.label)), accuracy)  # fmt: skip
+        self.at.history.append(row)
+        if accuracy >= self.at.best:
+            self.at.since_best = 0 if accuracy > self.at.best else self.at.since_best + 1
+            self.at.best = accuracy
+            weights = self.ema.module.state_dict()
+            self.best_weights = {key: value.detach().cpu().clone() for key, value in weights.items()}
+        else:
+            self.at.since_best += 1
+        self.at.loss_sum, self.at.loss_steps = 0.0, 0
+        self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
+
+    def fit(self) -> Progress:
+        """Train to the last step or until validation stops improving; goes on from where the run stands."""
+        start, last, first = time.monotonic(), time.monotonic(), self.at.steps
+        steps = self.block["steps"]
+        while self.at.steps < steps and not self.at.done:
+            parts = batches(self._order(self.at.epoch), self.block["batch"])
+            while self.at.batch < len(parts) and self.at.steps < steps and not self.at.done:
+                self._step(parts[self.at.batch])
+                self.at.batch += 1
+                if self.at.steps % self.block["validate_every"] == 0 or self.at.steps == steps:
+                    self._validate()
+                    self._say(start, first)
+                if time.monotonic() - last > self.block["checkpoint_s"]:
+                    self.save()
+                    last = time.monotonic()
+            if self.at.batch == len(parts):
+                self.at.epoch, self.at.batch = self.at.epoch + 1, 0
+        return self.at
+
+    def _say(self, start: float, first: int) -> None:
+        if self.machine.rank:
+            return
+        spent = time.monotonic() - start
+        speed = (self.at.steps - first) / spent
+        left = (self.block["steps"] - self.at.steps) / speed
+        row = dict(zip(HISTORY, self.at.history[-1], strict=True))
+        print(
+            f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} "
+            f"validation {100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
+            f"{speed * self.block['batch']:.0f} samples/s, {left:.0f} s left",
+            file=sys.stderr, flush=True,
+        )  # fmt: skip
+
+    def finish(self, extra: dict) -> None:
+        """Write `model.pt` (best averaged weights, `extra`) and `history.csv`, and drop the checkpoint."""
+        if self.machine.rank:
+            return
+        checkpoint.save(self.folder / "model.pt", self.name, {"weights": self.best_weights, **extra})
+        with replacing(self.folder / "history.csv") as temporary, temporary.open("w", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(HISTORY)
+            writer.writerows([[repr(value) for value in row] for row in self.at.history])
+        (self.folder / "checkpoint.pt").unlink(missing_ok=True)

@@ -1,0 +1,123 @@
+"""From shards to index images at the training size: sample by sample, or a whole shard into a cache file.
+
+Decoding and shrinking 256 x 256 images costs more than a small network's step, so a cache pays as soon as two
+runs share it; at scale a training run reads the shards themselves, and sees the same pixels.
+"""
+
+import math
+import re
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.network import Network
+from lowalt.recognition import samples
+from lowalt.recognition.samples import STATIONS, VIEWS, Facts
+from lowalt.shards import ShardSet
+from lowalt.tiles import resize
+
+_KEY = re.compile(r"(.+)-\d{6}-snr")
+
+
+def shrink(images: np.ndarray, size: int) -> np.ndarray:
+    """Return index images (..., S, S) uint8 at size x size, by the project's one resampling kernel."""
+    return images if images.shape[-1] == size else resize(images, size)
+
+
+def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
+    """Range (m) and aspect (rad) of a sample at every station.
+
+    Aspect is the angle, seen from above, between the target's front and the direction to the station: 0 head-on, pi
+    from behind.
+    """
+    motion = record["motion"]
+    front = np.array([-math.sin(motion["yaw_rad"]), math.cos(motion["yaw_rad"])])
+    ranges, aspects = [], []
+    for station in network.stations:
+        ranges.append(record["geometry"][station.name]["range_m"])
+        towards = np.array(station.position_m[:2]) - [motion["x_m"], motion["y_m"]]
+        length = float(np.hypot(*towards))
+        cosine = float(front @ towards) / length if length else 1.0
+        aspects.append(math.acos(max(-1.0, min(1.0, cosine))))
+    return ranges, aspects
+
+
+def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Facts:
+    """Return what the shards say of the samples `numbers`.
+
+    placed: read ranges and aspects from the records too; without it they are NaN and no record but one a subtype is
+    read, which is what a training run over a million samples wants.
+    """
+    ends = np.cumsum([shard["samples"] for shard in shards.shards])
+    owner = np.searchsorted(ends, numbers, side="right")
+    keys = np.array([key.decode() for key in shards.keys[numbers]])
+    network = Network.from_settings(shards.index["render"]["network"])
+    blank = ([math.nan] * len(STATIONS), [math.nan] * len(STATIONS))
+    names: dict[str, str] = {}
+    subtypes, places = [], []
+    for key, number in zip(keys, numbers, strict=True):
+        slug = _KEY.match(key)[1]
+        if placed or slug not in names:
+            record = shards.record(number)
+            names[slug] = record["subtype"]
+            places.append(geometry(record, network) if placed else blank)
+        else:
+            places.append(blank)
+        subtypes.append(names[slug])
+    return Facts(
+        key=keys,
+        subtype=np.array(subtypes),
+        model=shards.models[numbers],
+        snr_db=shards.snrs_db[numbers],
+        group=np.array([shards.shards[index]["group"] for index in owner]),
+        fold=np.array([shards.shards[index]["fold"] for index in owner]),
+        label=shards.labels[numbers],
+        range_m=np.array([place[0] for place in places]),
+        aspect_rad=np.array([place[1] for place in places]),
+    )
+
+
+def cache_shard(index: str | Path, name: str, size: int, out: str | Path) -> int:
+    """Write the cache file of the shard `name` and return its number of samples.
+
+    Raises: InputError where the index has no such shard, the size is wrong, or the shard is damaged.
+    """
+    if isinstance(size, bool) or not isinstance(size, int) or size < 8:
+        raise InputError(f"settings: size is {size!r}, expected a whole number of pixels >= 8")
+    shards = ShardSet(index)
+    names = [shard["name"] for shard in shards.shards]
+    if name not in names:
+        raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
+    place = names.index(name)
+    start = sum(shard["samples"] for shard in shards.shards[:place])
+    numbers = np.arange(start, start + shards.shards[place]["samples"])
+    views = np.empty((len(numbers), VIEWS, size, size), dtype=np.uint8)
+    for row, number in enumerate(numbers):
+        views[row] = shrink(shards.images(number), size)
+    # The images' bytes have been checked: the records need no second look.
+    samples.write(out, views, facts_of(ShardSet(index, check=False), numbers))
+    return len(numbers)
+
+
+class ShardSamples:
+    """Samples read from shards as they are asked for; the same calls and pixels as `ViewSamples`."""
+
+    def __init__(self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool) -> None:
+        """index: index file of the shards; columns: views to keep; folds: (group, fold) pairs; size: pixels.
+
+        placed: whether facts carry ranges and aspects (reads every record).
+        Raises: InputError where nothing is left.
+        """
+        groups, names = sorted({group for group, _ in folds}), sorted({fold for _, fold in folds})
+        self.shards, self.columns, self.size = ShardSet(index, groups, names), columns, size
+        flags = [[(shard["group"], shard["fold"]) in folds] * shard["samples"] for shard in self.shards.shards]
+        self.numbers = np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
+        if not len(self.numbers):
+            raise InputError(f"{index}: no samples of {sorted(folds)}")
+        self.facts = facts_of(self.shards, self.numbers, placed)
+
+    def views(self, numbers: np.ndarray) -> np.ndarray:
+        """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
+        found = [self.shards.images(self.numbers[number])[self.columns] for number in numbers]
+        return shrink(np.stack(found), self.size)
