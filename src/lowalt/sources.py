@@ -21,9 +21,13 @@ def _file(module: str) -> Path | None:
 
 @functools.cache
 def _imports(path: Path) -> tuple[str, ...]:
-    """Modules of the package that one file names in an import, anywhere in it."""
+    """Modules of the package that one file imports: anywhere in it, but in a `__main__` only at its top.
+
+    What a command imports inside its functions belongs to the subcommand asked for; the caller names those.
+    """
+    tree = ast.parse(path.read_text(), str(path))
     found = []
-    for node in ast.walk(ast.parse(path.read_text(), str(path))):
+    for node in tree.body if path.name == "__main__.py" else ast.walk(tree):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
@@ -32,22 +36,21 @@ def _imports(path: Path) -> tuple[str, ...]:
 
 
 @functools.cache
-def sources(module: str) -> tuple[Path, ...]:
-    """Return the files that `python -m {module}` can import from this package, sorted; `module` as on the command line.
+def sources(*modules: str) -> tuple[Path, ...]:
+    """Return the package's files that running `python -m` on these modules can import, sorted.
 
-    Imports inside functions count: what may run is what a change of must re-run.
+    modules: as on the command line, then the modules that the subcommand in question imports by itself.
     Raises: ModuleNotFoundError where there is no such module.
     """
-    if _file(module) is None:
-        raise ModuleNotFoundError(module)
-    todo, seen = [module], set()
-    if _file(f"{module}.__main__"):
-        todo.append(f"{module}.__main__")
+    todo, seen = [], set()
+    for module in modules:
+        if _file(module) is None:
+            raise ModuleNotFoundError(module)
+        todo += [module, *([f"{module}.__main__"] if _file(f"{module}.__main__") else [])]
     while todo:
         name = todo.pop()
-        if name in seen:
-            continue
-        seen.add(name)
-        todo += name.rpartition(".")[:1] if "." in name else []
-        todo += _imports(_file(name))
+        if name not in seen:
+            seen.add(name)
+            parent = name.rpartition(".")[0]
+            todo += [*([parent] if parent else []), *_imports(_file(name))]
     return tuple(sorted({_file(name) for name in seen}))

@@ -8,9 +8,13 @@ from snakemake.exceptions import WorkflowError
 
 from lowalt.config import canonical, check
 from lowalt.errors import InputError
+from lowalt.network import Network
 from lowalt.plan import Plan, slug
+from lowalt.recognition.schemes import named
 from lowalt.sources import sources
+from lowalt.spectra import Spectra
 from lowalt.targets.records import load_records, missing_inputs, source_files
+from lowalt.tiles.settings import Images
 
 # Jobs run `python -m lowalt.STAGE` by the interpreter that runs Snakemake, whether its environment is active or not.
 os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -28,19 +32,22 @@ def prepared(config):
         published = {name: record["published"] for name, record in records.items()}
         plan = Plan.of(config, published)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
+        Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
+        Images.from_settings(config["images"])
+        schemes = {name: named(config["recognition"]["table"], name) for name in config["recognition"]["schemes"]}
         lacking = missing_inputs(chosen, INPUTS)
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
     except InputError as error:
         raise WorkflowError(str(error)) from None
-    return chosen, plan
+    return chosen, plan, schemes
 
 
 INPUTS = config["inputs"] or os.environ.get("LOWALT_INPUTS")
 if INPUTS:
     os.environ["LOWALT_INPUTS"] = str(INPUTS)
 
-RECORDS, PLAN = prepared(config)
+RECORDS, PLAN, SCHEMES = prepared(config)
 RUN = config["run"]
 STATIONS = list(config["network"]["stations"])
 BY_SLUG = {slug(name): name for name in RECORDS}
@@ -54,11 +61,25 @@ wildcard_constraints:
     part=r"\d{5}",
     fold="train|val|test",
     station="|".join(STATIONS),
+    protocol="seen|unseen",
+    scheme="|".join(scheme.slug for scheme in SCHEMES.values()),
+    train_seed=r"\d+",
 
 
-def code(module):
-    """The source files a stage runs, as inputs: editing one re-runs the stage."""
-    return [os.path.relpath(path, workflow.basedir) for path in sources(module)]
+TRAININGS = [
+    f"{protocol}/{scheme.slug}/{seed}"
+    for scheme in SCHEMES.values()
+    for protocol in config["recognition"]["protocols"]
+    if protocol in scheme.protocols
+    for seed in config["recognition"]["seeds"]
+]
+SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
+RESULT_TABLES = ("accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv")
+
+
+def code(*modules):
+    """The source files a command runs, as inputs: editing one re-runs its jobs. The command, then its own imports."""
+    return [os.path.relpath(path, workflow.basedir) for path in sources(*modules)]
 
 
 def group_clouds(wildcards):
@@ -114,3 +135,46 @@ def shard_settings(wildcards):
             "shards": config["shards"],
         }
     )
+
+
+def sample_source(wildcards):
+    """What training and evaluation read: the shared caches of shrunk images, or the shards themselves."""
+    base = f"results/{wildcards.run}"
+    if config["recognition"]["cache"]:
+        return {"views": [f"{base}/views/{shard}.npz" for shard in PLAN.shards]}
+    return {"index": f"{base}/shards/index.json"}
+
+
+def source_option(wildcards, input):
+    return f"--views {input.views}" if "views" in input.keys() else f"--index {input.index}"
+
+
+def training_settings(wildcards):
+    block = config["recognition"]
+    kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
+    return canonical({"seed": int(wildcards.train_seed), "colour_map": config["images"]["colour_map"], **kept})
+
+
+def benchmark_files(wildcards):
+    """Benchmarks of all jobs, in pipeline order."""
+    base = f"results/{wildcards.run}/benchmarks"
+    tiles = [f"tiles/{chunk}" for chunk in PLAN.chunks] if config["shards"]["kind"] == "image" else []
+    views = [f"views/{shard}" for shard in PLAN.shards] if config["recognition"]["cache"] else []
+    names = [
+        *(f"cloud/{subtype}" for subtype in SLUGS),
+        *(f"motion/{chunk}" for chunk in PLAN.chunks),
+        *(f"echo/{chunk}-{station}" for chunk in PLAN.chunks for station in STATIONS),
+        *(f"noise/{chunk}" for chunk in PLAN.chunks),
+        *tiles,
+        *(f"shard/{shard}" for shard in PLAN.shards),
+        "index",
+        *views,
+        *(f"train/{training}" for training in TRAININGS),
+        *(f"evaluate/{training}" for training in TRAININGS),
+        "tables",
+    ]
+    return [f"{base}/{name}.jsonl" for name in names]
+
+
+def report_settings(wildcards):
+    return canonical({"config": config, "published": {name: record["published"] for name, record in RECORDS.items()}})

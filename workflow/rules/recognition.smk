@@ -1,0 +1,108 @@
+# Recognition: freeze what was simulated, train every scheme in its protocols, predict, and make the tables.
+# REQUIRED INPUTS: results/{run}/shards/index.json and its shards, all clouds and motion tables
+# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions
+
+
+rule views:
+    input:
+        code=code("lowalt.recognition", "lowalt.recognition.views"),
+        index="results/{run}/shards/index.json",
+        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
+    output:
+        "results/{run}/views/{group}-{fold}-{part}.npz",
+    log:
+        "results/{run}/logs/views/{group}-{fold}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/views/{group}-{fold}-{part}.jsonl"
+    params:
+        settings=canonical({"size": config["recognition"]["size"]}),
+    shell:
+        "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
+        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part} --out {output:q} 2> {log:q}"
+
+
+rule freeze:
+    input:
+        code=code("lowalt.recognition", "lowalt.recognition.freeze"),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks),
+    output:
+        "results/{run}/SHA256SUMS",
+    log:
+        "results/{run}/logs/freeze.log",
+    shell:
+        "python -m lowalt.recognition freeze --settings '{{}}' --files {input.clouds:q} {input.motion:q}"
+        " --out {output:q} 2> {log:q}"
+
+
+rule train:
+    input:
+        unpack(sample_source),
+        code=code(
+            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+        ),
+        frozen="results/{run}/SHA256SUMS",
+        schemes=config["recognition"]["table"],
+    output:
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+        history="results/{run}/models/{protocol}/{scheme}/{train_seed}/history.csv",
+    log:
+        "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
+    benchmark:
+        "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
+    threads: config["recognition"]["training"]["threads"]
+    resources:
+        mem_mb=8000,
+        runtime=1440,
+    params:
+        settings=training_settings,
+        source=source_option,
+    shell:
+        "python -m lowalt.recognition train --settings {params.settings:q} {params.source} --frozen {input.frozen:q}"
+        " --schemes {input.schemes:q} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
+        " --out $(dirname {output.model:q}) 2> {log:q}"
+
+
+rule evaluate:
+    input:
+        unpack(sample_source),
+        code=code(
+            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+        ),
+        frozen="results/{run}/SHA256SUMS",
+        model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+    output:
+        table="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.csv",
+        about="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.json",
+    log:
+        "results/{run}/logs/evaluate/{protocol}/{scheme}/{train_seed}.log",
+    benchmark:
+        "results/{run}/benchmarks/evaluate/{protocol}/{scheme}/{train_seed}.jsonl"
+    threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        mem_mb=8000,
+    params:
+        settings=canonical(config["recognition"]["evaluation"]),
+        source=source_option,
+    shell:
+        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
+        " --frozen {input.frozen:q} --model {input.model:q} --out {output.table:q} 2> {log:q}"
+
+
+rule tables:
+    input:
+        code=code("lowalt.recognition", "lowalt.recognition.tables"),
+        predictions=expand("results/{{run}}/predictions/{training}.csv", training=TRAININGS),
+        about=expand("results/{{run}}/predictions/{training}.json", training=TRAININGS),
+        schemes=config["recognition"]["table"],
+    output:
+        multiext("results/{run}/", *RESULT_TABLES),
+    log:
+        "results/{run}/logs/tables.log",
+    benchmark:
+        "results/{run}/benchmarks/tables.jsonl"
+    params:
+        settings=canonical({"seed": config["seed"]}),
+    shell:
+        "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
+        " --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"

@@ -1,0 +1,30 @@
+# Report: one self-contained page of the run, and the table of what each stage took.
+# REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark
+# OUTPUTS: results/{run}/report.html, results/{run}/stages.csv
+
+
+rule report:
+    input:
+        code=code("lowalt.report"),
+        page="src/lowalt/report/page.html",
+        published=config["report"]["published"],
+        tables=multiext("results/{run}/", *RESULT_TABLES),
+        index="results/{run}/shards/index.json",
+        configuration="results/{run}/config.yaml",
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        gallery="results/{run}/clouds.png",
+        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks[0]),
+        benchmarks=benchmark_files,
+    output:
+        page="results/{run}/report.html",
+        stages="results/{run}/stages.csv",
+    log:
+        "results/{run}/logs/report.log",
+    params:
+        settings=report_settings,
+    shell:
+        "python -m lowalt.report --settings {params.settings:q} --accuracy results/{wildcards.run}/accuracy.csv"
+        " --published {input.published:q} --confusion results/{wildcards.run}/confusion.csv"
+        " --subtypes results/{wildcards.run}/subtypes.csv --comparisons results/{wildcards.run}/comparisons.csv"
+        " --index {input.index:q} --clouds {input.clouds:q} --gallery {input.gallery:q} --motion {input.motion:q}"
+        " --benchmarks {input.benchmarks:q} --stages {output.stages:q} --out {output.page:q} 2> {log:q}"

@@ -6,8 +6,8 @@ import matplotlib
 import numpy as np
 
 matplotlib.use("Agg")  # no screen on a cluster node
-from matplotlib import pyplot as plt  # noqa: E402
-from matplotlib.figure import Figure  # noqa: E402
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
 
 SNR_LABELS = {"inf": "∞"}
 

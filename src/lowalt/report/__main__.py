@@ -1,0 +1,122 @@
+"""Command line of the report: the run's tables, pictures and measurements -> one self-contained HTML page."""
+
+import base64
+import csv
+import json
+import sys
+from pathlib import Path
+
+import jinja2
+import yaml
+
+from lowalt.command import parser, pick, run
+from lowalt.files import existing, replacing, sha256
+from lowalt.hardware import describe
+from lowalt.motion import read_table
+from lowalt.report import figures
+from lowalt.report.made_with import versions
+from lowalt.report.strip import motion_strip
+from lowalt.report.tables import by_scheme, confusion, read_csv, stage_times
+from lowalt.report.tiles import example_tiles
+from lowalt.shards import ShardSet
+from lowalt.targets.cloud import CATEGORIES, read
+
+STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "hardware")
+
+
+def picture(data: bytes) -> str:
+    """Return PNG bytes as the address of an embedded picture."""
+    return "data:image/png;base64," + base64.b64encode(data).decode()
+
+
+def cloud_rows(paths: list[str], published: dict[str, dict]) -> list[dict]:
+    """Return one row a cloud file: subtype, category, group, source, points, the published count, checksum."""
+    rows = []
+    for path in paths:
+        cloud = read(path)
+        row = published[cloud.subtype]
+        rows.append(
+            {
+                "subtype": cloud.subtype,
+                "category": cloud.category,
+                "group": row["unseen_protocol"],
+                "source": cloud.record["source"],
+                "points": len(cloud.points),
+                "published": row["points_in_published_cloud_approx"],
+                "sha256": sha256(path),
+            }
+        )
+    return rows
+
+
+def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
+    """Return (columns, rows) of accuracy by subtype: a column a protocol and scheme, a row a subtype."""
+    columns: dict[str, None] = {}
+    table: dict[tuple[str, str], dict[str, str]] = {}
+    for row in rows:
+        column = f"{row['protocol']} {row['scheme']}"
+        columns[column] = None
+        table.setdefault((row["subtype"], row["category"]), {})[column] = f"{float(row['accuracy_percent']):.1f}"
+    return list(columns), [(name, category, values) for (name, category), values in table.items()]
+
+
+def write_stages(path: str | Path, times: list[dict], samples: int) -> None:
+    """Write what each rule took as CSV, with the number of samples made and the hardware."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(STAGE_COLUMNS)
+        for entry in times:
+            seconds = (f"{entry['wall_s']:.2f}", f"{entry['cpu_s']:.2f}", f"{entry['peak_mib']:.0f}")
+            writer.writerow([entry["rule"], entry["jobs"], *seconds, samples, describe()])
+
+
+def main(arguments: list[str]) -> None:
+    """Write the page, and the stages' times as a table."""
+    options = parser("lowalt.report", __doc__)
+    options.add_argument("--accuracy", required=True, help="accuracy by scheme and SNR (.csv)")
+    options.add_argument("--published", required=True, help="the paper's accuracies (.csv)")
+    options.add_argument("--confusion", required=True, help="confusion counts (.csv)")
+    options.add_argument("--subtypes", required=True, help="accuracy by subtype (.csv)")
+    options.add_argument("--comparisons", required=True, help="paired comparisons of schemes (.csv)")
+    options.add_argument("--index", required=True, help="index of the shards (.json)")
+    options.add_argument("--clouds", nargs="+", required=True, help="all cloud files")
+    options.add_argument("--gallery", required=True, help="picture of all clouds (.png)")
+    options.add_argument("--motion", required=True, help="a motion table; its first model a category is drawn")
+    options.add_argument("--benchmarks", nargs="+", required=True, help="benchmark files of all jobs (.jsonl)")
+    options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
+    options.add_argument("--out", required=True, help="page to write (.html)")
+    given = options.parse_args(arguments)
+    config, published = pick(given.settings, "config", "published")
+    shards = ShardSet(given.index)
+    times = stage_times(given.benchmarks)
+    write_stages(given.stages, times, len(shards))
+    ours = by_scheme(read_csv(given.accuracy, "protocol", "scheme", "snr_db", "accuracy_percent"))
+    paper = by_scheme(read_csv(given.published, "protocol", "scheme", "snr_db", "accuracy_percent"))
+    counts = confusion(read_csv(given.confusion, "protocol", "scheme", "category", "predicted", "samples"))
+    columns, subtypes = subtype_table(read_csv(given.subtypes, "protocol", "scheme", "subtype", "accuracy_percent"))
+    clouds = cloud_rows(given.clouds, published)
+    pictures = {
+        "accuracy": figures.accuracy_over_snr(ours, paper),
+        "confusion": figures.confusion_matrices(counts, CATEGORIES),
+        "times": figures.stage_bars(times),
+        "clouds": existing(given.gallery, "gallery").read_bytes(),
+        "strip": motion_strip([read(path) for path in given.clouds], read_table(given.motion)),
+    }
+    labels = [f"{snr:g}" for snr in map(float, config["noise"]["snr_db"])]
+    template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
+    page = template.from_string(Path(__file__).with_name("page.html").read_text()).render(
+        run=config["run"], seed=config["seed"], stations=list(config["network"]["stations"]), snrs=labels,
+        models=len(shards) // len(labels), subtypes=len(clouds), samples=len(shards),
+        bytes=sum(shard["bytes"] for shard in shards.shards), hardware=describe(),
+        ours=ours, published=paper, comparisons=read_csv(given.comparisons), subtype_columns=columns,
+        subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
+        clouds=clouds, times=times, versions=versions(), configuration=yaml.safe_dump(config, sort_keys=False),
+        images={name: picture(data) for name, data in pictures.items()},
+    )  # fmt: skip
+    with replacing(given.out) as temporary:
+        temporary.write_text(page)
+    print(json.dumps({"report": given.out, "samples": len(shards)}), file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run(main)

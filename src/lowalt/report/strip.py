@@ -1,0 +1,50 @@
+"""A strip of pictures a category: how one motion model's parts move over one cycle, seen in the target's own frame."""
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from lowalt.motion import positions
+from lowalt.report.figures import png
+from lowalt.targets.cloud import CATEGORIES, Cloud
+
+VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
+         "Pedestrian": (1, 2, "from the side")}  # fmt: skip
+
+
+def still_row(row: dict) -> dict:
+    """Return the motion row without place, velocity and attitude, so that only the parts' own motion is left."""
+    names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
+    return {**row, **dict.fromkeys(names, 0.0)}
+
+
+def cycle_s(cloud: Cloud, row: dict) -> float:
+    """Return the time of one cycle (s): a turn, a beat, or the whole recording."""
+    if len(cloud.track):
+        return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
+    return 1.0 / row["rate_hz"]
+
+
+def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
+    """Draw the first motion model of each category at `instants` equal steps of its cycle; returns PNG bytes."""
+    named = {cloud.subtype: cloud for cloud in clouds}
+    chosen = [next((row for row in rows if row["category"] == name), None) for name in CATEGORIES]
+    chosen = [row for row in chosen if row is not None]
+    figure, panels = plt.subplots(len(chosen), instants, figsize=(1.7 * instants, 1.8 * len(chosen)), squeeze=False)
+    for line, row in zip(panels, chosen, strict=True):
+        cloud = named[row["subtype"]]
+        across, up, view = VIEWS[row["category"]]
+        times = np.arange(instants) / instants * cycle_s(cloud, row)
+        points = positions(cloud, still_row(row), times)
+        low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
+        half = 0.55 * max(high[across] - low[across], high[up] - low[up])
+        middle = (low + high) / 2
+        moving = np.array([kind != "body" for kind in cloud.kinds])[cloud.part]
+        for panel, time, frame in zip(line, times, points, strict=True):
+            panel.scatter(frame[~moving, across], frame[~moving, up], s=2, color="0.6")
+            panel.scatter(frame[moving, across], frame[moving, up], s=3, c=cloud.part[moving], cmap="tab10")
+            panel.set(xlim=(middle[across] - half, middle[across] + half), ylim=(middle[up] - half, middle[up] + half))
+            panel.set(aspect="equal", xticks=[], yticks=[])
+            panel.set_title(f"{1000 * time:.4g} ms", fontsize=8)
+        line[0].set_ylabel(f"{row['subtype']}\n{view}", fontsize=8)
+    figure.tight_layout()
+    return png(figure)

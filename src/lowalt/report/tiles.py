@@ -1,0 +1,32 @@
+"""One clean sample of each category out of the shards, as pictures for the page."""
+
+import io
+
+import numpy as np
+from PIL import Image
+
+from lowalt.shards import ShardSet
+from lowalt.targets.cloud import CATEGORIES
+
+
+def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
+    """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion model in the set."""
+    chosen = []
+    for label, category in enumerate(CATEGORIES):
+        numbers = np.flatnonzero(shards.labels == label)
+        if len(numbers):
+            best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
+            record = shards.record(int(best))
+            caption = f"{category}: {record['subtype']}, motion model {record['model']}, SNR {record['snr_db']} dB"
+            chosen.append((caption, _picture(shards, int(best))))
+    return chosen
+
+
+def _picture(shards: ShardSet, number: int) -> bytes:
+    if shards.kind == "image":
+        return shards.png(number)
+    buffer = io.BytesIO()
+    picture = Image.fromarray(shards.tile(number), "P")
+    picture.putpalette(np.ascontiguousarray(shards.palette).tobytes())
+    picture.save(buffer, "PNG")
+    return buffer.getvalue()

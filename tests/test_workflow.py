@@ -1,0 +1,186 @@
+"""The real workflow on a tiny overlay: it runs, repeats to the byte, and re-runs only what a change touches."""
+
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.sources import PACKAGE, sources
+
+pytest.importorskip("snakemake")
+pytestmark = pytest.mark.workflow
+
+ROOT = Path(__file__).parent.parent
+OVERLAY = {
+    "run": "test",
+    "targets": {"select": ["DJI Mini 2", "DJI Mini 4 Pro", "Crow", "Walking Pedestrian 5"]},
+    "motion": {"models": 20, "models_per_chunk": 10},
+    "noise": {"snr_db": [8, float("inf")]},
+}
+
+
+# Python imports this by itself at start: every job notes its command and the package's modules it ended up with.
+SPY = """
+import atexit, os, pathlib, sys, uuid
+
+def note():
+    files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
+    base = os.environ["LOWALT_TEST_PACKAGE"]
+    files = sorted(os.path.relpath(file, base) for file in files if file.startswith(base))
+    if files and sys.argv[0].startswith(base):
+        command = os.path.relpath(sys.argv[0], base), sys.argv[1]
+        lines = "\\n".join([" ".join(command), *files])
+        pathlib.Path(os.environ["LOWALT_TEST_IMPORTS"], uuid.uuid4().hex).write_text(lines)
+
+if "LOWALT_TEST_IMPORTS" in os.environ:
+    atexit.register(note)
+"""
+RULES = {
+    "targets/__main__.py": "cloud", "targets/gallery.py": "gallery", "motion/__main__.py": "motion",
+    "echo/__main__.py": "echo", "noise/__main__.py": "noise", "tiles/__main__.py": "tiles",
+    "shards/__main__.py write": "shard", "shards/__main__.py index": "index",
+}  # fmt: skip
+
+
+def workplace(folder: Path) -> Path:
+    """A copy of the project without results, so that a test may edit what it likes."""
+    for name in ("workflow", "config", "profiles", "src"):
+        shutil.copytree(ROOT / name, folder / name)
+    shutil.copy(ROOT / "Snakefile", folder)
+    (folder / "imports").mkdir()
+    (folder / "src/sitecustomize.py").write_text(SPY)
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY))
+    return folder
+
+
+def snakemake(folder: Path, *arguments: str, cores: int = 2, good: bool = True) -> str:
+    """Run snakemake in a workplace and return what it printed."""
+    environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
+    environment.pop("LOWALT_INPUTS", None)
+    environment |= {"LOWALT_TEST_IMPORTS": str(folder / "imports"), "LOWALT_TEST_PACKAGE": str(folder / "src/lowalt")}
+    command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--configfile", "overlay.yaml", *arguments]
+    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    text = run.stdout + run.stderr
+    assert (run.returncode == 0) == good, text[-6000:]
+    return text
+
+
+def planned(folder: Path, *arguments: str) -> set[str]:
+    """The rules a dry run would execute."""
+    text = snakemake(folder, "--dry-run", *arguments)
+    return set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE))
+
+
+def checksums(folder: Path) -> dict[str, str]:
+    """SHA-256 of every file of a run's data set."""
+    base = folder / "results/test"
+    names = ("clouds/*.npz", "motion/*.csv", "echo/*/*.npy", "noisy/*.npy", "shards/*")
+    files = [path for name in names for path in base.glob(name)]
+    return {str(path.relative_to(base)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory) -> Path:
+    """A workplace whose data set is made, on two cores."""
+    folder = workplace(tmp_path_factory.mktemp("two-cores"))
+    snakemake(folder, "--", "data")
+    return folder
+
+
+def test_one_core_and_two_give_the_same_bytes(finished, tmp_path):
+    alone = workplace(tmp_path)
+    snakemake(alone, "--", "data", cores=1)
+    found = checksums(finished)
+    assert len(found) > 30
+    assert checksums(alone) == found
+
+
+def test_a_finished_run_has_nothing_to_do(finished):
+    assert planned(finished, "--", "data") == set()
+
+
+DOWNSTREAM = ["cloud", "motion", "echo", "noise", "tiles", "shard", "index"]
+
+
+@pytest.mark.parametrize(
+    ("overlay", "first"),
+    [
+        ({"motion": {"tilt_deg": 10.0}}, "motion"),
+        ({"network": {"guard_subcarriers": 20}}, "echo"),
+        ({"noise": {"snr_db": [9, float("inf")]}}, "noise"),
+        ({"images": {"colour_map": "magma"}}, "tiles"),
+        ({"split": {"val": 2, "train": 7}}, "shard"),
+    ],
+)
+def test_a_changed_setting_re_runs_its_stage_and_what_follows(finished, tmp_path, overlay, first):
+    path = tmp_path / "change.yaml"
+    path.write_text(yaml.safe_dump(overlay))
+    rules = planned(finished, "--configfile", "overlay.yaml", str(path), "--", "data") - {
+        "data",
+        "configuration",
+        "gallery",
+    }
+    assert rules == set(DOWNSTREAM[DOWNSTREAM.index(first) :])
+
+
+@pytest.mark.parametrize(
+    ("file", "first"), [("echo/engine.py", "echo"), ("noise/awgn.py", "noise"), ("shards/tar.py", "shard")]
+)
+def test_edited_code_re_runs_its_stage_and_what_follows(finished, file, first):
+    path = finished / "src/lowalt" / file
+    before = path.read_text()
+    path.write_text(before + "\n# edited\n")
+    try:
+        rules = planned(finished, "--", "data") - {"data"}
+    finally:
+        path.write_text(before)
+    assert rules == set(DOWNSTREAM[DOWNSTREAM.index(first) :])
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"noise": {"snr_db": []}}, "noise.snr_db: value [], expected at least 1 item(s)"),
+        ({"targets": {"select": ["Dodo"]}}, "targets.select: ['Dodo']"),
+        ({"network": {"carrier_hz": 4.9}}, "network.carrier_hz: value 4.9"),
+        ({"network": {"symbols": 256}}, "256"),
+        ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
+        ({"recogniton": {}}, "unknown key(s) ['recogniton']"),
+    ],
+)
+def test_a_wrong_configuration_starts_no_job(tmp_path, finished, overlay, words):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(yaml.safe_dump(overlay))
+    text = snakemake(finished, "--configfile", "overlay.yaml", str(path), "--", "data", good=False)
+    assert words in text
+    assert "rule " not in text
+
+
+def declared(rule: str) -> set[str]:
+    """The source files a rule declares as its code, relative to the package, from the arguments in its rule file."""
+    text = "\n".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
+    body = re.search(rf"^rule {rule}:\n(.*?)(?=^rule |\Z)", text, re.MULTILINE | re.DOTALL)[1]
+    arguments = re.search(r"code=code\((.*?)\)", body, re.DOTALL)[1]
+    modules = re.findall(r'"([\w.]+)"', arguments)
+    if "SOURCE_MODULES" in arguments:
+        modules += [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
+    return {str(path.relative_to(PACKAGE)) for path in sources(*modules)}
+
+
+def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
+    seen = {}
+    for path in (finished / "imports").iterdir():
+        command, *files = path.read_text().split("\n")
+        rule = RULES.get(command) or RULES.get(command.split()[0])
+        if rule:
+            seen.setdefault(rule, set()).update(files)
+    assert set(seen) == set(RULES.values()) - {"gallery"}
+    for rule, imported in seen.items():
+        assert imported <= declared(rule), rule
+        assert "errors.py" in imported
