@@ -1,0 +1,169 @@
+"""Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a target.
+
+Who does what: trimesh reads all five formats and places a scene's geometries (pymeshlab flattens scenes and drops
+their names); pymeshlab repairs, since its filters keep two million triangles within seconds and a gigabyte;
+sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+
+SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
+UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+LARGEST_TRIANGLES = 20_000_000
+"""Above this a file is refused: its arrays alone would take over two gigabytes."""
+
+_SAME_UNIT = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A repaired triangle surface: `vertices` (V, 3) in metres along the file's axes, `faces` (F, 3) in right-hand
+    order, `component` (F,) the number of each face's connected component, `closed` (C,) whether it is watertight."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    component: np.ndarray
+    closed: np.ndarray
+
+    def mapped(self, matrix: np.ndarray, offset: np.ndarray) -> "Mesh":
+        """Return the mesh under x -> matrix @ x + offset; a mirroring matrix turns the faces: normals stay outward."""
+        faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
+        return Mesh(self.vertices @ np.asarray(matrix, float).T + offset, faces, self.component, self.closed)
+
+
+def joined(meshes: list[Mesh]) -> Mesh:
+    """Return several meshes as one, components numbered on."""
+    vertices = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
+    components = np.cumsum([0] + [len(mesh.closed) for mesh in meshes[:-1]])
+    return Mesh(
+        np.concatenate([mesh.vertices for mesh in meshes]),
+        np.concatenate([mesh.faces + start for mesh, start in zip(meshes, vertices, strict=True)]),
+        np.concatenate([mesh.component + start for mesh, start in zip(meshes, components, strict=True)]),
+        np.concatenate([mesh.closed for mesh in meshes]),
+    )
+
+
+def _triangles(path: Path, unit: str, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (V, 3) in file units and faces (F, 3) of a file, or of the named geometries of its scene."""
+    import trimesh  # only records with a mesh pay for the import
+
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        found = {_SAME_UNIT.get(str(scene.units)) for scene in [scene]} - {None}
+        names = sorted(scene.geometry)
+        parts = []
+        for node in sorted(scene.graph.nodes_geometry):
+            place, name = scene.graph[node]
+            if geometry is None or name in geometry:
+                mesh = scene.geometry[name]
+                if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
+                    vertices = trimesh.transform_points(mesh.vertices, place)
+                    faces = np.asarray(mesh.faces)
+                    parts.append((vertices, faces[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else faces))
+    except Exception as error:  # trimesh's readers raise whatever their format brings
+        raise InputError(f"{path}: not a readable {path.suffix} mesh ({type(error).__name__}: {error})") from None
+    if geometry is not None and set(geometry) - set(names):
+        raise InputError(
+            f"{path}: geometry {sorted(set(geometry) - set(names))} is not in it, expected some of {names}"
+        )
+    if found and found != {unit}:
+        raise InputError(f"{path}: the file says its unit is {found.pop()}, the record says {unit}, expected the same")
+    if not parts:
+        raise InputError(f"{path}: has no triangle, expected a surface")
+    starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts[:-1]])
+    faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=True)])
+    return np.concatenate([vertices for vertices, _ in parts]).astype(float), faces.astype(np.int64)
+
+
+def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface with identical vertices merged; STL stores every corner on its own.
+
+    Before pymeshlab, whose vertices take 150 bytes each: this keeps two million triangles near a gigabyte.
+    """
+    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # adding 0 makes -0 equal to 0
+    mixed = bits[:, 0] * np.uint64(0x9E3779B97F4A7C15)
+    for column in (1, 2):
+        mixed ^= mixed >> np.uint64(29)
+        mixed = (mixed + bits[:, column]) * np.uint64(0xBF58476D1CE4E5B9)
+    _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
+    if not np.array_equal(vertices[first][inverse], vertices):  # two different vertices with one hash: about never
+        _, first, inverse = np.unique(vertices, axis=0, return_index=True, return_inverse=True)
+    return vertices[first], inverse.reshape(-1)[faces]
+
+
+def _repaired(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the surface with equal vertices merged, and empty, repeated and unused elements gone.
+
+    Raises: InputError where pymeshlab cannot be imported.
+    """
+    try:
+        import pymeshlab
+    except ImportError as error:
+        raise InputError(
+            f"mesh records need pymeshlab, which does not load here ({error}); on a machine without a display install "
+            "the system's OpenGL libraries (Debian: libgl1 libopengl0), or use built-in records"
+        ) from None
+    vertices, faces = _merged(vertices, faces)
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(vertices, faces.astype(np.int32)))
+    # Equal to a millionth of the diagonal: what single precision leaves of vertices that were one.
+    meshes.meshing_merge_close_vertices(threshold=pymeshlab.PercentageValue(1e-4))
+    meshes.meshing_remove_duplicate_faces()
+    meshes.meshing_remove_null_faces()
+    meshes.meshing_remove_unreferenced_vertices()
+    mesh = meshes.current_mesh()
+    return np.array(mesh.vertex_matrix()), np.array(mesh.face_matrix()).astype(np.int64)
+
+
+def components(faces: np.ndarray, vertices: int) -> np.ndarray:
+    """Return each face's connected component (F,), faces that share a vertex being connected."""
+    links = np.concatenate([faces[:, :2], faces[:, 1:]])
+    graph = coo_array((np.ones(len(links), np.int8), links.T), shape=(vertices, vertices))
+    _, label = connected_components(graph, directed=False)
+    return np.unique(label[faces[:, 0]], return_inverse=True)[1]
+
+
+def _outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the faces with closed components turned outward, and whether each component is closed (C,)."""
+    count = int(component.max()) + 1
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    _, first, uses = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_index=True, return_counts=True)
+    closed = np.ones(count, bool)
+    closed[component[first[uses != 2] % len(faces)]] = False
+    a, b, c = np.moveaxis(vertices[faces], 1, 0)
+    volume = np.bincount(component, np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count)
+    inverted = closed & (volume < 0)
+    return np.where(inverted[component][:, None], faces[:, ::-1], faces), closed
+
+
+def read_mesh(path: str | Path, unit: str, geometry: list[str] | None = None) -> Mesh:
+    """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own axes.
+
+    `unit` is the length unit of the file's numbers (m, cm, mm, in, ft), `geometry` the names of the scene's
+    geometries to take (all by default). Open surfaces stay open: they are sampled as triangle soup.
+    Raises: InputError naming the file and the reason: no such file, another format, unreadable, no or fewer than four
+    triangles, no area, NaN or infinite vertices, too many triangles, a unit other than the file states.
+    """
+    path = existing(path, "mesh")
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
+    vertices, faces = _triangles(path, unit, geometry)
+    if len(faces) > LARGEST_TRIANGLES:
+        raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
+    used = vertices[faces.ravel()] if faces.min() >= 0 and faces.max() < len(vertices) else np.array([np.nan])
+    if not np.isfinite(used).all():
+        raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")
+    vertices, faces = _repaired(vertices * UNITS_M[unit], faces)
+    if len(faces) < 4:
+        raise InputError(f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4")
+    component = components(faces, len(vertices))
+    faces, closed = _outward(vertices, faces, component)
+    return Mesh(vertices, faces, component, closed)

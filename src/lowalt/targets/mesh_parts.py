@@ -1,0 +1,119 @@
+"""From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the file's axes.
+
+A part is a pool of dense samples of its surface; which samples belong to which part is decided here, where and how
+large the target is comes later. Pure functions over arrays.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.targets.mesh_files import Mesh
+from lowalt.targets.sampling import face_normals, sample_faces
+from lowalt.targets.skeleton import rotation
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Dense samples of one part: `points` (N, 3) m, `normals` (N, 3), `component` (N,) of the mesh, the first
+    `corners` of them vertices that bound the surface, `area` in m2; `hinge` (3,) and `axis` (3,), NaN for a body."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    component: np.ndarray
+    corners: int
+    area: float
+    hinge: np.ndarray
+    axis: np.ndarray
+
+    def picked(self, mask: np.ndarray) -> "Pool":
+        """Return the samples of a mask (N,), in their order."""
+        return replace(
+            self, points=self.points[mask], normals=self.normals[mask], component=self.component[mask],
+            corners=int(mask[: self.corners].sum()), area=self.area * float(mask.mean()),
+        )  # fmt: skip
+
+
+def placed(mesh: Mesh, item: dict) -> Mesh:
+    """Return the mesh mirrored, turned and moved as its item of the record says, in that order."""
+    matrix = np.eye(3)
+    if "mirror" in item:
+        matrix["xyz".index(item["mirror"])] *= -1
+    if "turn" in item:
+        matrix = rotation(item["turn"]["axis"], np.radians(item["turn"]["deg"])) @ matrix
+    return mesh.mapped(matrix, np.array(item.get("move", [0.0, 0, 0])))
+
+
+def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
+    """Return `count` dense samples of a mesh, its extreme vertices first; hinge and axis unknown.
+
+    Raises: InputError where the surface has no area.
+    """
+    points, face = sample_faces(mesh.vertices, mesh.faces, count, rng)
+    at = mesh.faces.ravel()
+    along = mesh.vertices[at]
+    corners = np.unique(np.concatenate([along.argmin(axis=0), along.argmax(axis=0)]))
+    face = np.concatenate([corners // 3, face])
+    normals, areas = face_normals(mesh.vertices, mesh.faces)
+    return Pool(
+        np.concatenate([along[corners], points]), normals[face], mesh.component[face], len(corners),
+        float(areas.sum()), np.full(3, np.nan), np.full(3, np.nan),
+    )  # fmt: skip
+
+
+def inside(points: np.ndarray, region: dict) -> np.ndarray:
+    """Return whether each point (N, 3) lies in a region's box or cylinder, borders included; shape (N,)."""
+    if "box" in region:
+        low, high = (
+            np.array([limit if value is None else value for value in corner], float)
+            for corner, limit in zip(region["box"], (-np.inf, np.inf), strict=True)
+        )
+        return ((points >= low) & (points <= high)).all(axis=1)
+    cylinder = region["cylinder"]
+    away = points - np.array(cylinder["centre"])
+    axis = "xyz".index(cylinder["axis"])
+    across = np.delete(away, axis, axis=1)
+    return (np.hypot(*across.T) <= cylinder["radius"]) & (abs(away[:, axis]) <= cylinder["half_length"])
+
+
+def cut(pool: Pool, mesh: Mesh, region: dict) -> tuple[Pool, Pool]:
+    """Return what of a body's pool lies in the region, and the rest.
+
+    With `whole: true` only connected components of `mesh` (the body's) all of whose vertices are inside.
+    """
+    if region.get("whole"):
+        outside = ~inside(mesh.vertices, region)[mesh.faces].all(axis=1)
+        partly = np.zeros(len(mesh.closed), bool)
+        partly[mesh.component[outside]] = True
+        mask = ~partly[pool.component]
+    else:
+        mask = inside(pool.points, region)
+    return pool.picked(mask), pool.picked(~mask)
+
+
+def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
+    """Return the pool with its hinge and unit axis, given by the record's part or found from its samples.
+
+    Found: the hinge is the mean of the samples, the axis their thinnest direction. Signs: a rotor turns
+    anticlockwise about the axis seen from above, a wheel rolls to the front, a wing rises, all at positive angles;
+    `sense: cw` turns a rotor's axis round. `up` and `front` (3,) are the target's, in the file's axes.
+    Raises: InputError naming `where` for too few samples to find an axis.
+    """
+    right = np.cross(front, up)
+    hinge, axis = part.get("hinge", "found"), part.get("axis", front.tolist() if part["kind"] == "wing" else "found")
+    centre = pool.points.mean(axis=0) if len(pool.points) else np.zeros(3)
+    hinge = centre if isinstance(hinge, str) else np.array(hinge, float)
+    if isinstance(axis, str):
+        if len(pool.points) < 4:
+            raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")
+        axis = np.linalg.eigh(np.cov((pool.points - centre).T))[1][:, 0]
+    axis = np.array(axis, float) / np.linalg.norm(axis)
+    if part["kind"] == "rotor":
+        axis = axis * np.sign(axis @ up or 1) * (-1 if part.get("sense") == "cw" else 1)
+    elif part["kind"] == "wheel":
+        axis = axis * -np.sign(axis @ right or 1)
+    else:
+        out = (centre - hinge) @ right
+        axis = axis * np.sign(np.cross(axis, out * right) @ up or 1)
+    return replace(pool, hinge=hinge, axis=axis)
