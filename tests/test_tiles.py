@@ -1,8 +1,8 @@
 """Images of spectra: the resampling kernel, the scales, the fused renderer, PNG and the command line."""
 
-import io
 import json
 import zipfile
+import zlib
 
 import numpy as np
 import pytest
@@ -19,12 +19,9 @@ from lowalt.tiles import (
     Images,
     Renderer,
     Scale,
-    colour_map,
     decode,
-    encode,
     files,
     join,
-    paint,
     resize,
     split,
     triangle,
@@ -228,26 +225,11 @@ def test_refusals_name_what_is_wrong():
             Images.from_settings({**IMAGES, **change})
 
 
-@settings(max_examples=20, deadline=None)
-@given(st.integers(1, 40), st.integers(1, 40), st.integers(0, 2**32 - 1))
-def test_png_gives_the_pixels_back(height, width, seed):
-    image = np.random.default_rng(seed).integers(0, 256, (height, width), np.uint8)
-    palette = colour_map("viridis")
-    data = encode(image, palette)
-    found, colours = decode(data)
-    np.testing.assert_array_equal(found, image)
-    np.testing.assert_array_equal(colours, palette)
-    with Image.open(io.BytesIO(data)) as picture:
-        np.testing.assert_array_equal(np.asarray(picture.convert("RGB")), paint(image, palette))
-
-
-def test_damaged_or_other_images_are_refused():
-    data = encode(np.arange(256, dtype=np.uint8).reshape(16, 16), colour_map("gray"))
-    gray = io.BytesIO()
-    Image.new("L", (4, 4)).save(gray, "PNG")
-    for bad in (b"", data[:60], data[:100] + b"\0" + data[101:], b"GIF89a", gray.getvalue()):
-        with pytest.raises(InputError, match="image"):
-            decode(bad)
+def test_pixels_of_a_signal_are_fixed():
+    """The renderer's pixels are a promise: equal on every machine and with every version of every library."""
+    steps = np.arange(1200, dtype=np.int64).reshape(3, 400)
+    signals = ((steps**3 % 257 - 128) + 1j * (steps**2 % 251 - 125)).astype(np.complex64)
+    assert zlib.crc32(renderer().tile(signals).tobytes()) == 4171406068
 
 
 @settings(max_examples=20, deadline=None)

@@ -1,7 +1,7 @@
-"""Palette PNG: 8-bit index images with their colour map, written by libdeflate, read back exactly.
+"""Palette PNG: 8-bit index images with their colour map, written small and fast, read back exactly.
 
-Every row has the sub filter (difference to the pixel on the left): spectra are smooth, so differences are small.
-libdeflate's level 1 gives the same bytes on every machine; other encoders follow the CPU.
+Spectra are resampled, so a pixel is nearly the plane through its neighbours: every row has the Paeth filter, and
+its differences an entropy code of our own (`lowalt.tiles.huffman`). Pixels, and bytes, are the same on every machine.
 """
 
 import io
@@ -12,6 +12,8 @@ import numpy as np
 from PIL import Image
 
 from lowalt.errors import InputError
+from lowalt.tiles import filters
+from lowalt.tiles.huffman import zlib_compress
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
@@ -23,19 +25,38 @@ def _chunk(name: bytes, body: bytes) -> bytes:
 def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
     """Return the PNG file of an index image (H, W) uint8 with a palette (256, 3) uint8.
 
-    Source: PNG specification (W3C, third edition), colour type 3, filter type 1.
+    Raises: InputError where the image is empty or not uint8.
+    Source: PNG specification (W3C, third edition), colour type 3, filter type 4.
     """
+    if image.dtype != np.uint8 or image.ndim != 2 or image.size == 0:
+        raise InputError(f"image: {image.dtype} {image.shape}, expected uint8 (H, W)")
     height, width = image.shape
     rows = np.empty((height, width + 1), np.uint8)
-    rows[:, 0] = 1
-    rows[:, 1] = image[:, 0]
-    np.subtract(image[:, 1:], image[:, :-1], out=rows[:, 2:])
+    filters.apply_paeth(image, rows)
     header = struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)
-    body = bytes(deflate.zlib_compress(rows, 1))
     colours = np.ascontiguousarray(palette).tobytes()
-    return SIGNATURE + b"".join(
-        _chunk(*part) for part in ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", body), (b"IEND", b""))
-    )
+    parts = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", zlib_compress(rows)), (b"IEND", b""))
+    return SIGNATURE + b"".join(_chunk(*part) for part in parts)
+
+
+def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
+    """Name and body of every chunk, checksums tested.
+
+    Raises: InputError where the bytes are no PNG, a checksum is wrong or the end is missing.
+    """
+    if data[:8] != SIGNATURE:
+        raise InputError("image: no PNG signature, expected a palette PNG")
+    view, place, found = memoryview(data), 8, []
+    while place + 12 <= len(data):
+        size = int.from_bytes(view[place : place + 4], "big")
+        end = place + 12 + size
+        if end > len(data) or deflate.crc32(view[place + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+            break
+        found.append((bytes(view[place + 4 : place + 8]), view[place + 8 : end - 4]))
+        if found[-1][0] == b"IEND":
+            return found
+        place = end
+    raise InputError(f"image: the PNG is damaged or cut off at byte {place}")
 
 
 def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
@@ -43,17 +64,26 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
 
     Raises: InputError where the bytes are no 8-bit palette PNG or are damaged.
     """
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            if image.format != "PNG" or image.mode != "P":
-                raise InputError(f"image: {image.format} {image.mode}, expected a palette PNG")
-            colours = image.getpalette("RGB")
-            pixels = np.array(image)
-    except (OSError, ValueError, SyntaxError, struct.error) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"image: not a PNG that can be read ({error})") from error
+    chunks = _chunks(data)
+    header = chunks[0][1] if chunks[0][0] == b"IHDR" and len(chunks[0][1]) == 13 else bytes(13)
+    width, height, depth, colour, _, _, interlace = struct.unpack(">IIBBBBB", header)
+    if (depth, colour) != (8, 3):
+        raise InputError(f"image: PNG of bit depth {depth} and colour type {colour}, expected an 8-bit palette PNG")
     palette = np.zeros((256, 3), np.uint8)
-    table = np.array(colours, np.uint8).reshape(-1, 3)
-    palette[: len(table)] = table
-    return pixels, palette
+    for name, body in chunks:
+        if name == b"PLTE":
+            table = np.frombuffer(body, np.uint8).reshape(-1, 3)
+            palette[: len(table)] = table
+    if interlace:
+        with Image.open(io.BytesIO(data)) as picture:
+            return np.array(picture), palette
+    packed = b"".join(body for name, body in chunks if name == b"IDAT")
+    try:
+        plain = deflate.zlib_decompress(packed, height * (width + 1))
+    except (deflate.DeflateError, ValueError) as error:
+        raise InputError(f"image: the PNG's pixels cannot be unpacked ({error})") from error
+    image = np.empty((height, width), np.uint8)
+    rows = np.frombuffer(plain, np.uint8)
+    if rows.size != height * (width + 1) or filters.undo(rows.reshape(height, width + 1), image) >= 0:
+        raise InputError("image: the PNG has too few pixels or an unknown filter")
+    return image, palette

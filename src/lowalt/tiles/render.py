@@ -13,7 +13,7 @@ from lowalt.errors import InputError
 from lowalt.network import SPEED_OF_LIGHT, Network
 from lowalt.spectra.settings import Spectra, windows
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
-from lowalt.tiles.resample import taps
+from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
 
@@ -22,55 +22,48 @@ VIEWS = ("vrp", "trp", "vt")
 
 
 @njit(cache=True)
-def _resample(values, source, weights, columns, shares, rows, out):
-    """Rows, then columns: values (points, starts) -> out (S, S); every sum runs in ascending order of its taps."""
-    size = out.shape[0]
-    starts = values.shape[1]
-    for j in range(size):
-        for t in range(starts):
-            rows[t] = weights[j, 0] * values[source[j, 0], t]
-        for k in range(1, weights.shape[1]):
-            w = weights[j, k]
-            line = values[source[j, k]]
-            for t in range(starts):
-                rows[t] += w * line[t]
-        line = out[j]
-        for c in range(size):
-            line[c] = shares[0, c] * rows[columns[0, c]]
-        for k in range(1, shares.shape[0]):
-            for c in range(size):
-                line[c] += shares[k, c] * rows[columns[k, c]]
+def _peak(values):
+    """The largest |value| of an image, as an array of one float32."""
+    bits = values.view(np.int32)
+    top = np.int32(0)
+    # Non-negative floats order like their bits, which keeps the search free of branches.
+    for j in range(bits.shape[0]):
+        row = bits[j]
+        for c in range(row.size):
+            top = max(top, row[c] & np.int32(0x7FFFFFFF))
+    peak = np.empty(1, np.int32)
+    peak[0] = top
+    return peak.view(np.float32)
 
 
 @njit(cache=True)
 def _index(values, signed, lowest, shift, base, cut, out):
     """Index values of one image (S, S) float32 -> out (S, S) uint8; see `lowalt.tiles.scale`."""
-    size = values.shape[0]
-    bits = values.view(np.int32)
-    top = np.int32(0)
-    # Non-negative floats order like their bits, which keeps the search for the largest free of branches.
-    for j in range(size):
-        for c in range(size):
-            top = max(top, bits[j, c] & np.int32(0x7FFFFFFF))
-    peak = np.empty(1, np.int32)
-    peak[0] = top
-    largest = peak.view(np.float32)[0]
-    if top == 0:
+    size = values.shape[1]
+    largest = _peak(values)[0]
+    if largest == 0:
         out[:] = 128 if signed else 0
         return
     x = np.empty(size, np.float32)
-    keys = x.view(np.int32)
-    for j in range(size):
+    bits = x.view(np.int32)
+    keys = np.empty(size, np.uint32)
+    steps = np.empty(size, np.int32)
+    for j in range(values.shape[0]):
+        line = values[j]
         row = out[j]
+        # Short loops over a row, which the compiler turns into vectors one by one.
         for c in range(size):
-            x[c] = np.abs(values[j, c]) / largest
+            x[c] = np.abs(line[c]) / largest
         for c in range(size):
-            key = np.uint32(max(keys[c] - lowest, 0) >> shift)
-            step = base[key] + np.int32(x[c] >= cut[key])
-            if signed:
-                row[c] = 128 - step if values[j, c] < 0 else 128 + step
-            else:
-                row[c] = step
+            keys[c] = max(bits[c] - lowest, np.int32(0)) >> shift
+        for c in range(size):
+            steps[c] = base[keys[c]] + np.int32(bits[c] >= cut[keys[c]])
+        if signed:
+            for c in range(size):
+                row[c] = 128 - steps[c] if line[c] < 0 else 128 + steps[c]
+        else:
+            for c in range(size):
+                row[c] = steps[c]
 
 
 class Renderer:
@@ -93,39 +86,43 @@ class Renderer:
             self._matched.append((np.cos(phase).astype(np.float32), np.sin(phase).astype(np.float32)))
         self._share = np.array([(length / (length + 1)) ** 2], np.float32)
         tables = {name: lookup(images.scale, 127 if name == "vt" else 255) for name in VIEWS}
-        self._lookup = {name: (t.lowest, t.shift, t.base, t.cut) for name, t in tables.items()}
+        self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in tables.items()}
         self._image = np.empty((images.size, images.size), np.float32)
 
     def _plan(self, name: str) -> tuple:
-        """Taps of one spectrum's rows and columns, its buffer of values and of one row."""
+        """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the axes' order."""
         setting = getattr(self.spectra, name)
         symbols, size = self.network.symbols, self.images.size
         count = windows(symbols, setting.window, setting.hop, name)
         points = len(setting.speeds_mps) if name == "vt" else setting.points
-        first, weights = taps(points, size)
+        source, weights = row_taps(points, size)
         # Row 0 is the most positive value, so rows count down; FFT rows start at frequency zero.
-        source = points - 1 - (first[:, None] + np.arange(weights.shape[1]))
+        source = points - 1 - source
         if name != "vt":
             source = (source + points // 2) % points
-        left, shares = taps(count, size)
-        columns = (left[:, None] + np.arange(shares.shape[1])) * setting.hop
+        columns, shares = column_taps(count, size, setting.hop)
         starts = (count - 1) * setting.hop + 1
-        return (
-            np.ascontiguousarray(source), weights.astype(np.float32),
-            np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(shares.T.astype(np.float32)),
-            np.empty((points, starts), np.float32), np.empty(starts, np.float32),
-        )  # fmt: skip
+        # Rows that become fewer go first, so that there is less to do along time.
+        rows_first = points > size
+        between = np.empty((size, starts) if rows_first else (points, size), np.float32)
+        values = np.empty((points, starts), np.float32)
+        return source, weights, columns, shares, values, between, rows_first
 
     def values(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
         """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,)."""
         re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
-        source, weights, columns, shares, values, row = self._plans[name]
+        source, weights, columns, shares, values, between, rows_first = self._plans[name]
         if name == "vt":
             transfer(re, im, self.spectra.vt.window, *self._matched[station], self._share, values)
         else:
             setting = getattr(self.spectra, name)
             fourier_magnitudes(re, im, setting.window, setting.points, *self._fourier[name], values)
-        _resample(values, source, weights, columns, shares, row, out)
+        if rows_first:
+            across_rows(values, source, weights, between)
+            along_rows(between, columns, shares, out)
+        else:
+            along_rows(values, columns, shares, between)
+            across_rows(between, source, weights, out)
 
     def tile(self, signals: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, 3 S) uint8.

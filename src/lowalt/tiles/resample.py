@@ -10,6 +10,7 @@ calls BILINEAR and what PyTorch computes with `antialias=True`.
 from functools import lru_cache
 
 import numpy as np
+from numba import njit
 
 from lowalt.errors import InputError
 
@@ -48,17 +49,79 @@ def taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
     return first, weights
 
 
+def row_taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps) float32."""
+    first, weights = taps(size, out)
+    return np.ascontiguousarray(first[:, None] + np.arange(weights.shape[1])), weights.astype(np.float32)
+
+
+def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares float32."""
+    first, weights = taps(size, out)
+    weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
+    columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
+    # Unsigned indices spare the compiled loop the test for negative ones.
+    return np.ascontiguousarray(columns.T.astype(np.uintp)), np.ascontiguousarray(weights.T.astype(np.float32))
+
+
+@njit(cache=True)
+def along_rows(values, columns, shares, out):
+    """The last axis: values (rows, n) -> out (rows, S).
+
+    columns, shares: (taps, S), an even number of taps, which are summed two by two, in order.
+    """
+    for j in range(out.shape[0]):
+        row = values[j]
+        line = out[j]
+        for c in range(line.size):
+            line[c] = shares[0, c] * row[columns[0, c]] + shares[1, c] * row[columns[1, c]]
+        for k in range(2, shares.shape[0], 2):
+            for c in range(line.size):
+                line[c] += shares[k, c] * row[columns[k, c]] + shares[k + 1, c] * row[columns[k + 1, c]]
+
+
+@njit(cache=True)
+def across_rows(values, source, weights, out):
+    """The first axis: values (points, n) -> out (S, n); source, weights: (S, taps), summed in order."""
+    for j in range(out.shape[0]):
+        line = out[j]
+        first = values[source[j, 0]]
+        for t in range(line.size):
+            line[t] = weights[j, 0] * first[t]
+        for k in range(1, weights.shape[1]):
+            w = weights[j, k]
+            row = values[source[j, k]]
+            for t in range(line.size):
+                line[t] += w * row[t]
+
+
+@njit(cache=True)
+def _resize(images, source, weights, columns, shares, out):
+    """(n, S, S) uint8 -> out (n, size, size) uint8, rows first, rounded half up at the end."""
+    between = np.empty((out.shape[1], images.shape[2]), np.float32)
+    values = np.empty(out.shape[1:], np.float32)
+    plain = np.empty(images.shape[1:], np.float32)
+    for n in range(len(images)):
+        plain[:] = images[n]
+        across_rows(plain, source, weights, between)
+        along_rows(between, columns, shares, values)
+        for j in range(values.shape[0]):
+            for c in range(values.shape[1]):
+                out[n, j, c] = np.int32(values[j, c] + np.float32(0.5))
+
+
 def resize(images: np.ndarray, size: int) -> np.ndarray:
     """Return index images at another size: (..., S, S) uint8 -> (..., size, size) uint8.
 
-    Values are index values, before the colour map: both axes by `triangle`, float32, one rounding at the end
-    (half up). Raises: InputError where the images are not square uint8.
+    Values are index values, before the colour map: both axes by `triangle`, in float32 and one fixed order, rounded
+    once at the end (half up). Raises: InputError where the images are not square uint8.
     """
     images = np.asarray(images)
     if images.dtype != np.uint8 or images.ndim < 2 or images.shape[-1] != images.shape[-2]:
         raise InputError(f"resize: images {images.dtype} {images.shape}, expected uint8 (..., S, S)")
     if images.shape[-1] == size:
         return images.copy()
-    weights = triangle(images.shape[-1], size).astype(np.float32)
-    values = weights @ images.astype(np.float32) @ weights.T
-    return (values + np.float32(0.5)).astype(np.uint8)
+    stack = np.ascontiguousarray(images).reshape(-1, *images.shape[-2:])
+    out = np.empty((len(stack), size, size), np.uint8)
+    _resize(stack, *row_taps(images.shape[-1], size), *column_taps(images.shape[-1], size), out)
+    return out.reshape(*images.shape[:-2], size, size)

@@ -64,8 +64,8 @@ class Lookup:
     `cut[key]` is the one inside it (2 where there is none).
     """
 
-    lowest: int
-    shift: int
+    lowest: np.int32
+    shift: np.int32
     base: np.ndarray
     cut: np.ndarray
 
@@ -79,6 +79,7 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     bits = thresholds.view(np.int32)
     top = int(np.float32(1).view(np.int32))
     lowest = int(np.float32(2.0 ** np.floor(np.log2(thresholds[0]))).view(np.int32))
+    shift, keys = 0, bits
     for mantissa in range(6, 24):
         shift = 23 - mantissa
         keys = (bits - lowest) >> shift
@@ -88,4 +89,4 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     base = np.searchsorted(keys, np.arange(count), side="left").astype(np.int32)
     cut = np.full(count, 2, np.float32)
     cut[keys] = thresholds
-    return Lookup(lowest, shift, base, cut)
+    return Lookup(np.int32(lowest), np.int32(shift), base, cut)
