@@ -92,6 +92,50 @@ def test_wrong_figures_are_refused(tmp_path, written, figure, message):
         load(tmp_path, {"Crow": record})
 
 
+@pytest.mark.parametrize(
+    ("name", "figure", "value", "message"),
+    [
+        (
+            "DJI Mini 4 Pro",
+            "spacing_ratio",
+            [1.5, 1, "estimate"],
+            r"propeller_diameter is 0\.1524 m, expected less than",
+        ),
+        ("DJI Avata", "motor_diagonal", [30, "cm", "maker"], r"motor diagonal is 0\.3 m in a craft of 0\.2048 m"),
+        ("EH 216 S", "propeller_diameter", [6, "m", "estimate"], r"motor diagonal is -0\.7296 m"),
+        ("Wild goose", "neck", [0.7, 1, "estimate"], r"add up to 1\.06 of the length"),
+        ("Owl", "wrist", [1.2, 1, "estimate"], r"figures\.wrist is 1\.2, expected 0\.1 to 0\.9"),
+        ("Owl", "span", [10, "cm", "reference"], r"figures\.span is 0\.1 m"),
+        ("Audi A6L 2019", "wheel_base", [4.5, "m", "maker"], r"are 5\.41 m, expected less than the length, 5\.0 m"),
+        ("Audi A6L 2019", "track", [2, "m", "maker"], r"figures\.track is 2 m"),
+        ("Audi A6L 2019", "roof_rear", [0.3, 1, "estimate"], r"expected rising from 0\.18 to 1"),
+        ("Audi A6L 2019", "hood_height", [0.9, 1, "estimate"], r"expected rising and below 1"),
+    ],
+)
+def test_impossible_shapes_are_refused(tmp_path, written, name, figure, value, message):
+    record = copy.deepcopy(written[name])
+    record["figures"][figure] = value
+    with pytest.raises(InputError, match=rf"mine\.yaml: {name}: .*{message}"):
+        load(tmp_path, {name: record})
+
+
+def test_layouts_that_do_not_fit_the_craft_are_refused(tmp_path, written):
+    quad = written["Type-A Firefighting UAV"]
+    with pytest.raises(InputError, match=r"model is tanker, which has 4 rotors, expected one of 6"):
+        load(tmp_path, {"DJI Matrice 600 Pro": quad})
+    with pytest.raises(InputError, match=r"coaxial is True, expected it with model cabin only, not tanker"):
+        load(tmp_path, {"Type-A Firefighting UAV": quad | {"coaxial": True}})
+    with pytest.raises(InputError, match=r"size_is is 'span over ducts', expected model ducted, not tanker"):
+        load(tmp_path, {"Type-A Firefighting UAV": quad | {"size_is": "span over ducts"}})
+
+
+def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
+    with pytest.raises(InputError, match="points is 8, expected more than one for each of 8 blades"):
+        load(tmp_path, {"DJI Mini 2": written["DJI Mini 2"] | {"points": 8}})
+    with pytest.raises(InputError, match="points is 4, expected at least one for each of 5 parts"):
+        load(tmp_path, {"Owl": written["Owl"] | {"points": 4}})
+
+
 def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected one of"):
         load(tmp_path, {"Dodo": {"source": "builtin"}})

@@ -20,7 +20,7 @@ from lowalt.targets.dimensions import rows as dimension_rows
 from lowalt.targets.gallery import main as gallery
 from lowalt.targets.records import load_table, merge, read_records, slug
 from lowalt.targets.surfaces import inside
-from lowalt.targets.uav import hubs, motor_diagonal
+from lowalt.targets.uav_pieces import hubs, motor_diagonal
 
 CONFIG = Path(__file__).parents[1] / "config"
 TABLE = load_table(CONFIG / "targets.csv")
@@ -248,9 +248,11 @@ def test_allotment_gives_moving_parts_their_share_in_whole_blades():
         assert all(count % part.copies == 0 and count >= part.copies for part, count in zip(parts, counts, strict=True))
 
 
-def test_too_few_points_are_refused():
-    with pytest.raises(InputError, match="8 points for 5 parts leave none for the body"):
-        variant("DJI Mini 2", points=8)
+def test_a_count_that_leaves_no_body_is_refused():
+    parts, _ = MODULES["UAV"].parts(RECORDS["DJI Mini 2"])
+    with pytest.raises(InputError, match="15 points for 5 parts leave none for the body"):
+        allot(parts, 15, 0.99)
+    assert allot(parts, 9, 0.4) == [1, 2, 2, 2, 2]
 
 
 @pytest.mark.parametrize("points", [20, 1000])

@@ -27,6 +27,21 @@ FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fo
 MOVING_SHARE = 0.62
 
 
+def fault(record: dict) -> str | None:
+    """Return what makes a merged record no bird, or None."""
+    f = {name: value["si"] for name, value in record["figures"].items()}
+    long = f["bill"] + f["head"] + f["neck"] + f["tail"]
+    if long > 0.9:
+        return f"figures bill, head, neck and tail add up to {long:.3g} of the length, expected at most 0.9"
+    if f["span"] / f["length"] <= 2 * f["body_width"]:
+        return f"figures.span is {f['span']:.3g} m, expected more than twice the body's width"
+    if not 0.1 <= f["wrist"] <= 0.9:
+        return f"figures.wrist is {f['wrist']}, expected 0.1 to 0.9 of the wing"
+    if record["points"] < 5:
+        return f"points is {record['points']}, expected at least one for each of 5 parts"
+    return None
+
+
 def _bill(front: float, root: float, depth: float) -> Surface:
     """The bill from its `root` (y) to its tip at y = `front`, a little hooked; `depth` is its height at the root."""
     sections = []

@@ -84,7 +84,10 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     resolved = {
         name: _figure(value, wanted[name], sources, f"{where}: figures.{name}") for name, value in figures.items()
     }
-    return merged | {"figures": resolved, "moving_share": share}
+    result = merged | {"figures": resolved, "moving_share": share}
+    if fault := MODULES[category].fault(result):
+        raise InputError(f"{where}: {fault}")
+    return result
 
 
 def record_files(record: dict) -> list[str]:

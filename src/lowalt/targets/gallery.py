@@ -8,6 +8,7 @@ import numpy as np
 from lowalt.command import run
 from lowalt.files import replacing
 from lowalt.targets.cloud import CATEGORIES, Cloud, read
+from lowalt.targets.skeleton import NODES, PARENTS
 
 COLUMNS = 5
 VIEWS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
@@ -52,6 +53,11 @@ def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
     """Draw one cloud into matplotlib axes in metres, `shift` (m) to the right, nearer points in front."""
     seen = shown(cloud)
     order = np.argsort(seen[:, 2])
+    # Nodes of a skeleton are told apart by the bones between them.
+    for node, parent in enumerate(PARENTS if cloud.names == NODES else ()):
+        if parent >= 0:
+            x, y = seen[[node, parent], :2].T
+            axes.plot(x + shift, y, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
     axes.scatter(seen[order, 0] + shift, seen[order, 1], c=colours(cloud)[order], s=size, linewidths=0)
 
 
@@ -61,7 +67,7 @@ def _lineup(axes, clouds: list[Cloud]) -> None:
     gap = 0.12 * widths.mean()
     middles = np.cumsum(widths + gap) - widths / 2
     for cloud, middle in zip(clouds, middles, strict=True):
-        draw(axes, cloud, 1.6, middle)
+        draw(axes, cloud, float(np.clip(200 / len(cloud.points), 1.6, 6)), middle)
     low = min(shown(cloud)[:, 1].min() for cloud in clouds)
     bar = 10 ** np.floor(np.log10(widths.max()))
     axes.plot([0, bar], [low - gap, low - gap], color="black", linewidth=1.2)
@@ -75,7 +81,7 @@ def _panel(axes, cloud: Cloud, aspect: float) -> None:
     """One cloud filling its panel, which is `aspect` times as high as wide."""
     width, height = np.ptp(shown(cloud), axis=0)[:2]
     half = max(width, height / aspect) / 2 * 1.06
-    draw(axes, cloud, 9.0)
+    draw(axes, cloud, float(np.clip(1400 / len(cloud.points), 5, 22)))
     axes.set(xlim=(-half, half), ylim=(-half * aspect, half * aspect), xticks=[], yticks=[], aspect="equal")
     size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
     axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {cloud.record['source']}, {size} m", fontsize=7)
@@ -91,7 +97,7 @@ def figure(clouds: list[Cloud]):
     rows = [-(-len(members) // COLUMNS) for members in groups]
     spans = [np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members]) for members in groups]
     # Every panel of a category has the same shape, that of its tallest cloud.
-    aspects = [float(np.clip((span[:, 1] / span[:, 0]).max(), 0.3, 2.0)) for span in spans]
+    aspects = [float(np.clip((span[:, 1] / span[:, 0]).max(), 0.3, 1.3)) for span in spans]
     lineups = [min(3.0, 2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum()) + 0.5 for span in spans]
     panels = [2.6 * aspect + 0.45 for aspect in aspects]
     heights = [top + panel * count for top, panel, count in zip(lineups, panels, rows, strict=True)]

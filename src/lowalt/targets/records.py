@@ -160,10 +160,12 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
 
 
 def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[str]:
-    """Return one line for each file that a record names and the folder `inputs` lacks: subtype, source and path."""
+    """Return one line for each file that a record names and the folder `inputs` lacks: subtype, source, path and where
+    a user gets it."""
     lines = []
     for name, record in records.items():
         for file in _source(record["source"]).record_files(record):
             if inputs is None or not (Path(inputs) / file).is_file():
-                lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'})")
+                get = f"; get it from {record['where']}" if "where" in record else ""
+                lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}")
     return lines

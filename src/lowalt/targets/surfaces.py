@@ -52,7 +52,7 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     near = np.flatnonzero(((points > low) & (points < high)).all(1))
     corners = surface.vertices[surface.faces]
     # Blocks bound the memory of the points-by-triangles arrays.
-    for block in np.array_split(near, len(near) * len(corners) // 500_000 + 1):
+    for block in np.array_split(near, len(near) * len(corners) // 30_000 + 1):
         a, b, c = np.moveaxis(corners[None] - points[block, None, None], 2, 0)
         la, lb, lc = (np.sqrt(np.einsum("...i,...i->...", v, v)) for v in (a, b, c))
         numerator = np.einsum("...i,...i->...", a, np.cross(b, c))

@@ -11,12 +11,14 @@ from lowalt.targets.cloud import Cloud, read
 
 
 def summary(cloud: Cloud) -> str:
-    """Return one line on a cloud: subtype, source, points, extent in metres, parts and normals."""
+    """Return one line on a cloud: subtype, source, points beside the published count, extent, parts, normals."""
     kinds = [f"{len(cloud.parts_of(kind))} {kind}" for kind in dict.fromkeys(cloud.kinds)]
     extent = " x ".join(f"{value:.3f}" for value in np.ptp(cloud.points, axis=0))
     normals = np.isfinite(cloud.normals).all(1).mean()
+    published = cloud.record.get("published", {}).get("points_in_published_cloud_approx", "unknown")
     return (
-        f"{cloud.subtype} ({cloud.category}, {cloud.record['source']}): {len(cloud.points)} points, {extent} m, "
+        f"{cloud.subtype} ({cloud.category}, {cloud.record['source']}): {len(cloud.points)} points "
+        f"(published: {published}), {extent} m, "
         f"{', '.join(kinds)}, normals on {normals:.0%}, checksum {cloud.record['checksum'][:12]}"
     )
 

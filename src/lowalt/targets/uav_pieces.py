@@ -1,0 +1,103 @@
+"""Pieces that multirotor layouts share: where rotors stand, propellers, motors, fuselage, gimbal and skids.
+
+Axes: front +y, right +x, up +z, metres. `figure` is a record's figures in SI units by name.
+"""
+
+import numpy as np
+
+from lowalt.targets.assemble import Part
+from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tube
+
+
+def motor_diagonal(record: dict) -> float:
+    """Return the largest distance between motor axes (m) that gives the craft its published size."""
+    size, figure = record["published"]["size_m"], record["figures"]
+    if record["size_is"] == "span over ducts":
+        return figure["motor_diagonal"]["si"]
+    if record["size_is"] == "span over rotors":
+        return size - figure["propeller_diameter"]["si"]
+    return size
+
+
+def hubs(record: dict, ratio: float | None) -> np.ndarray:
+    """Return the motor axes' places (R, 2) in plan (m), counted anticlockwise seen from above.
+
+    With a `ratio` (lateral over longitudinal spacing) four at the corners of a rectangle, else evenly on a circle
+    with the front between two of them.
+    """
+    reach = motor_diagonal(record) / 2
+    count = record["published"]["n_rotors_or_wings"]
+    if ratio is not None:
+        half = np.arctan(ratio)
+        angle = np.pi / 2 + np.array([-half, half, np.pi - half, np.pi + half])
+    else:
+        angle = np.pi / 2 + 2 * np.pi * (np.arange(count) - 0.5) / count
+    return reach * np.stack([np.cos(angle), np.sin(angle)], 1)
+
+
+def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
+    """Return one propeller blade along +x for a rotor turning anticlockwise (leading edge at +y), hub at the origin.
+
+    Twist follows a constant pitch of two thirds of the diameter, chord is largest at 0.35 of the radius.
+    """
+    stations = np.array([root, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
+    chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
+    twist = np.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
+    return foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
+
+
+def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
+    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, first blade square to its arm."""
+    shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
+    if sense < 0:
+        shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
+    out = np.arctan2(hub[1], hub[0]) + np.pi / 2
+    turn = np.array([[np.cos(out), -np.sin(out), 0], [np.sin(out), np.cos(out), 0], [0, 0, 1]])
+    axis = (0.0, 0.0, float(sense))
+    return Part(name, "rotor", (shell.mapped(turn).moved(hub),), tuple(hub), axis, copies=int(figure["blade_count"]))
+
+
+def rotors(places: np.ndarray, height: float, figure: dict, gap: float = 0.0) -> list[Part]:
+    """Return the rotors on the motor axes (R, 2) at `height`; neighbours turn in opposite senses.
+
+    With a `gap` (m) each axis carries a coaxial pair, the lower one turning against the upper.
+    """
+    parts = []
+    for index, (x, y) in enumerate(places):
+        sense = 1 if index % 2 == 0 else -1
+        parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure))
+        if gap:
+            parts.append(rotor(f"rotor {index + 1} lower", np.array([x, y, height - gap]), -sense, figure))
+    return parts
+
+
+def motors(places: np.ndarray, top: float, figure: dict) -> list[Surface]:
+    """Return the motor cans under the rotors (R, 2), reaching up to `top`."""
+    low, radius = top - figure["motor_height"], figure["motor_diameter"] / 2
+    return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in places]
+
+
+def fuselage(figure: dict, taper: float = 0.55) -> Surface:
+    """Return a slender fuselage along y, blunt at the nose and tapering to the tail."""
+    length, width, height = figure["body_length"], figure["body_width"], figure["body_height"]
+    stations = [(0.5, 0.62, -0.25, 0.28), (0.42, 0.85, -0.42, 0.42), (0.1, 1, -0.5, 0.5), (-0.3, 0.95, -0.5, 0.46),
+                (-0.5, taper, -0.3, 0.3)]  # fmt: skip
+    return hull([(y * length, w * width / 2, a * height, b * height) for y, w, a, b in stations], exponent=3.2)
+
+
+def camera(figure: dict, y: float, z: float) -> list[Surface]:
+    """Return a gimbal: a ball with its lens, hung from a short bar at (0, y, z)."""
+    d = figure["camera_diameter"]
+    lens = cylinder(d * 0.28, (0, y + 0.3 * d, z), (0, y + 0.62 * d, z))
+    return [ellipsoid((d / 2, d / 2, d / 2), (0, y, z)), lens, cylinder(d * 0.12, (0, y, z), (0, y, z + 0.9 * d), 8)]
+
+
+def skids(half_track: float, length: float, top: float, bottom: float, radius: float) -> list[Surface]:
+    """Return two landing skids: inclined struts from the body to runners along y."""
+    shells = []
+    for side in (-1, 1):
+        foot = side * half_track
+        shells.append(tube([(foot, -length / 2, bottom + radius), (foot, length / 2, bottom + radius)], radius, 8))
+        for y in (-0.28 * length, 0.28 * length):
+            shells.append(tube([(0.4 * foot, 0.7 * y, top), (foot, y, bottom + radius)], radius, 8))
+    return shells
