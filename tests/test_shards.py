@@ -21,7 +21,7 @@ from lowalt.shards.__main__ import main
 from lowalt.shards.record import geometry, record, sample_key, snr_label
 from lowalt.shards.table import map_samples
 from lowalt.splits import fold
-from lowalt.tiles import decode, encode, files, split
+from lowalt.tiles import decode, encode, files, resize, split
 from test_tiles import IMAGES, NETWORK, SPECTRA, echoes, renderer
 
 RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
@@ -306,3 +306,15 @@ def test_wrong_input_is_refused_by_name(images, tmp_path):
         ShardSet(images / "index.json", ["seen"], ["tests"])
     with pytest.raises(InputError, match="expected one of"):
         main(["pack"])
+
+
+def test_stations_and_views_are_selected_alike_from_both_kinds(images, signals):
+    for folder in (images, signals):
+        shards = ShardSet(folder / "index.json")
+        whole = shards.images(3)
+        np.testing.assert_array_equal(shards.images(3, stations=["B"]), whole[3:6])
+        np.testing.assert_array_equal(shards.images(3, stations=["C", "A"], views=["vt"]), whole[[8, 2]])
+        np.testing.assert_array_equal(shards.images(3, size=64, views=["trp"]), resize(whole[[1, 4, 7]], 64))
+        assert shards.images(3, size=224).shape == (9, 224, 224)
+        with pytest.raises(InputError, match="'D'"):
+            shards.images(3, stations=["D"])

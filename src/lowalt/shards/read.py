@@ -21,7 +21,8 @@ from lowalt.shards.table import map_samples, table_path
 from lowalt.spectra import Spectra
 from lowalt.splits import FOLDS
 from lowalt.tiles.png import decode
-from lowalt.tiles.render import Renderer, split
+from lowalt.tiles.render import VIEWS, Renderer, split
+from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
 
 
@@ -169,12 +170,36 @@ class ShardSet:
             return self.renderer.tile(self.signal(number))
         return decode(self.png(number))[0]
 
-    def images(self, number: int) -> np.ndarray:
+    def images(
+        self,
+        number: int,
+        size: int | None = None,
+        stations: Iterable[str] | None = None,
+        views: Iterable[str] | None = None,
+    ) -> np.ndarray:
         """Return the images of a sample, (9, S, S) uint8: station by station, VRP, TRP, VT.
 
-        Raises: InputError naming shard and sample where it is damaged.
+        size: pixels a side, by the project's one resampling kernel; stations, views: names to keep, in their own
+        order (signal shards then compute nothing else). Raises: InputError naming an unknown station or view, or
+        shard and sample where it is damaged.
         """
-        return split(self.tile(number))
+        numbers = self.columns(stations, views)
+        if self.kind == "signal":
+            images = self.renderer.some(self.signal(number), numbers)
+        else:
+            images = split(self.tile(number))[numbers]
+        return images if size in (None, images.shape[-1]) else resize(images, size)
+
+    def columns(self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None) -> list[int]:
+        """Return the numbers, among the nine images, of some stations and views (all by default).
+
+        Raises: InputError naming an unknown one.
+        """
+        known = list(self.index["render"]["network"]["stations"])
+        stations, views = list(known if stations is None else stations), list(VIEWS if views is None else views)
+        if set(stations) - set(known) or set(views) - set(VIEWS):
+            raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(VIEWS)}")
+        return [3 * known.index(station) + VIEWS.index(view) for station in stations for view in views]
 
     def _need(self, kind: str) -> None:
         if self.kind != kind:

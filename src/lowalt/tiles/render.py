@@ -6,6 +6,8 @@ two, which changes no digit and keeps its squares inside float32; images are sca
 so nothing is lost.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from numba import njit
 
@@ -124,25 +126,48 @@ class Renderer:
             along_rows(values, columns, shares, between)
             across_rows(between, source, weights, out)
 
+    def check(self, signals: np.ndarray) -> None:
+        """Refuse signals that are not (stations, symbols) of this network, or not finite.
+
+        Raises: InputError naming the shape.
+        """
+        shape = (len(self.network.stations), self.network.symbols)
+        if np.shape(signals) != shape:
+            raise InputError(f"tile: signals have shape {np.shape(signals)}, expected {shape}")
+        if not np.isfinite(signals).all():
+            raise InputError("tile: signals have a NaN or infinite value")
+
+    def image(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
+        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,)."""
+        self.values(signal, station, name, self._image)
+        _index(self._image, name == "vt", *self._lookup[name], out)
+
     def tile(self, signals: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
         """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, 3 S) uint8.
 
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
+        self.check(signals)
         stations, size = len(self.network.stations), self.images.size
-        if np.shape(signals) != (stations, self.network.symbols):
-            raise InputError(
-                f"tile: signals have shape {np.shape(signals)}, expected {(stations, self.network.symbols)}"
-            )
-        if not np.isfinite(signals).all():
-            raise InputError("tile: signals have a NaN or infinite value")
         out = np.empty((stations * size, len(VIEWS) * size), np.uint8) if out is None else out
         for station in range(stations):
             signal = normalised(signals[station])
             for view, name in enumerate(VIEWS):
-                self.values(signal, station, name, self._image)
                 part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
-                _index(self._image, name == "vt", *self._lookup[name], part)
+                self.image(signal, station, name, part)
+        return out
+
+    def some(self, signals: np.ndarray, numbers: Sequence[int]) -> np.ndarray:
+        """Return images of one sample by number, 3 station + view: (stations, symbols) -> (n, S, S) uint8.
+
+        They are those of `tile`, and only these are computed.
+        Raises: InputError where the shape does not fit the network or a value is not finite.
+        """
+        self.check(signals)
+        out = np.empty((len(numbers), self.images.size, self.images.size), np.uint8)
+        for place, number in enumerate(numbers):
+            station, view = divmod(int(number), len(VIEWS))
+            self.image(normalised(signals[station]), station, VIEWS[view], out[place])
         return out
 
 
