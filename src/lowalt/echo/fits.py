@@ -56,26 +56,48 @@ def folding() -> np.ndarray:
     return result
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
 def economised(weights, rates, phase, centre, half, degree, fold, out):
-    """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s."""
-    top = degree + EXTRA
-    taylor = np.zeros(top + 1)
-    for i in range(len(weights)):
+    """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s.
+
+    Rates are not negative.
+    """
+    count = len(weights)
+    term, even, odd = np.empty(count), np.empty(count), np.empty(count)
+    for i in range(count):
         angle = rates[i] * centre + phase
-        step = rates[i] * half
-        c, s = math.cos(angle), math.sin(angle)
-        term = weights[i]
-        for p in range(top + 1):
-            if p:
-                term *= step / p
-            q = p & 3
-            taylor[p] += term * (c if q == 0 else -s if q == 1 else -c if q == 2 else s)
-    for k in range(degree + 1):
-        value = taylor[k]
-        for j in range(EXTRA):
-            value += fold[degree, j, k] * taylor[degree + 1 + j]
-        out[k] = value
+        term[i], even[i], odd[i] = weights[i], math.cos(angle), -math.sin(angle)
+    out[:] = 0.0
+    for p in range(degree + EXTRA + 1):
+        value = 0.0
+        sign = -1.0 if p & 2 else 1.0
+        step = half / (p + 1)
+        if p & 1:
+            for i in range(count):
+                value += term[i] * odd[i]
+                term[i] *= rates[i] * step
+        else:
+            for i in range(count):
+                value += term[i] * even[i]
+                term[i] *= rates[i] * step
+        value *= sign
+        if p <= degree:
+            out[p] += value
+        else:
+            for k in range(degree + 1):
+                out[k] += fold[degree, p - degree - 1, k] * value
+
+
+def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same sum of cosines with rates +-r joined: only rates >= 0, largest first."""
+    order = np.argsort(-rates, kind="stable")
+    weights, rates = weights[order], rates[order]
+    keep = (len(rates) + 1) // 2
+    weights = 2 * weights[:keep]
+    if len(rates) % 2:
+        weights[-1] /= 2
+        rates = np.append(rates[: keep - 1], 0.0)
+    return weights, np.ascontiguousarray(rates[:keep])
 
 
 @lru_cache(maxsize=64)
@@ -90,7 +112,7 @@ def cell_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
     off = np.sqrt(k**2 * (count**2 - k**2) / (4.0 * (4.0 * k**2 - 1.0)))
     values, vectors = np.linalg.eigh(np.diag(off, 1) + np.diag(off, -1))
     weights = vectors[0] ** 2
-    return weights / weights.sum(), 2 * np.pi / count * values
+    return _half(weights / weights.sum(), 2 * np.pi / count * values)
 
 
 CELL_REACH = 4.0
@@ -102,7 +124,7 @@ def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, n
     """Weights (of sum 1) and rates (rad per unit of direction cosine) of U_{T-1} U_{R-1} / (T R) as a cosine sum."""
     weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
     top = transmit + receive - 2
-    return weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1))
+    return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
 
 
 @lru_cache(maxsize=1024)

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.echo import fast
 from lowalt.echo.fits import folding
-from lowalt.echo.lanes import TILE
+from lowalt.echo.lanes import ROW
 from lowalt.echo.layout import layout
 from lowalt.echo.motion import Scene
 from lowalt.echo.plan import SPREAD_LIMIT, Plan, plan, rules
@@ -59,8 +59,9 @@ def _run(scene, lay, radar, refs, span, symbols, aims, chosen: Plan, final: bool
     table = rules(radar)
     segs = np.empty((len(symbols), 8))
     count = segments(span, radar.cells, table[1][0], table[3][0], LONGEST, segs)
-    work = np.empty((6, TILE))
-    small = np.empty((10, TILE), np.float32 if chosen.single else np.float64)
+    # Separate arrays of odd length: rows of one array would be views, a counted reference each time they are passed.
+    work = tuple(np.empty(ROW) for _ in range(6))
+    small = tuple(np.empty(ROW, np.float32 if chosen.single else np.float64) for _ in range(10))
     fast.run(
         scene, lay, radar, refs, span, segs[:count], symbols, aims, table, chosen.fits, folding(),
         (chosen.fit, chosen.share, chosen.peak, float(final)), work, small, tuple(found),

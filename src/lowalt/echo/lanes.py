@@ -2,7 +2,9 @@
 
 A tile's arrays stay in the first-level cache. Every smooth factor is a polynomial whose degree the plan has chosen
 by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
-Sums may be reordered and products fused; nothing here depends on the order of roundings.
+Sums may be reordered and products fused; nothing here depends on the order of roundings. Places in arrays are
+unsigned: a signed one may be negative, and Python's wrap-around of those would keep the loops from being vectors;
+views of arrays would do as well, but cost a counted reference each.
 """
 
 import numpy as np
@@ -10,7 +12,9 @@ from numba import njit
 
 FLAGS = {"contract", "reassoc", "nsz"}
 TILE = 512
-"""Points in a tile: some twenty arrays of 4 kB fit the first-level cache."""
+"""Points in a tile: some twenty arrays of 4 kB stay in the nearest caches."""
+ROW = TILE + 24
+"""Room for a tile's array: rows a whole 4096 bytes apart would make loads wait for unrelated stores."""
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
@@ -46,11 +50,12 @@ def horner(x, c, degree, out, size):
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def place_part(px, py, pz, low, high, m, at, ex, ey, ez):
-    """Fill the tile from `at` with points low..high of a part; m: 12 numbers, matrix rows then offset, per r_ref."""
+def place_part(px, py, pz, low, size, m, ex, ey, ez, at):
+    """Fill offsets ex, ey, ez from `at` with `size` points of a part from `low`; m: 12 numbers, matrix rows then offset, per r_ref."""
     m0, m1, m2, m3, m4, m5 = m[0], m[1], m[2], m[3], m[4], m[5]
     m6, m7, m8, m9, m10, m11 = m[6], m[7], m[8], m[9], m[10], m[11]
-    for l in range(high - low):
+    at, low = np.uint64(at), np.uint64(low)
+    for l in range(np.uint64(size)):
         x, y, z = px[low + l], py[low + l], pz[low + l]
         ex[at + l] = m0 * x + m1 * y + m2 * z + m9
         ey[at + l] = m3 * x + m4 * y + m5 * z + m10
@@ -58,33 +63,36 @@ def place_part(px, py, pz, low, high, m, at, ex, ey, ez):
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def relative_excess(ex, ey, ez, at, size, hx, hy, hz, eps):
+def relative_excess(ex, ey, ez, hx, hy, hz, eps, at, size):
     """eps = r^2 / r_ref^2 - 1 from offsets per r_ref and twice the unit vector (hx, hy, hz) to the reference."""
-    for l in range(at, at + size):
+    at = np.uint64(at)
+    for i in range(np.uint64(size)):
+        l = at + i  # noqa: E741
         eps[l] = ex[l] * (hx + ex[l]) + ey[l] * (hy + ey[l]) + ez[l] * (hz + ez[l])
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def arguments(at, size, k, eps, inverse, excess, ey, ez, amplitude, first, psi, omega, u, turn, amp):
+def arguments(k, s, ey, ez, eps, inverse, excess, amplitude, first, psi, omega, u, turn, amp, at, size):
     """From the two polynomials: arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2], amplitude.
 
-    k: the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u, turns per
+    k: (symbols, 16), row s the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u, turns per
     excess, per psi and per omega, the reference's turn, 1 / r_ref^2.
     """
-    hy, hz, sp, cp, so, co, su, cu = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
-    te, tp, to, t0, inverse_r2 = k[8], k[9], k[10], k[11], k[12]
-    for l in range(size):
-        i = at + l
-        s = inverse[i]
-        d = eps[i] * excess[i]
-        p = (hy + ey[i]) * s * sp - cp
-        o = (hz + ez[i]) * s * so - co
-        psi[i] = p
-        omega[i] = o
-        u[i] = d * su + cu
+    hy, hz, sp, cp, so, co, su, cu = k[s, 0], k[s, 1], k[s, 2], k[s, 3], k[s, 4], k[s, 5], k[s, 6], k[s, 7]
+    te, tp, to, t0, inverse_r2 = k[s, 8], k[s, 9], k[s, 10], k[s, 11], k[s, 12]
+    at, first = np.uint64(at), np.uint64(first)
+    for i in range(np.uint64(size)):
+        l = at + i  # noqa: E741
+        f = inverse[l]
+        d = eps[l] * excess[l]
+        p = (hy + ey[l]) * f * sp - cp
+        o = (hz + ez[l]) * f * so - co
+        psi[l] = p
+        omega[l] = o
+        u[l] = d * su + cu
         t = te * d + tp * p + to * o + t0
-        turn[i] = t - np.rint(t)
-        amp[i] = amplitude[first + l] * s * s * inverse_r2
+        turn[l] = t - np.rint(t)
+        amp[l] = amplitude[first + i] * f * f * inverse_r2
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
@@ -105,39 +113,47 @@ def squares(size, turn, square):
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def weigh(at, size, weight, real, imag):
-    """Sums of weight * real and weight * imag over part of the tile."""
-    re, im = weight[0] * real[0] * 0, weight[0] * imag[0] * 0
-    for l in range(at, at + size):
+def weigh(weight, real, imag, at, size):
+    """Sums of weight * real and weight * imag."""
+    re, im = weight[0] - weight[0], weight[0] - weight[0]
+    at = np.uint64(at)
+    for i in range(np.uint64(size)):
+        l = at + i  # noqa: E741
         re += weight[l] * real[l]
         im += weight[l] * imag[l]
     return re, im
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def far_sums(at, size, sine, u, real, imag, amp):
-    """Sums of c, c u and |z| with c = z sin(pi u), for the bound on far cells."""
-    zero = real[0] * 0
-    a, b, c, d, total = zero, zero, zero, zero, zero
-    for l in range(at, at + size):
-        x, y, t = real[l] * sine[l], imag[l] * sine[l], u[l]
+def far_sums(sine, u, real, imag, amp, at, size):
+    """Sums of c and c u with c = z sin(pi u), and of |z|, |z| u and |z| u^2, for the bound on far cells."""
+    a = sine[0] - sine[0]
+    b, c, d, total, first, second = a, a, a, a, a, a
+    at = np.uint64(at)
+    for i in range(np.uint64(size)):
+        l = at + i  # noqa: E741
+        x, y, t, w = real[l] * sine[l], imag[l] * sine[l], u[l], amp[l]
         a += x
         b += y
         c += x * t
         d += y * t
-        total += amp[l]
-    return a, b, c, d, total
+        total += w
+        first += w * t
+        second += w * t * t
+    return a, b, c, d, total, first, second
 
 
 @njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def distant_cell(at, size, j, scale, shift, count, sine, u, real, imag):
-    """Sum over part of the tile in cell j, which no point is near: c / (M sin(pi (j - u) / M)).
+def distant_cell(j, scale, shift, count, sine, u, real, imag, at, size):
+    """Sum in cell j, which no point is near, of c / (M sin(pi (j - u) / M)) with c = z sin(pi u).
 
-    u: on [-1, 1], cells = scale u + shift. |pi x / M| must stay below 1.6, for the polynomial of the sine.
+    u: on [-1, 1], cells = scale u + shift. |pi (j - cells) / M| must stay below 1.6 for the sine's polynomial.
     """
-    re, im = real[0] * 0, real[0] * 0
+    re, im = 0.0, 0.0
     step = np.pi / count
-    for l in range(at, at + size):
+    at = np.uint64(at)
+    for i in range(np.uint64(size)):
+        l = at + i  # noqa: E741
         x = (j - shift - scale * u[l]) * step
         q = x * x
         s = x * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880 + q * (

@@ -69,6 +69,7 @@ def segments(span, cells_per_m, rate_h, rate_v, longest, out):
         low = np.array([np.inf, np.inf, np.inf])
         high = np.array([-np.inf, -np.inf, -np.inf])
         end = n
+        room_h, room_v, room = 0.0, 0.0, 0.0
         while end < len(span) and end - n < longest:
             d = span[end, SPREAD]
             turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
@@ -76,8 +77,12 @@ def segments(span, cells_per_m, rate_h, rate_v, longest, out):
             a, b, c = span[end, PSI], span[end, OMEGA], span[end, CELL]
             l0, l1, l2 = min(low[0], a - turn), min(low[1], b - turn), min(low[2], c - deep)
             h0, h1, h2 = max(high[0], a + turn), max(high[1], b + turn), max(high[2], c + deep)
-            wide = max((h0 - l0) * rate_h / 4.0, (h1 - l1) * rate_v / 4.0, (h2 - l2) / 1.3)
-            if end > n and wide > 1.0:
+            if end == n:
+                # A target wide in itself still gets some symbols of common polynomials.
+                room_h = max(4.0, 1.2 * (h0 - l0) * rate_h + 1.0)
+                room_v = max(4.0, 1.2 * (h1 - l1) * rate_v + 1.0)
+                room = min(2.4, max(1.3, h2 - l2 + 0.5))
+            elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v or h2 - l2 > room:
                 break
             low[0], low[1], low[2], high[0], high[1], high[2] = l0, l1, l2, h0, h1, h2
             end += 1
