@@ -33,9 +33,14 @@ def encode(image: np.ndarray, palette: np.ndarray) -> bytes:
     height, width = image.shape
     rows = np.empty((height, width + 1), np.uint8)
     filters.apply_paeth(image, rows)
-    header = struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)
+    return packed(image.shape, palette, zlib_compress(rows))
+
+
+def packed(shape: tuple[int, int], palette: np.ndarray, stream: bytes) -> bytes:
+    """Return the PNG file of an 8-bit palette image (H, W) from the zlib stream of its filtered rows."""
+    header = struct.pack(">IIBBBBB", shape[1], shape[0], 8, 3, 0, 0, 0)
     colours = np.ascontiguousarray(palette).tobytes()
-    parts = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", zlib_compress(rows)), (b"IEND", b""))
+    parts = ((b"IHDR", header), (b"PLTE", colours), (b"IDAT", stream), (b"IEND", b""))
     return SIGNATURE + b"".join(_chunk(*part) for part in parts)
 
 
