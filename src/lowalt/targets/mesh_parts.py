@@ -95,15 +95,22 @@ def cut(pool: Pool, mesh: Mesh, region: dict) -> tuple[Pool, Pool]:
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
     """Return the pool with its hinge and unit axis, given by the record's part or found from its samples.
 
-    Found: the hinge is the mean of the samples, the axis their thinnest direction. Signs: a rotor turns
-    anticlockwise about the axis seen from above, a wheel rolls to the front, a wing rises, all at positive angles;
-    `sense: cw` turns a rotor's axis round. `up` and `front` (3,) are the target's, in the file's axes.
+    Found: the hinge is the middle of a wheel's extents or the mean of a rotor's samples, the axis the samples'
+    thinnest direction. Not said: a rotor's axis is found, a wheel's sideways, a wing's the front line. Signs: a rotor
+    turns anticlockwise about the axis seen from above, a wheel rolls to the front, a wing rises, all at positive
+    angles; `sense: cw` turns a rotor's axis round. `up` and `front` (3,) are the target's, in the file's axes.
     Raises: InputError naming `where` for too few samples to find an axis.
     """
     right = np.cross(front, up)
-    hinge, axis = part.get("hinge", "found"), part.get("axis", front.tolist() if part["kind"] == "wing" else "found")
+    hinge, axis = part.get("hinge", "found"), part.get("axis", "found")
     centre = pool.points.mean(axis=0) if len(pool.points) else np.zeros(3)
-    hinge = centre if isinstance(hinge, str) else np.array(hinge, float)
+    if isinstance(hinge, str):
+        hinge = centre
+        if part["kind"] == "wheel":
+            hinge = (pool.points.min(axis=0) + pool.points.max(axis=0)) / 2
+    hinge = np.array(hinge, float)
+    if "axis" not in part and part["kind"] != "rotor":
+        axis = front if part["kind"] == "wing" else right
     if isinstance(axis, str):
         if len(pool.points) < 4:
             raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")

@@ -17,8 +17,8 @@ parts        by name, the body first; each part has a kind and one of
              radius, half_length}}; with `whole: true` only connected components that lie inside as a whole
   wheel:     {diameter_m, width_m}: a wheel is made and added at the hinge
   and hinge: [x, y, z] or found (centre of its surface); axis: [x, y, z] or found (its thinnest direction; not for
-             wings, whose axis is the front line by default); sense: ccw or cw (rotors, seen from above);
-             parent: a part's name
+             wings); by default a rotor's is found, a wheel's sideways, a wing's the front line; sense: ccw or cw
+             (rotors, seen from above); parent: a part's name
 drop         regions of the body that are no part of the target (seats, stands)
 licence, attribution, where (a user gets the files), note: words, kept in the cloud's record
 """

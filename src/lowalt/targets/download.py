@@ -1,0 +1,84 @@
+"""The CMU recordings that `config/targets/real.yaml` and the tests use, from their official addresses.
+
+"The data used in this project was obtained from mocap.cs.cmu.edu. The database was created with funding from NSF
+EIA-0196217." It is free for use in research and products, but must not be resold, even in converted form.
+Run `python -m lowalt.targets.download --out FOLDER`; FOLDER is then what LOWALT_INPUTS names.
+"""
+
+import argparse
+import shutil
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+from lowalt.command import run
+from lowalt.errors import InputError
+from lowalt.files import replacing, sha256
+
+OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
+TIMEOUT_S = 60
+
+SHA256 = {
+    "02/02.asf": "c50c9cf21fa50dcea0b597e8caf5a2191975cd20999935cc50ab60d44382de9b",
+    "02/02_01.amc": "e196f67e5cee0bb575e2ed105082231166a13f81f6ff7b460f6078ed66c8e43a",
+    "02/02_02.amc": "c0905969083149ff73b52a26d2121c889081a6b19aa743173dd1d575e31ec697",
+    "02/02_03.amc": "a79e7127adfefb15566093a02d3e030cb67cd6c9e9773be95cc26c66b908aad0",
+    "05/05.asf": "bbdd4ba5c6807a5c036ebd2e4e23028c6097d36f557cb30a3f49d158aad07aa1",
+    "05/05_01.amc": "f8eb4d873cd81bf421dbeefc0aa6b47b8911d20d0f08d9d41076ea1ac211b37c",
+    "07/07.asf": "f1fbd8abcd9073d24189d5f33b7220974b0ac4b5223fabbb0cc07799ec7a93b3",
+    "07/07_01.amc": "97cdb8296c5a9a37a2eaca7ce214b9dbaef49016f7e28c22c5b74688fcd8e0e3",
+    "07/07_02.amc": "8cd7cbba57ed6675dd647c9427ba6f7b676d514c4e7e4ad6d27c7d10a665df68",
+    "07/07_03.amc": "f4a74d4239d54c33ab773079a0759e2a7d61ae15074d2af2e33b4025d7bd44d1",
+    "07/07_12.amc": "2c4c70bdf47d68a0a7e12e44239bfd24a1286d05e11b4104e1078a3483e95bb2",
+    "09/09.asf": "cc3aab1866fe8149dda70fbbee7cfe2d45506ea38bef31122ac97f94505a33ce",
+    "09/09_01.amc": "8ce3d9e2b0e12db6650810177f75afc34fa64c8aa79f2fe4bddaec35e7b71ad2",
+    "09/09_02.amc": "74f2a66e16e800abd98e1c7894c0bcbdd5b7f0ee80665fc2ebff4c16dfe256c5",
+    "09/09_06.amc": "00e5ba506ae51456f75a46037a05e8a1ed60b07d0ae9539f43f2e543044121a3",
+    "09/09_07.amc": "5e6b06e6b9f89182edcd8cf41eacb7668385df255f2be5683719a9398c8941fd",
+    "09/09_10.amc": "487d4a5a2ba915952d78220ecf6b1cd572cb8a7b06fb59836eae574df2d5c360",
+    "35/35.asf": "2a8e2eda3c0d7d828566b2a9a8ab36b2b8b3864110574e8b73c8f069fded416c",
+    "35/35_01.amc": "0743f4ea48e7e199cd56b2810b5ce81f8ede08d32ff79aa4e363c44cc4fe33aa",
+    "131/131.asf": "0dee16ca41ae3d9363a53b05096e96ae00132ab9a9b7aaa002f986318a4e4dfd",
+    "131/131_01.amc": "930470d1979a42880dd01a6b6fe205028de69ebb142f84e32e0e83efe8447931",
+}
+"""Checksums of the files this project was made with, by subject and name (07_12.amc as its known copies have it:
+without the end of its last frame)."""
+
+
+def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
+    """Put the file `name` (SS/SS.asf or SS/SS_TT.amc) into `folder`/cmu; return False where it already was there.
+
+    Nothing is kept unless its SHA-256 is the pinned one.
+    Raises: InputError naming the address for an unknown name, a failed download or a wrong checksum.
+    """
+    if name not in SHA256:
+        raise InputError(f"{name}: no pinned checksum, expected one of {sorted(SHA256)}")
+    target = folder / "cmu" / name
+    if target.is_file() and sha256(target) == SHA256[name]:
+        return False
+    address = f"{base}/{name}"
+    with replacing(target) as temporary:
+        try:
+            with urllib.request.urlopen(address, timeout=TIMEOUT_S) as source, temporary.open("wb") as file:
+                shutil.copyfileobj(source, file)
+        except (urllib.error.URLError, OSError, ValueError) as error:
+            raise InputError(f"{address}: download failed ({error})") from None
+        found = sha256(temporary)
+        if found != SHA256[name]:
+            raise InputError(f"{address}: SHA-256 is {found}, expected {SHA256[name]}; nothing was kept")
+    return True
+
+
+def main(arguments: list[str]) -> None:
+    """Fetch the named files, all by default."""
+    line = argparse.ArgumentParser(prog="python -m lowalt.targets.download", description=__doc__)
+    line.add_argument("--out", required=True, type=Path, help="folder of inputs; files go to its cmu/")
+    line.add_argument("--base", default=OFFICIAL, help="address of the folder of subjects")
+    line.add_argument("names", nargs="*", help="SS/SS.asf or SS/SS_TT.amc; all by default")
+    given = line.parse_args(arguments)
+    for name in given.names or SHA256:
+        print(name, "fetched" if fetch(name, given.out, given.base) else "already there")
+
+
+if __name__ == "__main__":
+    run(main)

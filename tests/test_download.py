@@ -1,0 +1,60 @@
+"""The download rule: pinned checksums, nothing kept that does not match, on file:// addresses."""
+
+import hashlib
+
+import pytest
+
+from lowalt.errors import InputError
+from lowalt.targets import download
+
+
+@pytest.fixture
+def served(tmp_path, monkeypatch):
+    """A folder of subjects with two files, and their checksums pinned."""
+    folder = tmp_path / "subjects" / "02"
+    folder.mkdir(parents=True)
+    sums = {}
+    for name, text in (("02.asf", b"skeleton"), ("02_01.amc", b"motion")):
+        (folder / name).write_bytes(text)
+        sums[f"02/{name}"] = hashlib.sha256(text).hexdigest()
+    monkeypatch.setattr(download, "SHA256", sums)
+    return folder.parent.as_uri()
+
+
+def test_files_arrive_once_and_are_not_fetched_again(served, tmp_path, capsys):
+    arguments = ["--out", str(tmp_path / "inputs"), "--base", served]
+    download.main(arguments)
+    assert (tmp_path / "inputs/cmu/02/02_01.amc").read_bytes() == b"motion"
+    download.main([*arguments, "02/02.asf"])
+    assert capsys.readouterr().out.split("\n")[:3] == [
+        "02/02.asf fetched", "02/02_01.amc fetched", "02/02.asf already there",
+    ]  # fmt: skip
+
+
+def test_wrong_checksum_is_refused_and_leaves_nothing(served, tmp_path):
+    (tmp_path / "subjects/02/02.asf").write_bytes(b"another skeleton")
+    with pytest.raises(InputError, match=r"02/02.asf: SHA-256 is \w{64}, expected \w{64}; nothing was kept"):
+        download.fetch("02/02.asf", tmp_path / "inputs", served)
+    assert not any(path.is_file() for path in (tmp_path / "inputs").rglob("*"))
+
+
+def test_a_changed_file_is_replaced(served, tmp_path):
+    download.fetch("02/02.asf", tmp_path, served)
+    (tmp_path / "cmu/02/02.asf").write_bytes(b"changed")
+    assert download.fetch("02/02.asf", tmp_path, served)
+    assert (tmp_path / "cmu/02/02.asf").read_bytes() == b"skeleton"
+
+
+def test_unknown_and_missing_files_are_named(served, tmp_path):
+    with pytest.raises(InputError, match=r"99/99.asf: no pinned checksum"):
+        download.fetch("99/99.asf", tmp_path, served)
+    with pytest.raises(InputError, match=r"nowhere/02/02.asf: download failed"):
+        download.fetch("02/02.asf", tmp_path, served.replace("subjects", "nowhere"))
+    assert not any(path.is_file() for path in (tmp_path / "cmu").rglob("*"))
+
+
+def test_every_pinned_name_is_a_file_of_its_subject():
+    for name, value in download.SHA256.items():
+        subject, file = name.split("/")
+        assert file == f"{subject}.asf" or (file.startswith(f"{subject}_") and file.endswith(".amc"))
+        assert len(value) == 64 and int(value, 16) >= 0
