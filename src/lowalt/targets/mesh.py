@@ -77,7 +77,7 @@ def _made_wheel(part: dict, samples: tuple[np.ndarray, np.ndarray], frame: np.nd
     area = np.pi * size["diameter_m"] * (size["diameter_m"] / 2 + size["width_m"])
     nothing = np.full(3, np.nan)
     # sample_part puts the points that bound the wheel first.
-    return Pool(points + hinge, normals, np.zeros(len(points), np.int64), 4, area, nothing, nothing)
+    return Pool(points + hinge, normals, np.zeros(len(points), np.int64), 6, area, nothing, nothing)
 
 
 def _surface(part: dict, record: dict, inputs_dir: Path) -> Mesh:
@@ -105,8 +105,6 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
     largest = float(np.ptp(mesh.vertices, axis=0).max())
     _refuse_size(record, f"the mesh of {body_name}", largest, _published_m(record).max(), 1 / limit, limit)
     body, found, wheels = pool_of(mesh, dense, rng), {}, _made_wheels(record, rng)
-    for region in record["drop"]:
-        body = cut(body, mesh, region)[1]
     for name, part in moving:
         if "region" in part:
             pool, body = cut(body, mesh, part["region"])
@@ -117,6 +115,8 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
         if not len(pool.points):
             raise InputError(f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface")
         found[name] = hinged(pool, part, up, front, f"{where}: parts.{name}")
+    for region in record["drop"]:
+        body = cut(body, mesh, region)[1]
     if not len(body.points):
         raise InputError(f"{where}: regions and drop leave nothing of {body_name}, expected a body")
     closed = float(mesh.closed[mesh.component].mean())

@@ -19,7 +19,8 @@ parts        by name, the body first; each part has a kind and one of
   and hinge: [x, y, z] or found (centre of its surface); axis: [x, y, z] or found (its thinnest direction; not for
              wings); by default a rotor's is found, a wheel's sideways, a wing's the front line; sense: ccw or cw
              (rotors, seen from above); parent: a part's name
-drop         regions of the body that are no part of the target (seats, stands)
+drop         regions of what is then left of the body that are no part of the target (stands) or that no
+             station sees (floors)
 licence, attribution, where (a user gets the files), note: words, kept in the cloud's record
 """
 
