@@ -1,0 +1,190 @@
+"""The data card: README.md, samples.csv and croissant.json beside the index; the folder can be published as it is."""
+
+import csv
+import json
+import re
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from lowalt import __version__
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing, sha256
+from lowalt.shards.croissant import FIELDS, metadata
+from lowalt.shards.read import ShardSet
+
+SLUG = re.compile(r"(.+)-\d{6}-snr")
+PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
+LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
+
+MEMBERS = {
+    "image": ("png", "the tile, 8-bit indices with their colour map; rows are the stations, columns VRP, TRP and VT"),
+    "signal": ("npy", "the noisy signals, complex64 (stations, symbols), from which every tile is rendered"),
+}
+
+ODDITIES = """\
+- Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
+- At every range-cell crossing the signal jumps in phase by nearly pi: the stripes of fast cars are real.
+- Published wheel diameters are rim sizes, so wheels turn faster than real ones; runners move at walking speed; bird
+  sizes are small. They are followed as published.
+- Six SNRs of one motion model are nearly the same picture: split by motion model, as the folds here do, unless
+  `split.by` is `sample` (the published way, which leaks motions from training into test).
+- Each image is scaled by its own largest value: absolute echo strength, and with it range, is not in the images. It is
+  in the signals.
+"""
+
+LIMITS = """\
+- Simulated: scattering points in free space with equal or modelled cross sections; no clutter, no multipath, no
+  occlusion, no receiver impairments unless the configuration below names them as effects.
+- Built-in targets are parametric models with published sizes and rates, not measured craft, animals or people.
+- One target a sample, tracked perfectly: the strongest range cell of every symbol is the target's.
+"""
+
+
+def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
+    lines = [header, tuple("---" for _ in header), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def _subtypes(shards: ShardSet) -> tuple[np.ndarray, list[dict]]:
+    """For every sample the number of its subtype, and of each subtype one record."""
+    # A key is {subtype}-{model, six digits}-{SNR}; what stands before the model is the subtype's file name.
+    slugs = [SLUG.match(key.decode())[1] for key in shards.keys.tolist()]
+    _, first, numbers = np.unique(slugs, return_index=True, return_inverse=True)
+    return numbers, [shards.record(int(place)) for place in first]
+
+
+def _counts(shards: ShardSet) -> str:
+    """Counts by group and fold, by subtype, and by SNR; sizes of the shards."""
+    places = Counter()
+    for entry in shards.shards:
+        places[entry["group"], entry["fold"]] += entry["samples"]
+    parts = [_table(("subtypes", "fold", "samples"), [(*place, number) for place, number in sorted(places.items())])]
+    numbers, records = _subtypes(shards)
+    rows = zip(records, np.bincount(numbers, minlength=len(records)), strict=True)
+    rows = [(record["category"], record["subtype"], record["group"], count) for record, count in rows]
+    parts.append(_table(("category", "subtype", "group", "samples"), sorted(rows)))
+    snrs = sorted(Counter(shards.snrs_db.tolist()).items())
+    parts.append(_table(("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in snrs]))
+    sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
+    parts.append(
+        f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
+        f"{1e3 * sum(sizes) / max(1, len(shards)):.1f} kB a sample.\n"
+    )
+    return "\n".join(parts)
+
+
+def write_samples(shards: ShardSet, path: Path) -> None:
+    """Write the table of all samples (CSV, columns FIELDS), in the order of the index."""
+    numbers, records = _subtypes(shards)
+    columns = (shards.keys, shards.labels, numbers, shards.models, shards.snrs_db)
+    owners = np.repeat(np.arange(len(shards.shards)), [entry["samples"] for entry in shards.shards])
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(FIELDS)
+        for key, label, number, model, snr_db, owner in zip(*columns, owners, strict=True):
+            entry, record = shards.shards[owner], records[number]
+            row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
+            writer.writerow([*row, model, f"{snr_db:g}", entry["name"]])
+
+
+def description(shards: ShardSet) -> str:
+    """Return the data set in one paragraph."""
+    stations = list(shards.index["render"]["network"]["stations"])
+    what = "3 x 3 tiles of time-frequency images" if shards.kind == "image" else "complex symbol-domain signals"
+    return (
+        f"Simulated echoes of low-altitude targets (UAVs, birds, vehicles, pedestrians) at the base stations "
+        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {what}, with motion parameters "
+        "and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target Recognition Towards "
+        "Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
+    )
+
+
+def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
+    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
+    first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
+    front = {
+        "pretty_name": name, "license": license_name.lower(), "task_categories": ["image-classification"],
+        "tags": ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"],
+    }  # fmt: skip
+    member, meaning = MEMBERS[shards.kind]
+    return f"""---
+{yaml.safe_dump(front, sort_keys=False).strip()}
+---
+# {name}
+
+{description(shards)}
+
+## What is in it
+
+{_counts(shards)}
+## How to read it
+
+Each shard is a plain tar in the WebDataset layout. A sample has two members:
+
+- `KEY.{member}`: {meaning};
+- `KEY.json`: class, subtype, motion parameters, what each station sees, SNR, seed, versions.
+
+`samples.csv` lists all samples, `index.json` the shards with their SHA-256, and the `.npz` beside a shard the offset,
+size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
+
+```python
+import webdataset
+for sample in webdataset.WebDataset("seen-train-00000.tar", shardshuffle=False).decode("pil"):
+    print(sample["__key__"], sample["json"]["category"], sample["{member}"])
+
+from lowalt.shards import ShardSet
+shards = ShardSet("index.json", groups=["seen"], folds=["train"])
+images, label = shards.images(0, size=224), shards.labels[0]  # (9, 224, 224) uint8
+```
+
+`python -m lowalt.shards verify --index index.json` checks every byte and names what is damaged.
+
+**Protocols.** *seen*: train, val and test folds of both groups. *unseen*: folds of the `seen` group, and all folds
+of the `unseen` group as the test on subtypes that training has not met.
+
+## Known limits
+
+{LIMITS}
+## Oddities to know
+
+{ODDITIES}
+## Licence
+
+{license_name} ({LICENSES[license_name]}). Inputs that a user adds (meshes, recordings) keep their own licences.
+
+## What made it
+
+{_table(("package", "version"), sorted(first["versions"].items()))}
+The exact configuration, which makes the same bytes again with these versions:
+
+```yaml
+{config.strip()}
+```
+"""
+
+
+def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
+    """Write README.md, samples.csv and croissant.json beside an index.
+
+    facts: what Croissant should say besides, such as `url` and `datePublished`.
+    Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
+    """
+    if license_name not in LICENSES:
+        raise InputError(f"--license: {license_name!r}, expected one of {sorted(LICENSES)}")
+    shards, config = ShardSet(index_path), existing(config_path, "configuration").read_text()
+    name = f"lowalt-{yaml.safe_load(config)['run']}"
+    folder = Path(index_path).parent
+    with replacing(folder / "README.md") as temporary:
+        temporary.write_text(readme(shards, config, name, license_name))
+    samples = folder / "samples.csv"
+    write_samples(shards, samples)
+    table = {"path": samples.name, "bytes": samples.stat().st_size, "sha256": sha256(samples)}
+    known = {
+        "name": name, "description": description(shards), "version": __version__,
+        "license": LICENSES[license_name], "citeAs": PAPER, **facts,
+    }  # fmt: skip
+    with replacing(folder / "croissant.json") as temporary:
+        temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")

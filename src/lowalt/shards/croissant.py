@@ -1,0 +1,145 @@
+"""Croissant metadata of a data set: its shards with checksums, and its samples as records that tools can load.
+
+Source: Croissant format specification 1.0 (MLCommons).
+"""
+
+from lowalt.shards.table import EXTENSIONS
+from lowalt.targets.cloud import CATEGORIES
+
+CONTEXT = {
+    "@language": "en",
+    "@vocab": "https://schema.org/",
+    "citeAs": "cr:citeAs",
+    "column": "cr:column",
+    "conformsTo": "dct:conformsTo",
+    "cr": "http://mlcommons.org/croissant/",
+    "data": {"@id": "cr:data", "@type": "@json"},
+    "dataBiases": "cr:dataBiases",
+    "dataCollection": "cr:dataCollection",
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "dct": "http://purl.org/dc/terms/",
+    "equivalentProperty": "cr:equivalentProperty",
+    "examples": {"@id": "cr:examples", "@type": "@json"},
+    "extract": "cr:extract",
+    "field": "cr:field",
+    "fileObject": "cr:fileObject",
+    "fileProperty": "cr:fileProperty",
+    "fileSet": "cr:fileSet",
+    "format": "cr:format",
+    "includes": "cr:includes",
+    "isLiveDataset": "cr:isLiveDataset",
+    "jsonPath": "cr:jsonPath",
+    "key": "cr:key",
+    "md5": "cr:md5",
+    "parentField": "cr:parentField",
+    "path": "cr:path",
+    "personalSensitiveInformation": "cr:personalSensitiveInformation",
+    "recordSet": "cr:recordSet",
+    "rai": "http://mlcommons.org/croissant/RAI/",
+    "references": "cr:references",
+    "regex": "cr:regex",
+    "repeated": "cr:repeated",
+    "replace": "cr:replace",
+    "samplingRate": "cr:samplingRate",
+    "sc": "https://schema.org/",
+    "separator": "cr:separator",
+    "source": "cr:source",
+    "subField": "cr:subField",
+    "transform": "cr:transform",
+}
+
+FIELDS = {
+    "key": ("sc:Text", "Unique name of the sample: subtype, motion model, SNR."),
+    "label": ("sc:Integer", f"Class: {', '.join(f'{n} {name}' for n, name in enumerate(CATEGORIES))}."),
+    "category": ("sc:Text", "The class by name."),
+    "subtype": ("sc:Text", "Published name of the target's subtype."),
+    "group": ("sc:Text", "Whether the unseen protocol trains on the subtype (seen) or only tests on it (unseen)."),
+    "fold": ("sc:Text", "train, val or test."),
+    "model": ("sc:Integer", "Number of the motion model within its subtype."),
+    "snr_db": ("sc:Float", "Signal-to-noise ratio in dB, or inf."),
+    "shard": ("sc:Text", "Shard that holds the sample's members KEY.json and its image or signal."),
+}
+"""Columns of the table of all samples: data type and meaning."""
+
+MEDIA = {
+    "image": ("image/png", "sc:ImageObject", "768 x 768 palette PNG: rows are stations, columns VRP, TRP, VT."),
+    "signal": ("application/octet-stream", "sc:Text", "Signals (stations, symbols), complex64, as an .npy file."),
+}
+
+
+def metadata(index: dict, table: dict, facts: dict) -> dict:
+    """Return the Croissant description (JSON-LD) of a data set by its index.
+
+    table: path, bytes and sha256 of the table of samples; facts: name, description, version, license, and what else
+    is known (url, datePublished). Paths are relative to the folder of the description.
+    """
+    kind = index["kind"]
+    files = [
+        _file(
+            entry, "application/x-tar", f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold."
+        )
+        for entry in index["shards"]
+    ]
+    files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
+    mime, data_type, meaning = MEDIA[kind]
+    inside = [{"@id": entry["name"]} for entry in index["shards"]]
+    sets = [
+        _files("records", inside, "application/json", "*.json", "JSON record of every sample: motion, geometry, seed."),
+        _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", f"The {kind} of every sample."),
+    ]
+    return {
+        "@context": CONTEXT,
+        "@type": "sc:Dataset",
+        **facts,
+        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "isLiveDataset": False,
+        "distribution": files + sets,
+        "recordSet": [_samples(table["path"]), _media(kind, data_type, meaning)],
+    }
+
+
+def _file(entry: dict, mime: str, meaning: str) -> dict:
+    return {
+        "@type": "cr:FileObject", "@id": entry["name"], "name": entry["name"], "contentUrl": entry["path"],
+        "contentSize": f"{entry['bytes']} B", "encodingFormat": mime, "sha256": entry["sha256"], "description": meaning,
+    }  # fmt: skip
+
+
+def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str) -> dict:
+    return {
+        "@type": "cr:FileSet", "@id": name, "name": name, "containedIn": inside, "encodingFormat": mime,
+        "includes": pattern, "description": meaning,
+    }  # fmt: skip
+
+
+def _samples(path: str) -> dict:
+    """One row a sample, from the table."""
+    fields = [
+        {
+            "@type": "cr:Field", "@id": f"samples/{name}", "name": name, "description": meaning, "dataType": kind,
+            "source": {"fileObject": {"@id": path}, "extract": {"column": name}},
+        }
+        for name, (kind, meaning) in FIELDS.items()
+    ]  # fmt: skip
+    return {
+        "@type": "cr:RecordSet", "@id": "samples", "name": "samples", "key": {"@id": "samples/key"},
+        "description": "All samples, without their images or signals.", "field": fields,
+    }  # fmt: skip
+
+
+def _media(kind: str, data_type: str, meaning: str) -> dict:
+    """One row a sample: the name of its member and the member itself."""
+    name = f"{kind}s"
+    parts = {"file": ("sc:Text", "filename", "Name of the member: KEY and its extension."),
+             "content": (data_type, "content", meaning)}  # fmt: skip
+    fields = [
+        {
+            "@type": "cr:Field", "@id": f"members/{part}", "name": part, "description": text, "dataType": what,
+            "source": {"fileSet": {"@id": name}, "extract": {"fileProperty": property_name}},
+        }
+        for part, (what, property_name, text) in parts.items()
+    ]  # fmt: skip
+    return {
+        "@type": "cr:RecordSet", "@id": "members", "name": "members",
+        "description": f"The {kind} of every sample, from the shards.", "field": fields,
+    }  # fmt: skip

@@ -1,0 +1,86 @@
+"""The data card: its counts are those of the shards, and its description of them can be loaded by others."""
+
+import csv
+import hashlib
+import json
+import shutil
+
+import pytest
+import yaml
+
+from lowalt.errors import InputError
+from lowalt.shards import ShardSet
+from lowalt.shards.__main__ import main
+from test_shards import RENDER, SEED, SNRS, SPLIT, build
+
+CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
+
+
+@pytest.fixture(scope="module", params=["image", "signal"])
+def published(request, tmp_path_factory):
+    folder = build(tmp_path_factory.mktemp(request.param), request.param)
+    (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG))
+    arguments = ["--index", str(folder / "index.json"), "--config", str(folder / "config.yaml")]
+    main(["card", *arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    return folder
+
+
+def test_card_has_counts_configuration_and_versions(published):
+    text = (published / "README.md").read_text()
+    front = yaml.safe_load(text.split("---")[1])
+    assert front["pretty_name"] == "lowalt-trial" and front["license"] == "mit"
+    for row in ("| seen | train | 8 |", "| unseen | test | 2 |", "| Bird | Crow | seen | 8 |", "| inf | 12 |"):
+        assert row in text
+    assert yaml.safe_load(text.split("```yaml")[1].split("```")[0]) == CONFIG
+    versions = ShardSet(published / "index.json").record(0)["versions"]
+    assert all(f"| {name} | {version} |" in text for name, version in versions.items())
+    for word in ("Known limits", "Oddities", "Licence", "verify"):
+        assert word in text
+
+
+def test_samples_are_all_listed(published):
+    shards = ShardSet(published / "index.json")
+    rows = list(csv.DictReader((published / "samples.csv").open()))
+    assert len(rows) == len(shards)
+    for number, row in enumerate(rows):
+        entry = shards.record(number)
+        assert {name: row[name] for name in ("key", "category", "subtype", "group", "fold")} == {
+            name: entry[name] for name in ("key", "category", "subtype", "group", "fold")
+        }
+        assert (int(row["label"]), int(row["model"])) == (entry["label"], entry["model"])
+        assert float(row["snr_db"]) == float(entry["snr_db"])
+        assert row["key"].encode() in (published / row["shard"]).read_bytes()
+
+
+def test_checksums_of_the_description_are_right(published):
+    files = [
+        node for node in json.loads((published / "croissant.json").read_text())["distribution"] if "sha256" in node
+    ]
+    assert len(files) == 7
+    for node in files:
+        data = (published / node["contentUrl"]).read_bytes()
+        assert node["sha256"] == hashlib.sha256(data).hexdigest()
+        assert node["contentSize"] == f"{len(data)} B"
+
+
+def test_mlcroissant_validates_and_loads(published):
+    """The reference implementation finds no fault and reads every sample's row, and images from the shards."""
+    mlcroissant = pytest.importorskip("mlcroissant")
+    data = mlcroissant.Dataset(str(published / "croissant.json"))
+    assert not data.metadata.issues.errors and not data.metadata.issues.warnings
+    rows = list(data.records("samples"))
+    shards = ShardSet(published / "index.json")
+    assert [row["samples/key"] for row in rows] == shards.keys.tolist()
+    assert [row["samples/label"] for row in rows] == shards.labels.tolist()
+    if shards.kind == "image":
+        assert next(iter(data.records("members")))["members/content"].size == (768, 768)
+
+
+def test_equal_data_sets_have_equal_cards(published, tmp_path):
+    copy = shutil.copytree(published, tmp_path / "copy")
+    before = {name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")}
+    arguments = ["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml")]
+    main(["card", *arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    assert before == {name: (copy / name).read_bytes() for name in before}
+    with pytest.raises(InputError, match="nowhere"):
+        main(["card", *arguments[:2], "--config", str(tmp_path / "nowhere.yaml")])
