@@ -19,7 +19,7 @@ def _views(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition views", _views.__doc__)
     line.add_argument("--index", required=True, help="index of the shards (.json)")
-    line.add_argument("--shard", required=True, help="name of the shard, {group}-{fold}-{part}")
+    line.add_argument("--shard", required=True, help="name of the shard, {group}-{fold}-{part}.tar")
     line.add_argument("--out", required=True, help="views to write (.npz)")
     given = line.parse_args(arguments)
     (size,) = pick(given.settings, "size")

@@ -15,10 +15,12 @@ Settings of this module, the block `recognition.network`:
 """
 
 from pathlib import Path
+from pickle import UnpicklingError
 
 import numpy as np
 import timm
 import torch
+from safetensors import SafetensorError
 from torch import nn
 
 from lowalt.command import pick
@@ -49,7 +51,7 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
         except TypeError:
             # Convolutional models take any size and refuse the argument.
             continue
-        except (RuntimeError, OSError, ValueError) as error:
+        except (RuntimeError, OSError, ValueError, UnpicklingError, SafetensorError) as error:
             raise InputError(f"network: backbone {name!r} with weights {weights!r}: {error}") from error
     raise InputError(f"network: timm cannot build {name!r} without its classifier")
 

@@ -8,6 +8,7 @@ A cache file (.npz) holds, for the samples of one shard in its order,
     one array (samples,) for every name of FACTS
 """
 
+import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
             if not keep.any():
                 return None
             images = data["views"]
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a views file ({error})") from error
     if images.ndim != 4 or images.shape[:2] != (len(facts), VIEWS) or images.dtype != np.uint8:
         raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {VIEWS}, S, S)")

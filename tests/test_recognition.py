@@ -1,0 +1,165 @@
+"""The network: token layout, pooling, palettes, parameter counts, on small timm backbones."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from lowalt.errors import InputError
+from lowalt.recognition import network, schemes
+
+BLOCK = {
+    "backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4, "feed_forward": 2,
+    "dropout": 0.0, "hidden": 0,
+}  # fmt: skip
+SIZE = 32
+PALETTES = np.stack([np.arange(256)[:, None] * [1, 0.5, 0.25] + shift for shift in (0, 0, 0)]).astype(np.uint8)
+
+
+def recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **changes):
+    torch.manual_seed(0)
+    row = {
+        "scheme": "x",
+        "stations": stations,
+        "spectra": spectra,
+        "fusion": fusion,
+        "backbone": "",
+        "protocols": "seen",
+    }
+    return network.Recogniser(schemes.scheme(row, "test"), {**BLOCK, **changes}, SIZE, PALETTES).eval()
+
+
+def images(samples, views, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    return torch.randint(0, 256, (samples, views, SIZE, SIZE), dtype=torch.uint8, generator=generator)
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize(("stations", "spectra"), [("A", "VT"), ("B", "VRP+TRP+VT"), ("AC", "TRP"), ("ABC", "VRP+VT")])
+def test_tokens_are_the_backbones_features_of_each_view_in_its_place(stations, spectra):
+    model = recogniser(stations, spectra)
+    count = (len(stations), len(spectra.split("+")))
+    index = images(3, count[0] * count[1])
+    tokens = model.tokens(index)
+    assert tokens.shape == (3, *count, model.backbone.num_features)
+    mean, std = (torch.tensor(model.backbone.pretrained_cfg[key]) for key in ("mean", "std"))
+    for sample in range(3):
+        for station in range(count[0]):
+            for spectrum in range(count[1]):
+                view = index[sample, station * count[1] + spectrum]
+                colour = torch.from_numpy(PALETTES[0])[view.long()] / 255
+                alone = model.backbone(((colour - mean) / std).permute(2, 0, 1)[None])[0]
+                torch.testing.assert_close(tokens[sample, station, spectrum], alone, atol=2e-5, rtol=1e-5)
+
+
+@torch.inference_mode()
+def test_each_spectrum_is_coloured_by_its_own_palette():
+    palettes = np.stack([np.full((256, 3), value, np.uint8) for value in (10, 20, 30)])
+    layer = network.Palettes(palettes, (0, 2), (0.0,) * 3, (1.0,) * 3)
+    colours = layer(images(2, 4).unflatten(1, (2, 2)))
+    assert colours.shape == (2, 2, 2, 3, SIZE, SIZE)
+    assert torch.allclose(colours[:, :, 0], torch.tensor(10 / 255))
+    assert torch.allclose(colours[:, :, 1], torch.tensor(30 / 255))
+
+
+@torch.inference_mode()
+def test_pooling_is_mean_within_a_station_and_max_between_stations():
+    fusion = network.AttentionFusion(8, 3, {**BLOCK, "intra_depth": 0, "inter_depth": 0})
+    tokens = torch.randn(5, 3, 3, 8)
+    expected = (tokens + fusion.modality).mean(2).amax(1)
+    torch.testing.assert_close(fusion(tokens), expected)
+    torch.testing.assert_close(network.MeanFusion()(tokens), tokens.mean((1, 2)))
+
+
+@torch.inference_mode()
+def test_stations_may_be_swapped_and_spectra_may_not():
+    model = recogniser()
+    index = images(4, 9)
+    turned = index.unflatten(1, (3, 3))[:, [2, 0, 1]].flatten(1, 2)
+    swapped = index.unflatten(1, (3, 3))[:, :, [1, 0, 2]].flatten(1, 2)
+    torch.testing.assert_close(model(index), model(turned), atol=1e-5, rtol=1e-4)
+    # A modality embedding of trained size tells the spectra apart.
+    nn.init.normal_(model.fusion.modality)
+    assert (model(index) - model(swapped)).abs().max() > 1e-3
+
+
+@torch.inference_mode()
+def test_samples_do_not_see_each_other():
+    model = recogniser()
+    index = images(4, 9)
+    torch.testing.assert_close(model(index)[1:2], model(index[1:2]), atol=1e-5, rtol=1e-4)
+
+
+def test_parameter_counts_follow_from_the_shapes():
+    width, wide = 64, 128
+    layer = 4 * width * width + 4 * width + 2 * width * wide + wide + width + 4 * width
+    features = recogniser("A", "VRP", "mean", hidden=0)
+    assert features.backbone.num_features == width
+    base = network.parameters(features.backbone)
+    linear = 4 * width + 4
+    assert network.parameters(features) == base + linear
+    for spectra, depth in (("VRP", 1), ("VRP+TRP+VT", 1), ("VRP+TRP+VT", 3)):
+        model = recogniser("ABC", spectra, intra_depth=depth)
+        modality = (spectra.count("+") + 1) * width
+        encoders = (depth + 1) * layer + 2 * 2 * width
+        assert network.parameters(model) == base + modality + encoders + linear
+    hidden = recogniser("A", "VRP", "mean", hidden=16)
+    assert network.parameters(hidden) == base + (width + 1) * 16 + (16 + 1) * 4
+
+
+def test_encoders_normalise_first_and_last():
+    model = recogniser()
+    for encoder in (model.fusion.intra, model.fusion.inter):
+        assert encoder.layers[0].norm_first
+        assert isinstance(encoder.norm, nn.LayerNorm)
+        assert not encoder.enable_nested_tensor
+
+
+@pytest.mark.parametrize("name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet"])
+def test_any_kind_of_backbone_trains_a_step(name):
+    model = recogniser("AB", "VRP+VT", backbone=name, heads=1).train()
+    model(images(2, 4)).square().sum().backward()
+    assert all(value.grad is not None and value.grad.isfinite().all() for value in model.parameters())
+
+
+def test_a_row_of_the_table_chooses_its_own_backbone():
+    row = {
+        "scheme": "x",
+        "stations": "A",
+        "spectra": "VT",
+        "fusion": "mean",
+        "backbone": "test_vit",
+        "protocols": "seen",
+    }
+    model = network.Recogniser(schemes.scheme(row, "test"), {**BLOCK, "backbone": "test_resnet"}, SIZE, PALETTES)
+    assert type(model.backbone).__name__ == "VisionTransformer"
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"backbone": "swin_giant"}, "swin_giant"),
+        ({"weights": "nowhere.pth"}, "nowhere.pth"),
+        ({"heads": 7}, "heads is 7"),
+        ({"layers": 2}, "layers"),
+    ],
+)
+def test_wrong_settings_are_refused_by_name(changes, words):
+    with pytest.raises(InputError, match=words):
+        recogniser(**changes)
+
+
+def test_weights_come_from_a_local_file_also_at_another_size(tmp_path: Path):
+    torch.manual_seed(7)
+    from safetensors.torch import save_file
+    from timm import create_model
+
+    source = create_model("test_vit2", img_size=48)
+    save_file(source.state_dict(), tmp_path / "weights.safetensors")
+    model = recogniser(weights=str(tmp_path / "weights.safetensors"))
+    torch.testing.assert_close(model.backbone.patch_embed.proj.weight, source.patch_embed.proj.weight)
+    (tmp_path / "broken.safetensors").write_bytes(b"not weights")
+    with pytest.raises(InputError, match=r"broken\.safetensors"):
+        recogniser(weights=str(tmp_path / "broken.safetensors"))
