@@ -6,15 +6,15 @@ The strongest cell is the arg max over all M cells: cells that are not computed 
 import math
 
 import numpy as np
-from numba import njit
 
+from lowalt.echo.compile import PLAIN
 from lowalt.echo.terms import cell_phase, cell_sum, terms
 
 NEAR_TIE = 1e-12
 """Relative gap below which the two strongest cells count as a near-tie."""
 
 
-@njit(cache=True)
+@PLAIN
 def far_bound(z, u, low, high, count):
     """Upper bound of |sum| over all cells outside low..high (relative to ref's cell), without computing any.
 
@@ -42,9 +42,9 @@ def far_bound(z, u, low, high, count):
     return bound / count * (1.0 + 1e-9) + 1e-14 * total
 
 
-@njit(cache=True)
+@PLAIN
 def strongest(z, u, base, count):
-    """Arg max over all cells of one symbol: (value, cell, near-tie, cells computed)."""
+    """Arg max over all cells of one symbol: (value, cell, near-tie)."""
     low, high = math.floor(u.min()), math.ceil(u.max())
     for grow in range(3):
         if grow == 1:
@@ -63,10 +63,10 @@ def strongest(z, u, base, count):
         if high - low + 1 >= count or far_bound(z, u, low, high, count) < best * (1.0 - NEAR_TIE):
             break
     tie = best - second <= NEAR_TIE * best and count > 1
-    return value, cell, tie, high - low + 1
+    return value, cell, tie
 
 
-@njit(cache=True)
+@PLAIN
 def shift(z, u, l, radar, delay, gain):  # noqa: E741
     """Amplitude and range in cells of one point by a path `delay` (s) longer and `gain` times as strong."""
     turn = radar.centre_hz * delay
@@ -75,7 +75,7 @@ def shift(z, u, l, radar, delay, gain):  # noqa: E741
     return z[l] * gain * later, u[l] + radar.bandwidth_hz * delay
 
 
-@njit(cache=True)
+@PLAIN
 def symbol(scene, radar, ref, n, aims, delays, gains, e, z, u):
     """Fill z, u (L or L * paths) of symbol n, paths included; returns 1 + l for a point in the station, else 0."""
     count = len(e)
@@ -93,9 +93,9 @@ def symbol(scene, radar, ref, n, aims, delays, gains, e, z, u):
     return 0
 
 
-@njit(cache=True)
-def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, computed):
-    """Fill values, cells, ties and the number of cells computed at the symbols listed; 0, or n L + l + 1 at r = 0."""
+@PLAIN
+def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, totals):
+    """Fill values, cells, ties and sums of |amplitude| at the symbols listed; returns 0, or n L + l + 1 at r = 0."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
     size = count * max(1, delays.shape[0])
     e, z, u = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size)
@@ -103,11 +103,12 @@ def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties
         fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u)
         if fault:
             return n * count + fault
-        values[n], cells[n], ties[n], computed[n] = strongest(z, u, int(refs[n, 5]), radar.subcarriers)
+        values[n], cells[n], ties[n] = strongest(z, u, int(refs[n, 5]), radar.subcarriers)
+        totals[n] = np.abs(z).sum()
     return 0
 
 
-@njit(cache=True)
+@PLAIN
 def matrix(scene, radar, refs, aims, delays, gains, cells, out):
     """Fill out (N, M) with all range cells, or with subcarriers where `cells` is false; result as `signal`."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.echo import answers, ladder
+from lowalt.echo.ladder import Choice
 from lowalt.echo.motion import Rigid, Scene, check
 from lowalt.echo.precise import reference
 from lowalt.echo.radar import Radar, radar
@@ -29,12 +30,15 @@ class EchoResult(NamedTuple):
     """Signal of one station.
 
     signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: how
-    many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding).
+    many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding); bound: proved
+    bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why.
     """
 
     signal: np.ndarray
     cell: np.ndarray
     near_ties: int
+    bound: float
+    choice: Choice
 
 
 def echo_signal(
@@ -54,16 +58,43 @@ def echo_signal(
     paths: all ways of the wave (default: the direct one alone); sample: a name for error messages.
     Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
     """
+    _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
-    if paths is None:
-        found, again = ladder.climb(scene, radio, refs, aims, tolerance)
-    else:
-        found, again = ladder.Found.empty(len(refs)), np.arange(len(refs))
+    found, again, choice = ladder.climb(scene, radio, refs, aims, tolerance)
+    if paths is not None:
+        again = np.arange(len(refs))
+        choice = choice._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
     if len(again):
-        computed = np.empty(len(refs), np.int64)
-        fault = answers.signal(scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, computed)
+        fault = answers.signal(
+            scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, found.totals
+        )
         _check_fault(fault, scene, station, sample)
-    return EchoResult(found.values, found.cells, int(found.ties.sum()))
+        found.bounds[again] = found.totals[again] * choice.general_share
+        if choice.spread >= 0.9:
+            found.bounds[again] = np.inf
+    largest = float(abs(found.values).max())
+    bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
+    if tolerance is not None and not bound <= tolerance:
+        where = f"{sample}: " if sample else ""
+        raise InputError(
+            f"{where}tolerance is {tolerance}, below the floor of this sample: float64 can promise {bound:.1e} of its "
+            f"largest value, expected a larger tolerance or null"
+        )
+    return EchoResult(found.values, found.cells, int(found.ties.sum()), bound, choice)
+
+
+def explain(result: EchoResult) -> str:
+    """Return in words how a signal was computed and which bounds allowed it."""
+    choice = result.choice
+    kind = "float32 after the phase" if choice.single else "float64"
+    aim = "exact mode" if choice.error is None else f"plan for {choice.error:.1e} of the sum of amplitudes"
+    return "\n".join([
+        f"target radius {choice.size_m:.3g} m, at most {choice.spread:.3g} of the range",
+        f"{aim}: {kind}, orders of 1/r {choice.orders[0]}, range {choice.orders[1]}, cosine {choice.orders[2]}, "
+        f"sine {choice.orders[3]}",
+        f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, {choice.general} by the general kernel",
+        f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
+    ])  # fmt: skip
 
 
 def range_cells(
@@ -90,6 +121,13 @@ def subcarrier_matrix(
 ) -> np.ndarray:
     """Return Y_k (N, M) complex128, the known symbol removed; arguments and errors as `echo_signal`. Source: Eq. 24."""
     return _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, False)
+
+
+def _check_tolerance(tolerance, sample: str) -> None:
+    good = tolerance is None or (isinstance(tolerance, (int, float)) and 0 < tolerance < 1)
+    if not good:
+        where = f"{sample}: " if sample else ""
+        raise InputError(f"{where}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
 
 
 def _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, cells: bool) -> np.ndarray:

@@ -1,15 +1,16 @@
 """The fast kernel's driver: segments of symbols, tiles of points, certified strongest cells.
 
-All smooth factors are the plan's polynomials; `lanes` holds the loops.
+All smooth factors are the plan's polynomials; `lanes` holds the loops. Everything here is compiled without counted
+references (`_nrt=False`): they took a quarter of the time. So nothing here may allocate; rooms come in as arguments.
 """
 
 import math
 
 import numpy as np
-from numba import njit
 
 from lowalt.echo import lanes
 from lowalt.echo.answers import NEAR_TIE
+from lowalt.echo.compile import LEAN
 from lowalt.echo.fits import TOP, degree_for, economised, tail
 from lowalt.echo.spans import CELL, SIZE, SPREAD
 from lowalt.echo.terms import cell_phase
@@ -26,8 +27,8 @@ FINE, AGAIN = 0, 1
 """State of a symbol: done, or to be computed again with the finest plan or the general kernel."""
 
 
-@njit(cache=True, error_model="numpy")
-def fit_segment(segment, aims, rules, error, base, fold, coefficients, degrees):
+@LEAN
+def fit_segment(segment, aims, rules, error, base, fold, room, coefficients, degrees):
     """Fit a segment's polynomials to `error`; returns (cells, first cell, bounds of gains, of cells, of sine).
 
     rules: weights and rates of the horizontal and vertical gain and the cell kernel. The number of cells is 0 where
@@ -47,18 +48,17 @@ def fit_segment(segment, aims, rules, error, base, fold, coefficients, degrees):
     degree = degrees[SINE]
     for cell in range(cells):
         degrees[FIRST + cell] = degree
-        economised(wk, rk, 0.0, middle - low - cell, half, degree, fold, coefficients[FIRST + cell])
+        economised(wk, rk, 0.0, middle - low - cell, half, degree, fold, room, coefficients[FIRST + cell])
     # sin(pi u) serves the bound on far cells alone.
     degrees[SINE] = degree_for(bands[2], max(error, FAR))
-    economised(wh, rh, 0.0, segment[2] - aims[0], segment[3], degrees[H], fold, coefficients[H])
-    economised(wv, rv, 0.0, segment[4] - aims[1], segment[5], degrees[V], fold, coefficients[V])
-    one = np.ones(1)
-    economised(one, math.pi * one, -0.5 * math.pi, middle, half, degrees[SINE], fold, coefficients[SINE])
+    economised(wh, rh, 0.0, segment[2] - aims[0], segment[3], degrees[H], fold, room, coefficients[H])
+    economised(wv, rv, 0.0, segment[4] - aims[1], segment[5], degrees[V], fold, room, coefficients[V])
+    economised((1.0,), (math.pi,), -0.5 * math.pi, middle, half, degrees[SINE], fold, room, coefficients[SINE])
     gains = tail(bands[0], degrees[H]) + tail(bands[1], degrees[V])
     return cells, low, gains, tail(bands[2], degree), tail(bands[2], degrees[SINE])
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def far_limit(c0, c1, a2, distance, reach, count):
     """Bound of |sum| in every cell at least `distance` from the expansion's centre; see `answers.far_bound`."""
     if distance - reach <= 0.0:
@@ -69,7 +69,7 @@ def far_limit(c0, c1, a2, distance, reach, count):
     return (c0 / s + c1 * step * abs(k) / (s * s) + a2 * step * step / near**3) / count
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def fill_tile(rotation, translation, lx, ly, lz, parts, starts, q, sine, cosine, r, n, first, size, at, m, ex, ey, ez):
     """Put points first..first + size of symbol n into the tile from `at`: offsets from the reference, per r_ref.
 
@@ -107,7 +107,7 @@ def fill_tile(rotation, translation, lx, ly, lz, parts, starts, q, sine, cosine,
         ex[i], ey[i], ez[i] = 0.0, 0.0, 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def constants(radar, refs, i, segs, index, psi0, omega0, base, k, s):
     """Fill row s of k with the constants of symbol i, in segment `index`, for `lanes.arguments`."""
     r = refs[i, 3]
@@ -129,7 +129,7 @@ def constants(radar, refs, i, segs, index, psi0, omega0, base, k, s):
     k[s, 13], k[s, 14], k[s, 15] = 2.0 * hx, 2.0 * hy, 2.0 * hz
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def near_cells(place, deep, window):
     """Cells first..last of the window that can well be a symbol's strongest; the bound looks after the others."""
     margin = 0.6 + 1.5 * deep
@@ -137,7 +137,7 @@ def near_cells(place, deep, window):
     return max(0, min(first, window - 1)), max(0, min(last, window - 1))
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def rank(sums, lowest, highest):
     """Largest and second largest |sum| of the cells lowest..highest, and the place of the largest."""
     best, second, which = -1.0, -1.0, lowest
@@ -150,7 +150,7 @@ def rank(sums, lowest, highest):
     return best, second, which
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def one_cell(row, degree, at, size, u, weight, real, imag):
     """Sum of one symbol's points in one cell of the window."""
     lanes.horner(u[at : at + size], row, degree, weight[at : at + size], size)
@@ -158,7 +158,7 @@ def one_cell(row, degree, at, size, u, weight, real, imag):
     return complex(re, im)
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def certify(
     place, deep, c0, c1, a2, slack, bound, sums, first, last, window, at, size, typed, degree, shape, arrays
 ):  # fmt: skip
@@ -181,9 +181,7 @@ def certify(
                 break
             for j in range(1, RING + 1):
                 for cell in (-j, window - 1 + j):
-                    re, im = lanes.distant_cell(
-                        cell, half, centre, count, sin_u, u, real, imag, at, size
-                    )
+                    re, im = lanes.distant_cell(cell, half, centre, count, sin_u, u, real, imag, at, size)
                     # Only an upper bound of the size, since the sine is coarse; no value is taken from here.
                     sums[RING + cell] = math.hypot(re, im) + slack
             lowest, highest = 0, 2 * RING + window - 1
@@ -199,13 +197,14 @@ def certify(
     return AGAIN, 0, False, True
 
 
-@njit(cache=True, error_model="numpy")
-def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, plan, work, small, out):
+@LEAN
+def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, plan, rooms, work, small, out):
     """Compute the symbols of all segments.
 
     symbols: indices that refs, span and segs are cut from; fits: polynomials of inverse, excess (float64), cosine and
     sine (the tile's type); plan: error of the segments' fits, slack relative to the sum of amplitudes and to the sum
-    of peak amplitudes, 1 where close calls are final; out: values, cells, state, totals, bounds, ties, each (N,).
+    of peak amplitudes, 1 where close calls are final; rooms, work, small: see `rooms_for`; out: values, cells, state,
+    totals, bounds, ties, each (N,).
     """
     inverse, excess, cosine, sine = fits
     values, cells, state, totals, bounds, ties = out
@@ -218,24 +217,20 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
     padded = len(amplitude)
     together = max(1, lanes.TILE // padded)
     chunk = min(padded, lanes.TILE)
-    m, k = np.empty(12), np.empty((together, 16))
-    sums = np.empty((together, WIDEST + 2 * RING), np.complex128)
-    more = np.empty((together, 2), np.complex128)
-    weights = np.empty((together, 3))
-    coefficients = np.empty((FIRST + WIDEST, TOP + 1))
-    typed = np.empty((FIRST + WIDEST, TOP + 1), turn.dtype)
-    degrees = np.empty(FIRST + WIDEST, np.int64)
+    room, m, k, sums, more, weights, coefficients, typed, degrees = rooms
     for index in range(len(segs)):
         start, end = int(segs[index, 0]), int(segs[index, 1])
         base = np.rint(segs[index, 6])
         window, low, bound_gain, bound_cell, bound_sine = fit_segment(
-            segs[index], aims, rules, plan[0], base, fold, coefficients, degrees
+            segs[index], aims, rules, plan[0], base, fold, room, coefficients, degrees
         )
         if window == 0 or window >= radar.subcarriers:
             for i in range(start, end):
                 state[symbols[i]] = AGAIN
             continue
-        typed[: FIRST + window] = coefficients[: FIRST + window]
+        for row in range(FIRST + window):
+            for j in range(degrees[row] + 1):
+                typed[row, j] = coefficients[row, j]
         row_h, row_v, row_sine = typed[H], typed[V], typed[SINE]
         degree = degrees[FIRST]
         first, last = 0, window - 1
@@ -299,8 +294,8 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
                 a2 = abs(a2) + 1e-3 * total * min(1.0, (half + abs(shift)) ** 2)
                 c1 += total * bound_sine * 2.0 * segs[index, 7]
                 fate, which, tie, close = certify(
-                    place - low, span[i + s, SIZE] * radar.cells, c0, c1, a2, total * bound_sine, bound, sums[s], first, last,
-                    window, s * size, size if chunk == padded else 0, typed, degree,
+                    place - low, span[i + s, SIZE] * radar.cells, c0, c1, a2, total * bound_sine, bound, sums[s],
+                    first, last, window, s * size, size if chunk == padded else 0, typed, degree,
                     (radar.subcarriers, segs[index, 7], segs[index, 6] - base - low),
                     (gain_h, u, real, imag, gain_v),
                 )  # fmt: skip
@@ -311,3 +306,20 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
                     cell = int(base) + low + which - RING
                     values[n] = sums[s, which] * cell_phase(cell, radar.subcarriers)
                     cells[n], ties[n] = cell % radar.subcarriers, tie
+
+
+def rooms_for(points: int, rates: int, single: bool):
+    """Work arrays of `run`: (rooms, work in float64, small in the tile's type).
+
+    The tile's arrays are separate and of odd length: as rows of one array a whole 4096 bytes apart, loads would wait
+    for unrelated stores.
+    """
+    kind = np.float32 if single else np.float64
+    together = max(1, lanes.TILE // points)
+    rooms = (
+        np.empty((3, rates)), np.empty(12), np.empty((together, 16)),
+        np.empty((together, WIDEST + 2 * RING), np.complex128), np.empty((together, 2), np.complex128),
+        np.empty((together, 3)), np.empty((FIRST + WIDEST, TOP + 1)), np.empty((FIRST + WIDEST, TOP + 1), kind),
+        np.empty(FIRST + WIDEST, np.int64),
+    )  # fmt: skip
+    return rooms, tuple(np.empty(lanes.ROW) for _ in range(6)), tuple(np.empty(lanes.ROW, kind) for _ in range(10))

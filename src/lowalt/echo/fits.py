@@ -8,8 +8,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.polynomial import chebyshev
+
+from lowalt.echo.compile import PLAIN, VECTOR
 
 TOP = 40
 """Highest degree of any polynomial here; a stretch that would need more goes to the general kernel."""
@@ -17,7 +18,7 @@ EXTRA = 8
 """Taylor orders beyond the degree that are folded back into it (economisation)."""
 
 
-@njit(cache=True)
+@PLAIN
 def tail(band, degree):
     """Bound of the error of `economised` for a sum of cosines with weights of sum 1 and phases up to `band` (rad)."""
     half = 0.5 * band
@@ -34,7 +35,7 @@ def tail(band, degree):
     return term / (1.0 - ratio) + cut / (1.0 - other)
 
 
-@njit(cache=True)
+@PLAIN
 def degree_for(band, error):
     """Smallest degree whose `tail` is at most `error`; TOP + 1 where none is."""
     for degree in range(TOP + 1):
@@ -56,14 +57,14 @@ def folding() -> np.ndarray:
     return result
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
-def economised(weights, rates, phase, centre, half, degree, fold, out):
+@VECTOR
+def economised(weights, rates, phase, centre, half, degree, fold, room, out):
     """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s.
 
-    Rates are not negative.
+    Rates are not negative; room: (3, at least as many as rates), overwritten.
     """
     count = len(weights)
-    term, even, odd = np.empty(count), np.empty(count), np.empty(count)
+    term, even, odd = room[0], room[1], room[2]
     for i in range(count):
         angle = rates[i] * centre + phase
         term[i], even[i], odd[i] = weights[i], math.cos(angle), -math.sin(angle)

@@ -6,15 +6,18 @@ import numpy as np
 
 from lowalt.echo import fast
 from lowalt.echo.fits import folding
-from lowalt.echo.lanes import ROW
 from lowalt.echo.layout import layout
 from lowalt.echo.motion import Scene
-from lowalt.echo.plan import SPREAD_LIMIT, Plan, plan, rules
+from lowalt.echo.plan import SPREAD_LIMIT, Plan, general_share, plan, rules
 from lowalt.echo.radar import Radar
-from lowalt.echo.spans import SIZE, segments, spans
+from lowalt.echo.spans import SIZE, SPREAD, segments, spans
 
 LONGEST = 64
 """Most symbols of a segment."""
+
+
+PROBES = 8
+"""Symbols computed exactly first: their largest value bounds the sample's largest from below."""
 
 
 class Found(NamedTuple):
@@ -36,33 +39,104 @@ class Found(NamedTuple):
         )  # fmt: skip
 
 
-def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float | None) -> tuple[Found, np.ndarray]:
-    """Return what the fast kernel found and the symbols left for the general kernel."""
+class Choice(NamedTuple):
+    """What was decided for a sample, and by which bounds.
+
+    error: what the cheap plan was to keep, relative to the sum of amplitudes (None: exact mode only); single: float32
+    after the phase; orders: polynomial orders of 1/r, range, cosine, sine; cheap, exact, general: symbols by kernel;
+    spread: largest target radius over range; size_m: largest radius (m); general_share: error bound of the general
+    kernel relative to the sum of amplitudes.
+    """
+
+    error: float | None
+    single: bool
+    orders: tuple[int, int, int, int]
+    cheap: int
+    exact: int
+    general: int
+    spread: float
+    size_m: float
+    general_share: float
+
+
+def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float | None):
+    """Return (found, symbols left for the general kernel, choice): first cheap, then exact where a bound asks for it.
+
+    A symbol is computed again where its bound exceeds the tolerance times the largest value, where its strongest cell
+    is not certain to that bound, and where far cells could not be excluded.
+    """
+    sample = _Sample(scene, radar, refs, aims)
     found = Found.empty(len(refs))
     everyone = np.arange(len(refs))
-    peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
-    lay = layout(scene, peak)
-    first = scene.part[0] if len(scene.part) else 0
-    span = np.empty((len(refs), 5))
-    spread = spans(scene.rotation, scene.translation, first, lay.parts, lay.radii, refs, radar.sine, radar.cosine, span)
-    if not spread < SPREAD_LIMIT:
-        return found, everyone
-    size_m = span[:, SIZE].max()
-    exact = plan(radar, spread, size_m, len(lay.amplitude), 0.0)
-    _run(scene, lay, radar, refs, span, everyone, aims, exact, True, found)
-    return found, np.flatnonzero(found.state)
+    exact = sample.plan(0.0)
+    if not sample.spread < SPREAD_LIMIT:
+        return found, everyone, sample.choice(None, exact, 0, 0, len(refs))
+    chosen, error, cheap = exact, None, 0
+    if tolerance is not None and len(refs) > PROBES:
+        probes = everyone[:: -(-len(refs) // PROBES)]
+        sample.run(probes, exact, True, found)
+        share = abs(found.values[probes]).max() / (found.totals[probes].max() + sample.peaks(probes).max())
+        error = 0.5 * tolerance * share
+        chosen = sample.plan(error)
+        if chosen.fits[2].size < exact.fits[2].size:
+            sample.run(everyone, chosen, False, found)
+            good = (found.state == fast.FINE) & (found.bounds <= tolerance * _floor_of_largest(found))
+            cheap = int(good.sum())
+            everyone = np.flatnonzero(~good)
+        else:
+            chosen, error = exact, None
+    if len(everyone):
+        sample.run(everyone, exact, True, found)
+    left = np.flatnonzero(found.state)
+    return found, left, sample.choice(error, chosen, cheap, len(everyone) - len(left), len(left))
 
 
-def _run(scene, lay, radar, refs, span, symbols, aims, chosen: Plan, final: bool, found: Found) -> None:
-    if len(symbols) < len(refs):
-        refs, span = refs[symbols], span[symbols]
-    table = rules(radar)
-    segs = np.empty((len(symbols), 8))
-    count = segments(span, radar.cells, table[1][0], table[3][0], LONGEST, segs)
-    # Separate arrays of odd length: rows of one array would be views, a counted reference each time they are passed.
-    work = tuple(np.empty(ROW) for _ in range(6))
-    small = tuple(np.empty(ROW, np.float32 if chosen.single else np.float64) for _ in range(10))
-    fast.run(
-        scene, lay, radar, refs, span, segs[:count], symbols, aims, table, chosen.fits, folding(),
-        (chosen.fit, chosen.share, chosen.peak, float(final)), work, small, tuple(found),
-    )  # fmt: skip
+def _floor_of_largest(found: Found) -> float:
+    """What the largest |value| is at least, whatever the errors."""
+    done = found.state == fast.FINE
+    return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
+
+
+class _Sample:
+    """One sample's layout and spans, and the runs of the fast kernel on it."""
+
+    def __init__(self, scene: Scene, radar: Radar, refs: np.ndarray, aims) -> None:
+        self.scene, self.radar, self.refs, self.aims = scene, radar, refs, aims
+        peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
+        self.lay = layout(scene, peak)
+        self.span = np.empty((len(refs), 5))
+        first = scene.part[0] if len(scene.part) else 0
+        self.spread = spans(
+            scene.rotation, scene.translation, first, self.lay.parts, self.lay.radii, refs, radar.sine, radar.cosine,
+            self.span,
+        )  # fmt: skip
+        self.size_m = float(self.span[:, SIZE].max())
+
+    def plan(self, error: float) -> Plan:
+        """The plan that keeps `error` (0: the exact mode)."""
+        return plan(self.radar, min(self.spread, SPREAD_LIMIT), self.size_m, len(self.lay.amplitude), error)
+
+    def peaks(self, symbols: np.ndarray) -> np.ndarray:
+        """Sum of amplitudes at the arrays' peak gain, a bound for every symbol."""
+        return self.lay.total / (self.refs[symbols, 3] * (1 - self.span[symbols, SPREAD])) ** 2
+
+    def run(self, symbols: np.ndarray, chosen: Plan, final: bool, found: Found) -> None:
+        """Compute `symbols` into `found` with the plan chosen; `final`: close calls between cells stand."""
+        refs, span = self.refs, self.span
+        if len(symbols) < len(refs):
+            refs, span = refs[symbols], span[symbols]
+        table = rules(self.radar)
+        segs = np.empty((len(symbols), 8))
+        count = segments(span, self.radar.cells, table[1][0], table[3][0], LONGEST, segs)
+        widest = max(len(rates) for rates in table[1::2])
+        rooms, work, small = fast.rooms_for(len(self.lay.amplitude), widest, chosen.single)
+        fast.run(
+            self.scene, self.lay, self.radar, refs, span, segs[:count], symbols, self.aims, table, chosen.fits,
+            folding(), (chosen.fit, chosen.share, chosen.peak, float(final)), rooms, work, small, tuple(found),
+        )  # fmt: skip
+
+    def choice(self, error, chosen: Plan, cheap: int, exact: int, general: int) -> Choice:
+        """The record of what was done."""
+        share = general_share(self.radar, self.size_m, len(self.lay.amplitude))
+        orders = tuple(len(c) - 1 for c in chosen.fits)
+        return Choice(error, chosen.single, orders, cheap, exact, general, self.spread, self.size_m, share)

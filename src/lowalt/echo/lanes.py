@@ -8,131 +8,134 @@ views of arrays would do as well, but cost a counted reference each.
 """
 
 import numpy as np
-from numba import njit
 
-FLAGS = {"contract", "reassoc", "nsz"}
+from lowalt.echo.compile import VECTOR
+
 TILE = 512
 """Points in a tile: some twenty arrays of 4 kB stay in the nearest caches."""
 ROW = TILE + 24
 """Room for a tile's array: rows a whole 4096 bytes apart would make loads wait for unrelated stores."""
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def horner(x, c, degree, out, size):
     """out[:size] = sum of c[k] x^k for k up to `degree`, four orders a pass over the tile."""
     k = degree
     top = c[degree]
     first = degree & 3
     if first == 0:
-        for l in range(size):
-            out[l] = top
+        for i in range(size):
+            out[i] = top
     elif first == 1:
         c0 = c[degree - 1]
-        for l in range(size):
-            out[l] = top * x[l] + c0
+        for i in range(size):
+            out[i] = top * x[i] + c0
     elif first == 2:
         c0, c1 = c[degree - 1], c[degree - 2]
-        for l in range(size):
-            t = x[l]
-            out[l] = (top * t + c0) * t + c1
+        for i in range(size):
+            t = x[i]
+            out[i] = (top * t + c0) * t + c1
     else:
         c0, c1, c2 = c[degree - 1], c[degree - 2], c[degree - 3]
-        for l in range(size):
-            t = x[l]
-            out[l] = ((top * t + c0) * t + c1) * t + c2
+        for i in range(size):
+            t = x[i]
+            out[i] = ((top * t + c0) * t + c1) * t + c2
     k = degree - first
     while k > 0:
         c0, c1, c2, c3 = c[k - 1], c[k - 2], c[k - 3], c[k - 4]
-        for l in range(size):
-            t = x[l]
-            out[l] = (((out[l] * t + c0) * t + c1) * t + c2) * t + c3
+        for i in range(size):
+            t = x[i]
+            out[i] = (((out[i] * t + c0) * t + c1) * t + c2) * t + c3
         k -= 4
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def place_part(px, py, pz, low, size, m, ex, ey, ez, at):
-    """Fill offsets ex, ey, ez from `at` with `size` points of a part from `low`; m: 12 numbers, matrix rows then offset, per r_ref."""
+    """Fill offsets ex, ey, ez from `at` with `size` points of a part from `low`.
+
+    m: 12 numbers, the rows of the part's matrix, then its offset, all over r_ref.
+    """
     m0, m1, m2, m3, m4, m5 = m[0], m[1], m[2], m[3], m[4], m[5]
     m6, m7, m8, m9, m10, m11 = m[6], m[7], m[8], m[9], m[10], m[11]
     at, low = np.uint64(at), np.uint64(low)
-    for l in range(np.uint64(size)):
-        x, y, z = px[low + l], py[low + l], pz[low + l]
-        ex[at + l] = m0 * x + m1 * y + m2 * z + m9
-        ey[at + l] = m3 * x + m4 * y + m5 * z + m10
-        ez[at + l] = m6 * x + m7 * y + m8 * z + m11
+    for i in range(np.uint64(size)):
+        x, y, z = px[low + i], py[low + i], pz[low + i]
+        ex[at + i] = m0 * x + m1 * y + m2 * z + m9
+        ey[at + i] = m3 * x + m4 * y + m5 * z + m10
+        ez[at + i] = m6 * x + m7 * y + m8 * z + m11
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def relative_excess(ex, ey, ez, hx, hy, hz, eps, at, size):
     """eps = r^2 / r_ref^2 - 1 from offsets per r_ref and twice the unit vector (hx, hy, hz) to the reference."""
     at = np.uint64(at)
     for i in range(np.uint64(size)):
-        l = at + i  # noqa: E741
-        eps[l] = ex[l] * (hx + ex[l]) + ey[l] * (hy + ey[l]) + ez[l] * (hz + ez[l])
+        j = at + i
+        eps[j] = ex[j] * (hx + ex[j]) + ey[j] * (hy + ey[j]) + ez[j] * (hz + ez[j])
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def arguments(k, s, ey, ez, eps, inverse, excess, amplitude, first, psi, omega, u, turn, amp, at, size):
     """From the two polynomials: arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2], amplitude.
 
-    k: (symbols, 16), row s the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u, turns per
-    excess, per psi and per omega, the reference's turn, 1 / r_ref^2.
+    k: (symbols, 16), row s the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u,
+    turns per excess, per psi and per omega, the reference's turn, 1 / r_ref^2.
     """
     hy, hz, sp, cp, so, co, su, cu = k[s, 0], k[s, 1], k[s, 2], k[s, 3], k[s, 4], k[s, 5], k[s, 6], k[s, 7]
     te, tp, to, t0, inverse_r2 = k[s, 8], k[s, 9], k[s, 10], k[s, 11], k[s, 12]
     at, first = np.uint64(at), np.uint64(first)
     for i in range(np.uint64(size)):
-        l = at + i  # noqa: E741
-        f = inverse[l]
-        d = eps[l] * excess[l]
-        p = (hy + ey[l]) * f * sp - cp
-        o = (hz + ez[l]) * f * so - co
-        psi[l] = p
-        omega[l] = o
-        u[l] = d * su + cu
+        j = at + i
+        f = inverse[j]
+        d = eps[j] * excess[j]
+        p = (hy + ey[j]) * f * sp - cp
+        o = (hz + ez[j]) * f * so - co
+        psi[j] = p
+        omega[j] = o
+        u[j] = d * su + cu
         t = te * d + tp * p + to * o + t0
-        turn[l] = t - np.rint(t)
-        amp[l] = amplitude[first + i] * f * f * inverse_r2
+        turn[j] = t - np.rint(t)
+        amp[j] = amplitude[first + i] * f * f * inverse_r2
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def waves(size, amp, gain_h, gain_v, cosine, sine, turn, real, imag):
     """real, imag = amplitude times gains times (cosine, sine); `sine` comes divided by the turn."""
-    for l in range(size):
-        a = amp[l] * gain_h[l] * gain_v[l]
-        real[l] = a * cosine[l]
-        imag[l] = a * sine[l] * turn[l]
-        amp[l] = abs(a)
+    for i in range(size):
+        a = amp[i] * gain_h[i] * gain_v[i]
+        real[i] = a * cosine[i]
+        imag[i] = a * sine[i] * turn[i]
+        amp[i] = abs(a)
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def squares(size, turn, square):
     """square = turn^2."""
-    for l in range(size):
-        square[l] = turn[l] * turn[l]
+    for i in range(size):
+        square[i] = turn[i] * turn[i]
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def weigh(weight, real, imag, at, size):
     """Sums of weight * real and weight * imag."""
     re, im = weight[0] - weight[0], weight[0] - weight[0]
     at = np.uint64(at)
     for i in range(np.uint64(size)):
-        l = at + i  # noqa: E741
-        re += weight[l] * real[l]
-        im += weight[l] * imag[l]
+        j = at + i
+        re += weight[j] * real[j]
+        im += weight[j] * imag[j]
     return re, im
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
+@VECTOR
 def far_sums(sine, u, real, imag, amp, at, size):
     """Sums of c and c u with c = z sin(pi u), and of |z|, |z| u and |z| u^2, for the bound on far cells."""
     a = sine[0] - sine[0]
     b, c, d, total, first, second = a, a, a, a, a, a
     at = np.uint64(at)
     for i in range(np.uint64(size)):
-        l = at + i  # noqa: E741
-        x, y, t, w = real[l] * sine[l], imag[l] * sine[l], u[l], amp[l]
+        j = at + i
+        x, y, t, w = real[j] * sine[j], imag[j] * sine[j], u[j], amp[j]
         a += x
         b += y
         c += x * t
@@ -143,22 +146,22 @@ def far_sums(sine, u, real, imag, amp, at, size):
     return a, b, c, d, total, first, second
 
 
-@njit(cache=True, fastmath=FLAGS, error_model="numpy")
-def distant_cell(j, scale, shift, count, sine, u, real, imag, at, size):
-    """Sum in cell j, which no point is near, of c / (M sin(pi (j - u) / M)) with c = z sin(pi u).
+@VECTOR
+def distant_cell(cell, scale, shift, count, sine, u, real, imag, at, size):
+    """Sum in one cell, which no point is near, of c / (M sin(pi (cell - u) / M)) with c = z sin(pi u).
 
-    u: on [-1, 1], cells = scale u + shift. |pi (j - cells) / M| must stay below 1.6 for the sine's polynomial.
+    u: on [-1, 1], cells = scale u + shift. |pi (cell - cells) / M| must stay below 1.6 for the sine's polynomial.
     """
     re, im = 0.0, 0.0
     step = np.pi / count
     at = np.uint64(at)
     for i in range(np.uint64(size)):
-        l = at + i  # noqa: E741
-        x = (j - shift - scale * u[l]) * step
+        j = at + i
+        x = (cell - shift - scale * u[j]) * step
         q = x * x
         s = x * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880 + q * (
             -1 / 39916800 + q * (1 / 6227020800 + q * (-1 / 1307674368000))))))))  # fmt: skip
-        w = sine[l] / s
-        re += w * real[l]
-        im += w * imag[l]
+        w = sine[j] / s
+        re += w * real[j]
+        im += w * imag[j]
     return re / count, im / count

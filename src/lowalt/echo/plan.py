@@ -57,7 +57,7 @@ def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
     wave = 2 * np.pi * turns * 2 * size_m
     array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
     unit = 2.0**-53
-    single = 600 * 2.0**-24 < error
+    single = error > 600 * 2.0**-24
     coarse = 2.0**-24 if single else unit
     part = error / 8
     inverse, inverse_error = smooth("inverse", reach, part / (2 + 2 * array_phase))
@@ -71,3 +71,15 @@ def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
     kind = np.float32 if single else np.float64
     fits = (inverse, excess, cosine.astype(kind), sine.astype(kind))
     return Plan(max(part, FINEST), share, array_phase * inverse_error + 80 * coarse, single, fits)
+
+
+def general_share(radar: Radar, size_m: float, points: int) -> float:
+    """Bound of the general kernel's error relative to the sum of amplitudes, for targets away from the station.
+
+    Phase: range differences, direction cosines and their products each carry a few roundings; the rest is sums.
+    """
+    array_phase = np.pi * radar.kappa / 2 * (
+        radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v - 4
+    )  # fmt: skip
+    wave = 2 * np.pi * radar.turns * 2 * size_m
+    return float((8 * wave + 40 * array_phase + 200 + points) * 2.0**-53)

@@ -7,17 +7,18 @@ not grow with range. Compiled without any fast-math flag: the compensations belo
 import math
 
 import numpy as np
-from numba import njit
+
+from lowalt.echo.compile import PLAIN
 
 
-@njit(cache=True, inline="always")
+@PLAIN
 def _two_sum(a, b):
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
-@njit(cache=True, inline="always")
+@PLAIN
 def _two_product(a, b):
     p = a * b
     x = 134217729.0 * a
@@ -29,7 +30,7 @@ def _two_product(a, b):
     return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-@njit(cache=True, inline="always")
+@PLAIN
 def _fraction(r, r_lo, k, k_lo):
     """Whole part and fraction, within about [-1/2, 1/2], of (r + r_lo) (k + k_lo)."""
     p, q = _two_product(r, k)
@@ -37,7 +38,7 @@ def _fraction(r, r_lo, k, k_lo):
     return whole, (p - whole) + (q + (r * k_lo + r_lo * k))
 
 
-@njit(cache=True)
+@PLAIN
 def reference(place, station, turns, turns_lo, cells, cells_lo):
     """Reference geometry of every symbol: array (N, 7).
 

@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from numba import njit
+
+from lowalt.echo.compile import PLAIN
 
 PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
 """Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
 
 
-@njit(cache=True)
+@PLAIN
 def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
     """Fill out (N, 5) and return the largest SPREAD.
 
@@ -44,7 +45,7 @@ def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
     return worst
 
 
-@njit(cache=True, inline="always")
+@PLAIN
 def norm(m):
     """Bound of a 3 x 3 matrix's norm: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
     a = m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2]
@@ -56,7 +57,7 @@ def norm(m):
     return math.sqrt(max(a + d + e, b + d + f, c + e + f))
 
 
-@njit(cache=True)
+@PLAIN
 def segments(span, cells_per_m, rate_h, rate_v, longest, out):
     """Cut the symbols into runs over which gains and cell kernels stay short polynomials.
 

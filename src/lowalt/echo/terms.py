@@ -6,10 +6,11 @@ It serves all three answers, extra paths, and the symbols that the fast kernel c
 import math
 
 import numpy as np
-from numba import njit
+
+from lowalt.echo.compile import PLAIN
 
 
-@njit(cache=True, inline="always")
+@PLAIN
 def sin_pi(x):
     """Sine of pi x with the argument reduced before pi comes in, so whole x give exactly zero."""
     k = np.rint(x)
@@ -17,7 +18,7 @@ def sin_pi(x):
     return -s if int(k) & 1 else s
 
 
-@njit(cache=True)
+@PLAIN
 def dirichlet(x, count):
     """U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x."""
     k = np.rint(x)
@@ -28,7 +29,7 @@ def dirichlet(x, count):
     return sign * sin_pi(count * f) / math.sin(math.pi * f)
 
 
-@njit(cache=True)
+@PLAIN
 def aim_cosines(aim, station, sine, cosine):
     """Direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and Omega)."""
     x, y, z = aim[0] - station[0], aim[1] - station[1], aim[2] - station[2]
@@ -36,7 +37,7 @@ def aim_cosines(aim, station, sine, cosine):
     return (cosine * y - sine * x) / r, z / r
 
 
-@njit(cache=True)
+@PLAIN
 def offsets(scene, n, place, e):
     """Fill e (L, 3) with the points' positions relative to `place` (3,) at symbol n (m)."""
     if scene.rotation.shape[0] == 0:
@@ -53,7 +54,7 @@ def offsets(scene, n, place, e):
             e[l, i] = turned + (scene.translation[n, p, i] - place[i])
 
 
-@njit(cache=True)
+@PLAIN
 def terms(scene, radar, ref, n, psi0, omega0, e, z, u):
     """Fill z (L,), complex amplitudes without the cell's own phase, and u (L,), ranges in cells from ref's cell.
 
@@ -89,20 +90,20 @@ def terms(scene, radar, ref, n, psi0, omega0, e, z, u):
     return 0
 
 
-@njit(cache=True)
+@PLAIN
 def cell_phase(m, count):
     """Phase factor exp(j pi (M-1) m / M) of range cell m, reduced in whole numbers."""
     turn = ((count - 1) * (m % (2 * count)) % (2 * count)) / (2.0 * count)
     return complex(math.cos(2.0 * math.pi * turn), math.sin(2.0 * math.pi * turn))
 
 
-@njit(cache=True)
+@PLAIN
 def kernel(x, count):
     """Real part of the range-cell kernel, sin(pi x) / (M sin(pi x / M)), x in cells."""
     return dirichlet(x / count, count) / count
 
 
-@njit(cache=True)
+@PLAIN
 def cell_sum(z, u, j, count):
     """Sum of the points in the cell j cells after ref's, without the cell's phase."""
     total = 0.0j
