@@ -82,11 +82,11 @@ class Renderer:
         self._fourier = {name: turns(getattr(spectra, name).points, np.float32) for name in ("vrp", "trp")}
         length = spectra.vt.window
         steps = np.outer(spectra.vt.speeds_mps, np.arange(length + 1))
-        self._matched = []
+        self.matched = []
         for station in network.stations:
             phase = 4 * np.pi * station.frequency_hz * network.symbol_interval_s / SPEED_OF_LIGHT * steps
-            self._matched.append((np.cos(phase).astype(np.float32), np.sin(phase).astype(np.float32)))
-        self._share = np.array([(length / (length + 1)) ** 2], np.float32)
+            self.matched.append((np.cos(phase).astype(np.float32), np.sin(phase).astype(np.float32)))
+        self.share = np.array([(length / (length + 1)) ** 2], np.float32)
         tables = {name: lookup(images.scale, 127 if name == "vt" else 255) for name in VIEWS}
         self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in tables.items()}
         self._image = np.empty((images.size, images.size), np.float32)
@@ -110,12 +110,28 @@ class Renderer:
         values = np.empty((points, starts), np.float32)
         return source, weights, columns, shares, values, between, rows_first
 
+    def plan(self, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Source rows and weights (S, taps), columns and shares (taps, S) of one spectrum's resampling."""
+        return self._plans[name][:4]
+
+    def rows_first(self, name: str) -> bool:
+        """Whether the resampling of one spectrum begins with its rows."""
+        return self._plans[name][-1]
+
+    def starts(self, name: str) -> int:
+        """Number of symbols, from the first, at which a window of one spectrum is computed."""
+        return self._plans[name][4].shape[1]
+
+    def turns(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Cosines and sines of one Fourier spectrum, (points,) each."""
+        return self._fourier[name]
+
     def values(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
         """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,)."""
         re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
         if name == "vt":
-            transfer(re, im, self.spectra.vt.window, *self._matched[station], self._share, values)
+            transfer(re, im, self.spectra.vt.window, *self.matched[station], self.share, values)
         else:
             setting = getattr(self.spectra, name)
             fourier_magnitudes(re, im, setting.window, setting.points, *self._fourier[name], values)
