@@ -8,7 +8,9 @@ import pytest
 
 from lowalt.config import canonical, check, load, load_yaml, merge
 from lowalt.errors import InputError
+from lowalt.motion import COLUMNS
 from lowalt.plan import Plan, slug
+from lowalt.report.__main__ import STAGE_COLUMNS
 from lowalt.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parent.parent
@@ -108,3 +110,14 @@ def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller()
 def test_sources_of_nothing_are_refused():
     with pytest.raises(ModuleNotFoundError):
         sources("lowalt.nowhere")
+
+
+def test_documented_columns_are_the_columns():
+    tables = load_yaml(ROOT / "workflow/schemas/tables.yaml")
+    header = (ROOT / "config/targets.csv").read_text().split("\n")[0].split(",")
+    assert list(tables["targets"]) == header
+    motion = [name for name in COLUMNS if not name.startswith("phase_")]
+    assert [name for name in tables["motion"] if name != "phase_N_rad"] == motion
+    assert list(tables["stages"]) == list(STAGE_COLUMNS)
+    published = (ROOT / "config/published_accuracy.csv").read_text().split("\n")[0].split(",")
+    assert list(tables["accuracy"])[:4] == published

@@ -18,7 +18,7 @@ rule views:
         settings=canonical({"size": config["recognition"]["size"]}),
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
 
 
 rule freeze:

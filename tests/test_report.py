@@ -1,0 +1,82 @@
+"""The report: tables are read and pivoted as written, faults are named, pictures are pictures."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lowalt.config import load
+from lowalt.errors import InputError
+from lowalt.report import figures
+from lowalt.report.estimate import estimate
+from lowalt.report.tables import by_scheme, confusion, read_csv, stage_times
+
+
+def test_accuracy_is_pivoted_in_order(tmp_path):
+    path = tmp_path / "accuracy.csv"
+    path.write_text("protocol,scheme,snr_db,accuracy_percent\nseen,A,3,91.5\nseen,A,avg,95\nunseen,B,inf,80\n")
+    table = by_scheme(read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent"))
+    assert table == {"seen": {"A": {"3": 91.5, "avg": 95.0}}, "unseen": {"B": {"inf": 80.0}}}
+
+
+def test_a_table_without_a_column_is_refused(tmp_path):
+    path = tmp_path / "accuracy.csv"
+    path.write_text("protocol,scheme\n")
+    with pytest.raises(InputError, match=r"lacks the columns \['snr_db'\]"):
+        read_csv(path, "snr_db")
+    with pytest.raises(InputError, match="no file"):
+        read_csv(tmp_path / "none.csv")
+
+
+def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
+    lines = [
+        {"rule_name": "echo", "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0},
+        {"rule_name": "echo", "s": 3.0, "cpu_time": "NA", "max_rss": None},
+        {"rule_name": "noise", "s": 1.0, "cpu_time": 0.5, "max_rss": 50.0},
+    ]
+    paths = [tmp_path / f"{index}.jsonl" for index in range(3)]
+    for path, line in zip(paths, lines, strict=True):
+        path.write_text(json.dumps(line) + "\n")
+    echo, noise = stage_times(paths)
+    assert echo == {"rule": "echo", "jobs": 2, "wall_s": 5.0, "cpu_s": 1.5, "peak_mib": 100.0}
+    assert noise["jobs"] == 1
+    paths[0].write_text("not json\n")
+    with pytest.raises(InputError, match=r"0\.jsonl: not an extended benchmark"):
+        stage_times(paths)
+
+
+def test_confusion_counts_add_up():
+    row = {"protocol": "seen", "scheme": "A", "category": "UAV", "predicted": "Bird", "samples": "3"}
+    assert confusion([row, row]) == {("seen", "A"): {("UAV", "Bird"): 6}}
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: figures.accuracy_over_snr({"seen": {"A": {"3": 90.0, "inf": 99.0, "avg": 95.0}}}, {}),
+        lambda: figures.confusion_matrices({("seen", "A"): {("UAV", "UAV"): 5, ("Bird", "UAV"): 1}}, ("UAV", "Bird")),
+        lambda: figures.stage_bars([{"rule": "echo", "jobs": 2, "wall_s": 5.0}]),
+    ],
+)
+def test_figures_are_pictures_with_ink_and_repeat_to_the_byte(draw):
+    first = draw()
+    assert first == draw()
+    pixels = np.asarray(Image.open(io.BytesIO(first)).convert("L"))
+    assert pixels.min() < 100 < 250 < pixels.max()
+
+
+def test_an_estimate_scales_samples_and_bytes():
+    config = load(["config/default.yaml", "config/paper.yaml"], "workflow/schemas/config.schema.yaml")
+    stages = [
+        {"rule": rule, "wall_s": "100", "samples": "1000", "hardware": "x"}
+        for rule in ("motion", "echo", "noise", "tiles", "shard", "index")
+    ]
+    row = estimate(stages, 2.5e5, config, "paper")
+    assert (row["motion_models"], row["samples"]) == (240_000, 1_440_000)
+    assert row["core_hours"] == pytest.approx(600 / 1000 * 1_440_000 / 3600)
+    assert row["shards_gb"] == pytest.approx(360.0)
+    assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
+    with pytest.raises(InputError, match="index"):
+        estimate(stages[:-1], 2.5e5, config, "paper")
