@@ -8,8 +8,9 @@ import pytest
 
 from lowalt.config import canonical, check, load, load_yaml, merge
 from lowalt.errors import InputError
+from lowalt.files import slug
 from lowalt.motion import COLUMNS
-from lowalt.plan import Plan, slug
+from lowalt.plan import Plan
 from lowalt.report.__main__ import STAGE_COLUMNS
 from lowalt.sources import PACKAGE, sources
 

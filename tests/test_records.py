@@ -7,7 +7,8 @@ import pytest
 import yaml
 
 from lowalt.errors import InputError
-from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, slug, source_files
+from lowalt.files import slug
+from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"
 TABLE = CONFIG / "targets.csv"
@@ -143,7 +144,7 @@ def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
         load_records(TABLE, [file for file in FILES if file.stem != "vehicle"])
     twice = tmp_path / "twice.yaml"
     twice.write_text("Crow: {source: builtin}\nOwl: {source: builtin}\nCrow: {source: gait}\n")
-    with pytest.raises(InputError, match=r"twice\.yaml: 'Crow' is named twice \(line 3\)"):
+    with pytest.raises(InputError, match=r"twice\.yaml: key 'Crow' stands twice \(line 3\)"):
         read_records(twice)
 
 
@@ -153,7 +154,7 @@ def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
         ("- Crow", "expected a mapping"),
         ("Crow: 3", "expected a mapping"),
         ("Crow: {", "not YAML"),
-        ("Crow: {source: gait, source: mesh}", "'source' is named twice"),
+        ("Crow: {source: gait, source: mesh}", "'source' stands twice"),
         ("", "expected a mapping"),
     ],
 )

@@ -13,12 +13,13 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from lowalt.errors import InputError
+from lowalt.files import slug
 from lowalt.targets.assemble import allot, turn
 from lowalt.targets.builtin import MODULES, builtin_cloud
 from lowalt.targets.cloud import check, read, write
 from lowalt.targets.dimensions import rows as dimension_rows
 from lowalt.targets.gallery import main as gallery
-from lowalt.targets.records import load_table, merge, read_records, slug
+from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.surfaces import inside
 from lowalt.targets.uav_pieces import hubs, motor_diagonal
 

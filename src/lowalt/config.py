@@ -14,33 +14,8 @@ import yaml
 
 from lowalt.command import parser, run
 from lowalt.errors import InputError
-from lowalt.files import existing, replacing
-
-
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """Safe YAML in which a key given twice is an error, not a silent overwrite."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
-        for key in keys:
-            if keys.count(key) > 1:
-                raise InputError(f"{node.start_mark.name}, line {node.start_mark.line + 1}: key {key!r} stands twice")
-        return super().construct_mapping(node, deep)
-
-
-def load_yaml(path: str | Path) -> dict:
-    """Return the mapping in a YAML file.
-
-    Raises: InputError naming the file where it is missing, not YAML, no mapping, or has a key twice.
-    """
-    with existing(path, "configuration").open() as file:
-        try:
-            value = yaml.load(file, _UniqueKeyLoader)
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: not YAML ({error})") from error
-    if not isinstance(value, dict):
-        raise InputError(f"{path}: {type(value).__name__}, expected a mapping of keys")
-    return value
+from lowalt.files import replacing
+from lowalt.yaml_files import load_yaml
 
 
 def merge(base: dict, overlay: dict) -> dict:

@@ -1,8 +1,9 @@
-"""Files at the edges of the stages: nothing half-written stays behind, every file has a checksum."""
+"""Files at the edges of the stages: nothing half-written stays behind, every file has a checksum and a plain name."""
 
 import contextlib
 import hashlib
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -38,3 +39,9 @@ def existing(path: str | Path, what: str) -> Path:
     if not path.is_file():
         raise InputError(f"{what}: no file at {path}")
     return path
+
+
+def slug(name: str) -> str:
+    """Return the file name of a subtype or scheme: lower case, runs of other characters than letters and digits as
+    one "-"."""
+    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

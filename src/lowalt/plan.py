@@ -1,6 +1,5 @@
 """What a run consists of: subtypes, chunks and shards, all known from the configuration before any job starts."""
 
-import re
 from dataclasses import dataclass
 
 from lowalt.errors import InputError
@@ -80,8 +79,3 @@ class Plan:
             for group, part in (chunk.split("-") for chunk in self.chunks)
             for name in self.folds(f"{group}-{part}")
         ]
-
-
-def slug(name: str) -> str:
-    """Return a file name for a subtype: lower case, runs of other characters than letters and digits as one "-"."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")

@@ -9,7 +9,8 @@ from snakemake.exceptions import WorkflowError
 from lowalt.config import canonical, check
 from lowalt.errors import InputError
 from lowalt.network import Network
-from lowalt.plan import Plan, slug
+from lowalt.files import slug
+from lowalt.plan import Plan
 from lowalt.recognition.schemes import named
 from lowalt.sources import sources
 from lowalt.spectra import Spectra

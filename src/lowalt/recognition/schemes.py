@@ -11,12 +11,11 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
 """
 
 import csv
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.files import existing, slug
 
 STATIONS = ("A", "B", "C")
 SPECTRA = ("VRP", "TRP", "VT")
@@ -45,11 +44,6 @@ class Scheme:
     def columns(self) -> list[int]:
         """Positions of the scheme's views among the nine of a sample, station-major."""
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
-
-
-def slug(name: str) -> str:
-    """Return `name` in lower case with each run of other characters than letters and digits as one hyphen."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
 
 
 def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, where: str) -> tuple[int, ...]:

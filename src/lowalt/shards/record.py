@@ -8,8 +8,8 @@ import math
 import numpy as np
 
 from lowalt import __version__
+from lowalt.files import slug
 from lowalt.network import Network
-from lowalt.plan import slug
 from lowalt.streams import digest
 from lowalt.targets.cloud import CATEGORIES
 

@@ -6,16 +6,14 @@ only one source understands (a mesh's unit, a recording's trim) is checked by th
 
 import csv
 import math
-import re
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-import yaml
-
 from lowalt.errors import InputError
 from lowalt.files import existing
 from lowalt.targets.cloud import CATEGORIES
+from lowalt.yaml_files import load_yaml
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = ("source", "points", "rcs_m2_per_point")
@@ -27,11 +25,6 @@ _NUMBERS = (
     "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
     "wheel_diam_m", "speed_lo", "speed_hi",
 )  # fmt: skip
-
-
-def slug(name: str) -> str:
-    """Return a subtype's file name: lower case, each run of other characters than letters and digits one `-`."""
-    return re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-")
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
@@ -71,33 +64,16 @@ def _cell(where: str, column: str, text: str) -> str | int | float | None:
     return value
 
 
-class _Loader(yaml.SafeLoader):
-    """YAML's safe loader that refuses a key given twice instead of keeping the last."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if key in seen:
-                raise InputError(
-                    f"{node.start_mark.name}: {key!r} is named twice (line {key_node.start_mark.line + 1})"
-                )
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
 def read_records(path: str | Path) -> dict[str, dict]:
     """Return the records of one file by subtype, as written.
 
     Raises: InputError where the file is no mapping of names to records, or names a subtype or a key twice.
     """
-    with existing(path, "record file").open() as file:
-        try:
-            records = yaml.load(file, _Loader)
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: not YAML ({error})") from error
-    if not isinstance(records, dict) or not all(isinstance(record, dict) for record in records.values()):
-        raise InputError(f"{path}: expected a mapping of subtypes' names to their records")
+    holds = "subtypes' names to their records"
+    records = load_yaml(path, "record file", holds)
+    for name, record in records.items():
+        if not isinstance(record, dict):
+            raise InputError(f"{path}: {name} is {record!r}, expected a mapping of {holds}")
     return records
 
 
