@@ -14,6 +14,7 @@ import torch
 
 from lowalt.errors import InputError
 from lowalt.recognition import checkpoint, predictions, recipe, runs, samples, schemes
+from lowalt.recognition.__main__ import main
 from lowalt.streams import stream
 
 TRAINING = {
@@ -101,6 +102,12 @@ def test_equal_seeds_repeat_bit_for_bit_and_others_do_not(views, tmp_path, preci
     assert not equal(one[0], train(views, tmp_path / "three", {**settings, "seed": 4})[0])
 
 
+def test_workers_that_read_ahead_change_no_bit(views, tmp_path):
+    one = train(views, tmp_path / "here", with_training(steps=9, validate_every=3))
+    two = train(views, tmp_path / "ahead", with_training(steps=9, validate_every=3, workers=2))
+    assert equal(one[0], two[0]) and one[1] == two[1]
+
+
 class Killed(Exception):
     pass
 
@@ -112,11 +119,11 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
     settings = with_training(checkpoint_s=0)
     at, step = [next(moments)], runs.Trainer._step
 
-    def breaking(self, numbers):
+    def breaking(self, *batch):
         if self.at.steps >= at[0]:
             at[0] = next(moments, 10**9)
             raise Killed
-        step(self, numbers)
+        step(self, *batch)
 
     monkeypatch.setattr(runs.Trainer, "_step", breaking)
     for _ in range(21):
@@ -129,13 +136,14 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
     assert equal(whole[0], parts[0]) and whole[1] == parts[1]
 
 
-def test_a_killed_process_resumes_from_the_command_line(views, tmp_path):
+def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys):
     table = tmp_path / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
     settings = with_training(steps=60, validate_every=10, checkpoint_s=0)
-    line = [sys.executable, "-m", "lowalt.recognition", "train", "--settings", json.dumps(settings), "--views",
-            str(views), "--protocol", "seen", "--scheme", "AB:VRP+VT", "--schemes", str(table)]  # fmt: skip
-    process = subprocess.Popen([*line, "--out", str(tmp_path / "killed")], stderr=subprocess.DEVNULL)
+    line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
+            "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(tmp_path / "killed")]  # fmt: skip
+    module = [sys.executable, "-m", "lowalt.recognition"]
+    process = subprocess.Popen([*module, *line], stderr=subprocess.DEVNULL)
     kept = tmp_path / "killed" / "checkpoint.pt"
     for _ in range(600):
         if kept.exists() or process.poll() is not None:
@@ -144,8 +152,8 @@ def test_a_killed_process_resumes_from_the_command_line(views, tmp_path):
     process.send_signal(signal.SIGKILL)
     process.wait()
     resumed = kept.exists()
-    result = subprocess.run([*line, "--out", str(tmp_path / "killed")], capture_output=True, text=True, check=True)
-    assert ("resumed at step" in result.stderr) == resumed
+    main(line)
+    assert ("resumed at step" in capsys.readouterr().err) == resumed
     name, state = checkpoint.load(tmp_path / "killed" / "model.pt")
     whole = with_training(steps=60, validate_every=10)
     weights, history = train(views, tmp_path / "whole", whole)
@@ -248,13 +256,16 @@ def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
 
 def predict_all(trained, views, out, ranks):
     settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32"})
-    arguments = ["-m", "lowalt.recognition", "evaluate", "--settings", settings, "--views", str(views),
+    arguments = ["evaluate", "--settings", settings, "--views", str(views),
                  "--model", str(trained / "model.pt"), "--out", str(out)]  # fmt: skip
-    if ranks > 1:
+    if ranks == 1:
+        main(arguments)
+    else:
         port = str(20000 + os.getpid() % 20000)
-        arguments = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port, *arguments]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    subprocess.run([sys.executable, *arguments], check=True, capture_output=True, env=environment)
+        launch = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port]
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+        command = [sys.executable, *launch, "-m", "lowalt.recognition", *arguments]
+        subprocess.run(command, check=True, capture_output=True, env=environment)
     return predictions.read(out)
 
 

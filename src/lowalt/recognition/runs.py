@@ -67,7 +67,8 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
-            "ranks": machine.ranks, "torch": torch.__version__, "timm": timm.__version__,
+            "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
+            "torch": torch.__version__, "timm": timm.__version__,
         })  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import torch
 from timm.utils import ModelEmaV3
 from torch import nn
+from torch.utils.data import DataLoader, Dataset
 
 from lowalt.errors import InputError
 from lowalt.files import replacing
@@ -45,6 +46,24 @@ class Progress:
     done: bool = False
 
 
+class Reader(Dataset):
+    """Augmented batches by (step, sample numbers): the map that the loader's workers call."""
+
+    def __init__(self, source, columns: list[int], augmentation: dict, keys: tuple, machine: Machine) -> None:
+        """source: samples; columns: their views; augmentation: its settings; keys: seed and names of the stream."""
+        self.source, self.columns, self.augmentation, self.keys = source, columns, augmentation, keys
+        self.rank, self.ranks = machine.rank, machine.ranks
+
+    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return this rank's share of a batch: index images (B, views, S, S) uint8 and labels (B,)."""
+        step, numbers = item
+        mine = numbers[self.rank :: self.ranks]
+        seed, *keys = self.keys
+        generator = stream(seed, "recognition-augment", *keys, step, self.rank)
+        images = augment(self.source.views(mine), self.columns, self.augmentation, generator)
+        return torch.from_numpy(images), torch.from_numpy(self.source.facts.label[mine]).long()
+
+
 class Trainer:
     """One training run: `fit` ends with the best averaged weights in `model.pt` and the history in `history.csv`."""
 
@@ -68,6 +87,7 @@ class Trainer:
         self.criterion = nn.CrossEntropyLoss(label_smoothing=self.block["label_smoothing"])
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
         self.best_weights: dict = {}
+        self.waited_s = 0.0
         self.at = Progress()
 
     def _order(self, epoch: int) -> np.ndarray:
@@ -106,13 +126,21 @@ class Trainer:
                 f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
             )
 
-    def _step(self, numbers: np.ndarray) -> None:
+    def _loader(self, parts: list[np.ndarray]) -> DataLoader:
+        """Batches of the rest of an epoch, read ahead by the workers; what they hold depends on the step alone."""
+        reader = Reader(self.train, self.columns, self.augmentation, (self.seed, *self.keys), self.machine)
+        numbered = list(enumerate(parts, start=self.at.steps))
+        return DataLoader(
+            reader, sampler=numbered, batch_size=None, num_workers=self.block["workers"],
+            pin_memory=self.machine.device.type == "cuda",
+            # Of its own: the loader must not draw from the stream that dropout draws from.
+            generator=torch.Generator(),
+        )  # fmt: skip
+
+    def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         self.step_model.train()
-        mine = numbers[self.machine.rank :: self.machine.ranks]
-        generator = stream(self.seed, "recognition-augment", *self.keys, self.at.steps, self.machine.rank)
-        images = augment(self.train.views(mine), self.columns, self.augmentation, generator)
-        images = torch.from_numpy(images).to(self.machine.device, non_blocking=True)
-        labels = torch.from_numpy(self.train.facts.label[mine]).long().to(self.machine.device)
+        images = images.to(self.machine.device, non_blocking=True)
+        labels = labels.to(self.machine.device, non_blocking=True)
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["factor"]
@@ -165,8 +193,12 @@ class Trainer:
         steps = self.block["steps"]
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
+            loader = iter(self._loader(parts[self.at.batch : self.at.batch + steps - self.at.steps]))
             while self.at.batch < len(parts) and self.at.steps < steps and not self.at.done:
-                self._step(parts[self.at.batch])
+                asked = time.monotonic()
+                batch = next(loader)
+                self.waited_s += time.monotonic() - asked
+                self._step(*batch)
                 self.at.batch += 1
                 if self.at.steps % self.block["validate_every"] == 0 or self.at.steps == steps:
                     self._validate()
