@@ -76,35 +76,35 @@ def shift(z, u, l, radar, delay, gain):  # noqa: E741
 
 
 @PLAIN
-def symbol(scene, radar, ref, n, aims, delays, gains, e, z, u):
-    """Fill z, u (L or L * paths) of symbol n, paths included; returns 1 + l for a point in the station, else 0."""
+def symbol(scene, radar, ref, n, aims, delays, gains, e, z, u, risk):
+    """Fill z, u, risk (L or L * paths) of symbol n with all paths; returns 1 + l for a point in the station, else 0."""
     count = len(e)
-    fault = terms(scene, radar, ref, n, aims[0], aims[1], e, z[:count], u[:count])
+    fault = terms(scene, radar, ref, n, aims[0], aims[1], e, z[:count], u[:count], risk[:count])
     paths = delays.shape[0]
     if fault or paths == 0:
         return fault
     # Backwards, since the first L entries hold the direct path that the others are made from.
     for k in range(paths - 1, -1, -1):
         for l in range(count):  # noqa: E741
-            z[k * count + l], u[k * count + l] = shift(
-                z, u, l, radar, delays[k, n % delays.shape[1], l % delays.shape[2]],
-                gains[k, n % gains.shape[1], l % gains.shape[2]],
-            )  # fmt: skip
+            delay = delays[k, n % delays.shape[1], l % delays.shape[2]]
+            gain = gains[k, n % gains.shape[1], l % gains.shape[2]]
+            z[k * count + l], u[k * count + l] = shift(z, u, l, radar, delay, gain)
+            risk[k * count + l] = risk[l] * abs(gain)
     return 0
 
 
 @PLAIN
-def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, totals):
-    """Fill values, cells, ties and sums of |amplitude| at the symbols listed; returns 0, or n L + l + 1 at r = 0."""
+def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, totals, risks):
+    """Fill values, cells, ties and sums of |amplitude| and risk at `symbols`; returns 0, or n L + l + 1 at r = 0."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
     size = count * max(1, delays.shape[0])
-    e, z, u = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size)
+    e, z, u, risk = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size)
     for n in symbols:
-        fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u)
+        fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u, risk)
         if fault:
             return n * count + fault
         values[n], cells[n], ties[n] = strongest(z, u, int(refs[n, 5]), radar.subcarriers)
-        totals[n] = np.abs(z).sum()
+        totals[n], risks[n] = np.abs(z).sum(), risk.sum()
     return 0
 
 
@@ -114,9 +114,9 @@ def matrix(scene, radar, refs, aims, delays, gains, cells, out):
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
     size = count * max(1, delays.shape[0])
     total = radar.subcarriers
-    e, z, u = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size)
+    e, z, u, risk = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size)
     for n in range(len(refs)):
-        fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u)
+        fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u, risk)
         if fault:
             return n * count + fault
         base = int(refs[n, 5])

@@ -65,13 +65,13 @@ def echo_signal(
         again = np.arange(len(refs))
         choice = choice._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
     if len(again):
+        risks = np.zeros(len(refs))
         fault = answers.signal(
-            scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, found.totals
+            scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, found.totals, risks
         )
         _check_fault(fault, scene, station, sample)
-        found.bounds[again] = found.totals[again] * choice.general_share
-        if choice.spread >= 0.9:
-            found.bounds[again] = np.inf
+        share, direction = choice.general_share
+        found.bounds[again] = found.totals[again] * share + risks[again] * direction
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
@@ -92,7 +92,8 @@ def explain(result: EchoResult) -> str:
         f"target radius {choice.size_m:.3g} m, at most {choice.spread:.3g} of the range",
         f"{aim}: {kind}, orders of 1/r {choice.orders[0]}, range {choice.orders[1]}, cosine {choice.orders[2]}, "
         f"sine {choice.orders[3]}",
-        f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, {choice.general} by the general kernel",
+        f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, "
+        f"{choice.general} by the general kernel",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip
 

@@ -45,7 +45,7 @@ class Choice(NamedTuple):
     error: what the cheap plan was to keep, relative to the sum of amplitudes (None: exact mode only); single: float32
     after the phase; orders: polynomial orders of 1/r, range, cosine, sine; cheap, exact, general: symbols by kernel;
     spread: largest target radius over range; size_m: largest radius (m); general_share: error bound of the general
-    kernel relative to the sum of amplitudes.
+    kernel relative to its sums of amplitudes and of risks.
     """
 
     error: float | None
@@ -56,7 +56,7 @@ class Choice(NamedTuple):
     general: int
     spread: float
     size_m: float
-    general_share: float
+    general_share: tuple[float, float]
 
 
 def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float | None):

@@ -73,13 +73,13 @@ def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
     return Plan(max(part, FINEST), share, array_phase * inverse_error + 80 * coarse, single, fits)
 
 
-def general_share(radar: Radar, size_m: float, points: int) -> float:
-    """Bound of the general kernel's error relative to the sum of amplitudes, for targets away from the station.
+def general_share(radar: Radar, size_m: float, points: int) -> tuple[float, float]:
+    """Bound of the general kernel's error relative to its sums of amplitudes and of risks (`terms.terms`).
 
-    Phase: range differences, direction cosines and their products each carry a few roundings; the rest is sums.
+    Phase: a range difference carries a few roundings of the offset, whatever the range; the rest is sums. Risk: the
+    roundings of a direction cosine, as the gains and the array's phase see them.
     """
-    array_phase = np.pi * radar.kappa / 2 * (
-        radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v - 4
-    )  # fmt: skip
+    elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     wave = 2 * np.pi * radar.turns * 2 * size_m
-    return float((8 * wave + 40 * array_phase + 200 + points) * 2.0**-53)
+    share = (12 * wave + 200 + points) * 2.0**-53
+    return float(share), float(40 * (1 + np.pi * radar.kappa / 2 * (elements - 4)) * 2.0**-53)

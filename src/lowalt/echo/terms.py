@@ -55,8 +55,9 @@ def offsets(scene, n, place, e):
 
 
 @PLAIN
-def terms(scene, radar, ref, n, psi0, omega0, e, z, u):
-    """Fill z (L,), complex amplitudes without the cell's own phase, and u (L,), ranges in cells from ref's cell.
+def terms(scene, radar, ref, n, psi0, omega0, e, z, u, risk):
+    """Fill z (L,), complex amplitudes without the cell's own phase, u (L,), ranges in cells from ref's cell, and
+    risk (L,), the peak amplitude times how much rounding its direction may have taken: (r_ref + |e|) / r.
 
     ref: the symbol's row of `precise.reference`; e (L, 3): a work array. Returns 0, or 1 + l where point l stands
     in the station. Source: paper Eqs. 7 and 24, steering sums as Chebyshev polynomials.
@@ -66,6 +67,7 @@ def terms(scene, radar, ref, n, psi0, omega0, e, z, u):
     phase_h = radar.kappa / 4.0 * (radar.transmit_h + radar.receive_h - 2)
     phase_v = radar.kappa / 4.0 * (radar.transmit_v + radar.receive_v - 2)
     cells = radar.cells
+    peak = float(radar.transmit_h * radar.transmit_v) * float(radar.receive_h * radar.receive_v)
     for l in range(len(z)):  # noqa: E741
         x, y, w = ref[0] + e[l, 0], ref[1] + e[l, 1], ref[2] + e[l, 2]
         r2 = x * x + y * y + w * w
@@ -84,7 +86,10 @@ def terms(scene, radar, ref, n, psi0, omega0, e, z, u):
         gain *= dirichlet(v, radar.transmit_v) * dirichlet(v, radar.receive_v)
         turn = phase_h * psi + phase_v * omega - ref[4] - radar.turns * more
         turn -= np.rint(turn)
-        a = radar.scale * scene.root_rcs[l] * gain / r2
+        strength = radar.scale * scene.root_rcs[l] / r2
+        a = strength * gain
+        offset = math.sqrt(e[l, 0] ** 2 + e[l, 1] ** 2 + e[l, 2] ** 2)
+        risk[l] = strength * peak * (ref[3] + offset) / r
         z[l] = complex(a * math.cos(2.0 * math.pi * turn), a * math.sin(2.0 * math.pi * turn))
         u[l] = ref[6] + cells * more
     return 0
