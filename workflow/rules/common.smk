@@ -1,12 +1,12 @@
 # What the rules share: the checked configuration, the plan that follows from it, and the settings of each stage.
 # This is the only file of the workflow with functions.
 import os
-import sys
 from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
 from lowalt.config import canonical, check
+from lowalt.environment import prepare
 from lowalt.errors import InputError
 from lowalt.network import Network
 from lowalt.files import slug
@@ -16,11 +16,6 @@ from lowalt.sources import sources
 from lowalt.spectra import Spectra
 from lowalt.targets.records import load_records, missing_inputs, source_files
 from lowalt.tiles.settings import Images
-
-# Jobs run `python -m lowalt.STAGE` by the interpreter that runs Snakemake, whether its environment is active or not.
-os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-# Float sums depend on how BLAS splits them over threads; `threads:` fixes that a rule, this fixes it for `python -m`.
-os.environ.setdefault("PYTHONHASHSEED", "0")
 
 SCHEMA = Path(workflow.basedir) / "workflow" / "schemas" / "config.schema.yaml"
 
@@ -44,10 +39,7 @@ def prepared(config):
     return chosen, plan, schemes
 
 
-INPUTS = config["inputs"] or os.environ.get("LOWALT_INPUTS")
-if INPUTS:
-    os.environ["LOWALT_INPUTS"] = str(INPUTS)
-
+INPUTS = prepare(Path(workflow.basedir) / "src", config["inputs"])
 RECORDS, PLAN, SCHEMES = prepared(config)
 RUN = config["run"]
 STATIONS = list(config["network"]["stations"])

@@ -14,6 +14,8 @@ rule echo:
         "results/{run}/logs/echo/{group}-{part}-{station}.log",
     benchmark:
         "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
     shell:

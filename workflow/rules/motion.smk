@@ -13,6 +13,8 @@ rule motion:
         "results/{run}/logs/motion/{group}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/motion/{group}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=motion_settings,
         span=motion_span,

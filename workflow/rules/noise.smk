@@ -14,6 +14,8 @@ rule noise:
         "results/{run}/logs/noise/{group}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/noise/{group}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
     shell:

@@ -14,6 +14,8 @@ rule views:
         "results/{run}/logs/views/{group}-{fold}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/views/{group}-{fold}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({"size": config["recognition"]["size"]}),
     shell:
@@ -30,6 +32,8 @@ rule freeze:
         "results/{run}/SHA256SUMS",
     log:
         "results/{run}/logs/freeze.log",
+    conda:
+        "../../envs/environment.yaml"
     shell:
         "python -m lowalt.recognition freeze --settings '{{}}' --files {input.clouds:q} {input.motion:q}"
         " --out {output:q} 2> {log:q}"
@@ -50,6 +54,8 @@ rule train:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
     resources:
         mem_mb=8000,
@@ -78,6 +84,8 @@ rule evaluate:
         "results/{run}/logs/evaluate/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/evaluate/{protocol}/{scheme}/{train_seed}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
         mem_mb=8000,
@@ -101,6 +109,8 @@ rule tables:
         "results/{run}/logs/tables.log",
     benchmark:
         "results/{run}/benchmarks/tables.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({"seed": config["seed"]}),
     shell:

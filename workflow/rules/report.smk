@@ -20,6 +20,8 @@ rule report:
         stages="results/{run}/stages.csv",
     log:
         "results/{run}/logs/report.log",
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=report_settings,
     shell:

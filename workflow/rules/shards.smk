@@ -16,6 +16,8 @@ rule shard:
         "results/{run}/logs/shard/{group}-{fold}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/shard/{group}-{fold}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=shard_settings,
         tiles=lambda wildcards, input: f"--tiles {input.tiles}" if "tiles" in input.keys() else "",
@@ -35,6 +37,8 @@ rule index:
         "results/{run}/logs/index.log",
     benchmark:
         "results/{run}/benchmarks/index.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
     shell:
@@ -46,6 +50,8 @@ rule configuration:
         "results/{run}/config.yaml",
     log:
         "results/{run}/logs/configuration.log",
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical(config),
     shell:

@@ -13,6 +13,8 @@ rule cloud:
         "results/{run}/logs/cloud/{subtype}.log",
     benchmark:
         "results/{run}/benchmarks/cloud/{subtype}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     resources:
         mem_mb=2000,
     params:
@@ -31,5 +33,7 @@ rule gallery:
         "results/{run}/logs/gallery.log",
     benchmark:
         "results/{run}/benchmarks/gallery.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     shell:
         "python -m lowalt.targets.gallery --clouds {input.clouds:q} --out {output:q} 2> {log:q}"

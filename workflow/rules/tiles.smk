@@ -13,6 +13,8 @@ rule tiles:
         "results/{run}/logs/tiles/{group}-{part}.log",
     benchmark:
         "results/{run}/benchmarks/tiles/{group}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
     params:
         settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
     shell:

@@ -1,0 +1,23 @@
+"""The environment of a run's jobs: which interpreter and source they use, and where the user's inputs lie."""
+
+import os
+import sys
+from pathlib import Path
+
+INPUTS = "LOWALT_INPUTS"
+
+
+def prepare(source: Path, inputs: str | None) -> str | None:
+    """Set what jobs inherit and return the folder of the user's inputs: `inputs`, else LOWALT_INPUTS, else None.
+
+    Jobs run `python -m lowalt.STAGE` by the interpreter that runs the workflow, whether its environment is active or
+    not, and by this checkout's source, also in an environment of their own (conda, a cluster node).
+    """
+    environment = os.environ
+    environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])
+    known = environment.get("PYTHONPATH")
+    environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), str(source)])
+    folder = inputs or environment.get(INPUTS) or None
+    if folder:
+        environment[INPUTS] = str(folder)
+    return folder
