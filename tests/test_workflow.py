@@ -50,7 +50,7 @@ RULES = {
 
 def workplace(folder: Path) -> Path:
     """A copy of the project without results, so that a test may edit what it likes."""
-    for name in ("workflow", "config", "profiles", "src"):
+    for name in ("workflow", "config", "profiles", "src", "envs"):
         shutil.copytree(ROOT / name, folder / name)
     shutil.copy(ROOT / "Snakefile", folder)
     (folder / "imports").mkdir()
