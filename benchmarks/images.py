@@ -2,7 +2,7 @@
 
     python benchmarks/images.py --run results/default --samples 300 --out results/benchmarks/images.csv
 
-One core, one process. Every time is the least of three passes over a sample, averaged over the samples (other work
+One core, one process, processor time: the least of five passes over a sample, averaged over the samples (other work
 on the machine only ever adds). Samples are drawn evenly from all noisy signals of the run. Every method's PNG is
 decoded by Pillow and its RGB pixels held against the tile it came from; bytes are held against a second encoding.
 """
@@ -113,13 +113,13 @@ def libdeflate_png(tile: np.ndarray, palette: np.ndarray, kind: int) -> bytes:
     return packed(tile.shape, palette, bytes(deflate.zlib_compress(rows, 1)))
 
 
-def least(function, *arguments, repeats: int = 3) -> tuple[object, float]:
-    """Result of a call and its least time (ms)."""
+def least(function, *arguments, repeats: int = 5) -> tuple[object, float]:
+    """Result of a call and its least processor time (ms)."""
     best = np.inf
     for _ in range(repeats):
-        start = time.perf_counter()
+        start = time.process_time()
         result = function(*arguments)
-        best = min(best, time.perf_counter() - start)
+        best = min(best, time.process_time() - start)
     return result, 1e3 * best
 
 
