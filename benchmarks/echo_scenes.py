@@ -3,8 +3,9 @@
     python benchmarks/echo_scenes.py --count 10000 [--seed 1] [--out results/benchmarks/echo_scenes.csv]
 
 Ranges 1 m to 100 km, 1 to 5000 points, 0.5 to 100 GHz, any array sizes. Each scene is judged at eight random symbols
-and the two deepest fades. The judge sums elements and subcarriers one by one, its ranges in extended precision; it
-shares nothing with the closed form. A tolerance below a scene's floor is refused, which is counted, not judged.
+and the two deepest fades. The judge (`lowalt.echo.peers`) sums elements and subcarriers one by one, its ranges in
+extended precision; it shares nothing with the closed form. A tolerance below a scene's floor is refused, which is
+counted, not judged.
 """
 
 import argparse
@@ -17,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.echo import Rigid, echo_signal
+from lowalt.echo.peers import judge
 from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.network import Network, Station
@@ -25,7 +27,6 @@ from lowalt.streams import stream
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48
 NEAR_TIE = 1e-12
-PI = 4 * np.arctan(np.longdouble(1))
 
 
 def scene(seed: int, index: int) -> tuple[Network, Station, Rigid, np.ndarray, np.ndarray]:
@@ -59,38 +60,6 @@ def scene(seed: int, index: int) -> tuple[Network, Station, Rigid, np.ndarray, n
     translation = path[:, None] + rng.normal(scale=size / 5, size=(parts, 3))
     motion = Rigid(rotation, translation, points, rng.integers(0, parts, count))
     return network, station, motion, rng.exponential(size=count), path[0]
-
-
-def judge(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, n: int) -> np.ndarray:
-    """All cells (M,) of symbol n by plain sums over array elements and subcarriers."""
-    wide = np.longdouble
-    rotation, translation = motion.rotation[n, motion.part].astype(wide), motion.translation[n, motion.part]
-    offset = (translation.astype(wide) - np.array(station.position_m, wide)) + (
-        rotation * motion.points[:, None, :].astype(wide)
-    ).sum(axis=2)
-    aim = np.asarray(aim_m, wide) - np.array(station.position_m, wide)
-    kappa = wide(station.frequency_hz) / wide(network.carrier_hz)
-    sine, cosine = np.sin(wide(station.normal_rad)), np.cos(wide(station.normal_rad))
-
-    def look(d):
-        r = np.sqrt((d * d).sum(axis=-1))
-        return r, (cosine * d[..., 1] - sine * d[..., 0]) / r, d[..., 2] / r
-
-    r, psi, omega = look(offset)
-    _, psi0, omega0 = look(aim)
-    light = wide(299792458)
-    gain = np.ones(len(r), complex)
-    for counts in (network.transmit, network.receive):
-        for number, cosines in zip(counts, (psi - psi0, omega - omega0), strict=True):
-            step = (kappa * cosines / 2).astype(float)
-            gain *= np.exp(2j * np.pi * np.outer(np.arange(number), step)).sum(axis=0)
-    start, step = 2 * wide(station.frequency_hz) * r / light, 2 * wide(network.subcarrier_spacing_hz) * r / light
-    start, step = (start - np.rint(start)).astype(float), (step - np.rint(step)).astype(float)
-    amplitude = np.sqrt(rcs_m2) / ((4 * np.pi) ** 1.5 * r.astype(float) ** 2) * 299792458.0 / network.carrier_hz
-    wave = amplitude * gain * np.exp(-2j * np.pi * start)
-    y = np.exp(-2j * np.pi * np.outer(np.arange(network.subcarriers), step)) @ wave
-    elements = np.prod(network.transmit) * np.prod(network.receive)
-    return np.sqrt(network.power / elements) * np.fft.ifft(y)
 
 
 def examine(seed: int, index: int) -> list[dict]:
