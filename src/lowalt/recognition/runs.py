@@ -23,9 +23,9 @@ from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
 from lowalt.recognition.training import Trainer
-from lowalt.recognition.views import ShardSamples, shrink
+from lowalt.recognition.views import ShardSamples
 from lowalt.targets.cloud import CATEGORIES
-from lowalt.tiles import colour_map
+from lowalt.tiles import colour_map, resize
 
 Samples = ViewSamples | ShardSamples
 
@@ -159,7 +159,7 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     images = images_of(path, settings)
     if len(images) != len(STATIONS) * len(SPECTRA):
         raise InputError(f"{path}: {len(images)} images, expected {len(STATIONS) * len(SPECTRA)}")
-    views = shrink(images, trained.size)[trained.scheme.columns]
+    views = resize(images, trained.size)[trained.scheme.columns]
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]
     return dict(zip(CATEGORIES, found.tolist(), strict=True))

@@ -17,7 +17,6 @@ import numpy as np
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing
 
-STATIONS = ("A", "B", "C")
 VIEWS = 9
 
 

@@ -13,33 +13,30 @@ import numpy as np
 from lowalt.errors import InputError
 from lowalt.network import Network
 from lowalt.recognition import samples
-from lowalt.recognition.samples import STATIONS, VIEWS, Facts
+from lowalt.recognition.samples import VIEWS, Facts
+from lowalt.recognition.schemes import SPECTRA, STATIONS
 from lowalt.shards import ShardSet
-from lowalt.tiles import resize
 
 _KEY = re.compile(r"(.+)-\d{6}-snr")
-
-
-def shrink(images: np.ndarray, size: int) -> np.ndarray:
-    """Return index images (..., S, S) uint8 at size x size, by the project's one resampling kernel."""
-    return images if images.shape[-1] == size else resize(images, size)
 
 
 def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
     """Range (m) and aspect (rad) of a sample at every station.
 
     Aspect is the angle, seen from above, between the target's front and the direction to the station: 0 head-on, pi
-    from behind.
+    from behind, NaN without a yaw.
     """
     motion = record["motion"]
-    front = np.array([-math.sin(motion["yaw_rad"]), math.cos(motion["yaw_rad"])])
+    # Rows without an attitude have no aspect.
+    yaw = math.nan if motion["yaw_rad"] is None else motion["yaw_rad"]
+    front = np.array([-math.sin(yaw), math.cos(yaw)])
     ranges, aspects = [], []
     for station in network.stations:
         ranges.append(record["geometry"][station.name]["range_m"])
         towards = np.array(station.position_m[:2]) - [motion["x_m"], motion["y_m"]]
         length = float(np.hypot(*towards))
         cosine = float(front @ towards) / length if length else 1.0
-        aspects.append(math.acos(max(-1.0, min(1.0, cosine))))
+        aspects.append(math.acos(max(-1.0, min(1.0, cosine))) if math.isfinite(cosine) else math.nan)
     return ranges, aspects
 
 
@@ -94,7 +91,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path) -> int
     numbers = np.arange(start, start + shards.shards[place]["samples"])
     views = np.empty((len(numbers), VIEWS, size, size), dtype=np.uint8)
     for row, number in enumerate(numbers):
-        views[row] = shrink(shards.images(number), size)
+        views[row] = shards.images(number, size)
     # The images' bytes have been checked: the records need no second look.
     samples.write(out, views, facts_of(ShardSet(index, check=False), numbers))
     return len(numbers)
@@ -104,13 +101,16 @@ class ShardSamples:
     """Samples read from shards as they are asked for; the same calls and pixels as `ViewSamples`."""
 
     def __init__(self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool) -> None:
-        """index: index file of the shards; columns: views to keep; folds: (group, fold) pairs; size: pixels.
+        """index: index file of the shards; columns: views to keep, some spectra of some stations; folds: (group, fold)
+        pairs; size: pixels.
 
         placed: whether facts carry ranges and aspects (reads every record).
         Raises: InputError where nothing is left.
         """
         groups, names = sorted({group for group, _ in folds}), sorted({fold for _, fold in folds})
-        self.shards, self.columns, self.size = ShardSet(index, groups, names), columns, size
+        self.shards, self.size = ShardSet(index, groups, names), size
+        self.stations = [STATIONS[number] for number in sorted({column // len(SPECTRA) for column in columns})]
+        self.spectra = [SPECTRA[number].lower() for number in sorted({column % len(SPECTRA) for column in columns})]
         flags = [[(shard["group"], shard["fold"]) in folds] * shard["samples"] for shard in self.shards.shards]
         self.numbers = np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
         if not len(self.numbers):
@@ -119,5 +119,5 @@ class ShardSamples:
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
-        found = [self.shards.images(self.numbers[number])[self.columns] for number in numbers]
-        return shrink(np.stack(found), self.size)
+        chosen = (self.size, self.stations, self.spectra)
+        return np.stack([self.shards.images(self.numbers[number], *chosen) for number in numbers])

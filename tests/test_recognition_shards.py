@@ -1,0 +1,162 @@
+"""Recognition on real shards: cache and direct reading agree, facts match the records, predict and score from files."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from lowalt.errors import InputError
+from lowalt.network import Network
+from lowalt.recognition import checkpoint, network, predictions, runs, samples, schemes, score, views
+from lowalt.recognition.__main__ import main
+from lowalt.recognition.protocols import folds
+from lowalt.shards import ShardSet
+from lowalt.tiles import resize
+from test_shards import RENDER, build
+
+SIZE = 32
+SCHEME = schemes.Scheme("BC:VRP+VT", (1, 2), (0, 2))
+BLOCK = {"backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4, "feed_forward": 1,
+         "dropout": 0.0, "hidden": 0}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    return build(tmp_path_factory.mktemp("recognition"), "image")
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    torch.manual_seed(1)
+    palettes = np.zeros((3, 256, 3), np.uint8)
+    weights = network.Recogniser(SCHEME, BLOCK, SIZE, palettes).state_dict()
+    path = tmp_path_factory.mktemp("model") / "model.pt"
+    # The palettes are part of the weights: a model keeps the colours it was trained on.
+    about = {
+        "scheme": vars(SCHEME),
+        "protocol": "seen",
+        "network": BLOCK,
+        "size": SIZE,
+        "seed": 0,
+        "colour_map": "gray",
+    }
+    weights["palettes.table"] = torch.randn(2, 256, 3)
+    checkpoint.save(path, "{}", {"weights": weights, **about})
+    return path
+
+
+def cached(dataset, folder):
+    paths = []
+    for shard in ShardSet(dataset / "index.json").shards:
+        path = folder / shard["path"].replace(".tar", ".npz")
+        arguments = ["--index", str(dataset / "index.json"), "--shard", shard["name"], "--out", str(path)]
+        main(["views", "--settings", json.dumps({"size": SIZE}), *arguments])
+        paths.append(path)
+    return paths
+
+
+def test_cache_and_shards_hold_the_same_samples(dataset, tmp_path):
+    pairs = folds("seen", "train") | folds("seen", "test")
+    memory = samples.ViewSamples(cached(dataset, tmp_path), SCHEME.columns, pairs)
+    direct = views.ShardSamples(dataset / "index.json", SCHEME.columns, pairs, SIZE, placed=True)
+    mine, theirs = np.argsort(memory.facts.key), np.argsort(direct.facts.key)
+    assert len(mine) == len(theirs) > 6
+    assert (memory.views(mine) == direct.views(theirs)).all()
+    for name in samples.FACTS:
+        one, other = getattr(memory.facts, name)[mine], getattr(direct.facts, name)[theirs]
+        assert np.array_equal(one, other, equal_nan=one.dtype.kind == "f"), name
+    shards = ShardSet(dataset / "index.json")
+    keys = [key.decode() for key in shards.keys]
+    number = keys.index(str(direct.facts.key[3]))
+    assert (direct.views(np.array([3]))[0] == resize(shards.images(number), SIZE)[SCHEME.columns]).all()
+
+
+def test_facts_are_those_of_the_records(dataset):
+    shards = ShardSet(dataset / "index.json")
+    numbers = np.arange(len(shards))[::-2]
+    facts = views.facts_of(shards, numbers)
+    quick = views.facts_of(shards, numbers, placed=False)
+    for place, number in enumerate(numbers):
+        record = shards.record(number)
+        for name in ("key", "subtype", "model", "group", "fold", "label"):
+            assert getattr(facts, name)[place] == record[name] == getattr(quick, name)[place]
+        assert facts.snr_db[place] == float(record["snr_db"])
+        assert facts.range_m[place].tolist() == [record["geometry"][name]["range_m"] for name in "ABC"]
+    assert np.isnan(quick.range_m).all() and np.isnan(facts.aspect_rad).all()
+
+
+@pytest.mark.parametrize(("yaw_deg", "expected_deg"), [(0, 90), (90, 0), (-90, 180), (45, 45), (135, 45)])
+def test_aspect_is_zero_where_the_target_faces_the_station(yaw_deg, expected_deg):
+    net = Network.from_settings(RENDER["network"])
+    x, y, _ = net.stations[0].position_m
+    # The target stands east of the first station; its front is +y turned by the yaw, so yaw 90 degrees looks west.
+    motion = {"yaw_rad": math.radians(yaw_deg), "x_m": x + 100, "y_m": y}
+    geometry = {station.name: {"range_m": 1.0} for station in net.stations}
+    _, aspects = views.geometry({"motion": motion, "geometry": geometry}, net)
+    assert math.degrees(aspects[0]) == pytest.approx(expected_deg, abs=1e-6)
+
+
+def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(dataset, model, tmp_path):
+    shards = ShardSet(dataset / "index.json")
+    signals = {}
+    for group in ("seen", "unseen"):
+        for sample in np.load(dataset / f"{group}.npy").reshape(-1, 3, 400):
+            signals[shards.renderer.tile(sample).tobytes()] = sample
+    trained = runs.load(model)
+    for number in (0, 5):
+        (tmp_path / "tile.png").write_bytes(shards.png(number))
+        np.save(tmp_path / "signal.npy", signals[shards.tile(number).tobytes()])
+        given = [runs.predict(trained, tmp_path / name, RENDER) for name in ("tile.png", "signal.npy")]
+        assert given[0] == given[1]
+        assert list(given[0]) == ["UAV", "Bird", "Vehicle", "Pedestrian"]
+        assert sum(given[0].values()) == pytest.approx(1, abs=1e-12)
+        index = torch.from_numpy(resize(shards.images(number), SIZE)[SCHEME.columns][None])
+        with torch.inference_mode():
+            assert list(given[0].values()) == trained.model(index).double().softmax(1)[0].tolist()
+    np.save(tmp_path / "short.npy", np.zeros((3, 10), np.complex64))
+    for name, words in (("short.npy", "shape"), ("note.txt", "expected signals")):
+        (tmp_path / "note.txt").write_text("")
+        with pytest.raises(InputError, match=words):
+            runs.predict(trained, tmp_path / name, RENDER)
+
+
+def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tmp_path):
+    arguments = ["--index", str(dataset / "index.json"), "--model", str(model), "--out", str(tmp_path / "p.csv")]
+    main(["evaluate", "--settings", json.dumps({"batch": 4, "threads": 1, "precision": "fp32"}), *arguments])
+    ours = predictions.read(tmp_path / "p.csv").of(folds("seen", "test"))
+    found = score.score(tmp_path / "p.csv", dataset / "index.json", "seen")
+    assert found["samples"] == len(ours) > 0
+    shares = [ours.correct[ours.snr_db == snr].mean() for snr in np.unique(ours.snr_db)]
+    assert found["accuracy_percent"] == pytest.approx(100 * np.mean(shares))
+    with (tmp_path / "p.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    short = [{name: row[name] for name in ("key", *predictions.CLASSES)} for row in rows]
+
+    def written(rows):
+        with (tmp_path / "q.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, list(rows[0]))
+            writer.writeheader()
+            writer.writerows(rows)
+        return tmp_path / "q.csv"
+
+    # Labels of the file are never looked at.
+    lying = [{**row, "label": "0"} for row in rows]
+    assert score.score(written(lying), dataset / "index.json", "seen") == found
+    assert score.score(written(short[::-1]), dataset / "index.json", "seen") == found
+    kept = [row for row in short if row["key"] != ours.key[0]]
+    with pytest.raises(InputError, match=f"1 test samples have no prediction, the first is '{ours.key[0]}'"):
+        score.score(written(kept), dataset / "index.json", "seen")
+    with pytest.raises(InputError, match="stands twice"):
+        score.score(written([*short, short[0]]), dataset / "index.json", "seen")
+
+
+def test_unknown_shards_and_sizes_are_refused(dataset, tmp_path):
+    with pytest.raises(InputError, match="no shard 'seen-dev'"):
+        views.cache_shard(dataset / "index.json", "seen-dev", 32, tmp_path / "x.npz")
+    with pytest.raises(InputError, match="size is 4"):
+        views.cache_shard(dataset / "index.json", "seen-train-00000.tar", 4, tmp_path / "x.npz")
+    with pytest.raises(InputError, match="no samples"):
+        views.ShardSamples(dataset / "index.json", [0], set(), 32, placed=False)
