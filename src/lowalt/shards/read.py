@@ -1,4 +1,4 @@
-"""Map-style access to the samples of shards: any sample at any time, by memory map, checked on every access.
+"""Map-style access to the samples of shards: any sample at any time, checked on every access.
 
 No torch here: a data set of any framework is `len` and one of the methods below.
 """
@@ -29,7 +29,7 @@ from lowalt.tiles.settings import Images
 class ShardSet:
     """The samples of some groups and folds of a data set, numbered in the order of the index.
 
-    Picklable: workers open their own maps. Every access checks the sample's SHA-256 unless `check` is off.
+    Picklable: workers map their own tables. Every access checks the sample's SHA-256 unless `check` is off.
     """
 
     def __init__(
@@ -48,14 +48,13 @@ class ShardSet:
         self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
         self._tables: dict[int, np.ndarray] = {}
-        self._maps: dict[int, np.ndarray] = {}
 
     def __len__(self) -> int:
         return int(self._ends[-1])
 
     def __getstate__(self) -> dict:
         kept = {name: value for name, value in self.__dict__.items() if name != "renderer"}
-        return {**kept, "_tables": {}, "_maps": {}}
+        return {**kept, "_tables": {}}
 
     def _path(self, shard: int) -> Path:
         return self.index_path.parent / self.shards[shard]["path"]
@@ -70,17 +69,6 @@ class ShardSet:
             self._tables[shard] = samples
         return self._tables[shard]
 
-    def _data(self, shard: int) -> np.ndarray:
-        """The bytes of a shard, mapped at first use."""
-        if shard not in self._maps:
-            path, expected = self._path(shard), self.shards[shard]["bytes"]
-            # A map of a file that is too short would end the process, not raise.
-            found = existing(path, "shard").stat().st_size
-            if found != expected:
-                raise InputError(f"{path.name}: {found} bytes, expected {expected}")
-            self._maps[shard] = np.memmap(path, np.uint8, "r")
-        return self._maps[shard]
-
     def _locate(self, number: int) -> tuple[int, int]:
         number = int(number)
         if not 0 <= number < len(self):
@@ -91,13 +79,17 @@ class ShardSet:
     def _bytes(self, number: int, member: str) -> bytes:
         """The bytes of a member of a sample, after the sample's check."""
         shard, place = self._locate(number)
-        row, data = self._table(shard)[place], self._data(shard)
-        start, size = int(row["offset"]), int(row["size"])
-        if self.check and hashlib.sha256(data[start : start + size]).digest() != row["sha256"].tobytes():
-            name = self.shards[shard]["name"]
-            raise InputError(f"{name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
-        first = int(row[f"{member}_offset"])
-        return data[first : first + int(row[f"{member}_size"])].tobytes()
+        row, path = self._table(shard)[place], existing(self._path(shard), "shard")
+        offset, size = int(row["offset"]), int(row["size"])
+        # Opened for each sample: a data set may have more shards than a process may have open files, and a memory map
+        # of a file cut short would end the process.
+        with path.open("rb") as file:
+            file.seek(offset)
+            span = file.read(size)
+        if len(span) < size or (self.check and hashlib.sha256(span).digest() != row["sha256"].tobytes()):
+            raise InputError(f"{path.name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
+        first = int(row[f"{member}_offset"]) - offset
+        return span[first : first + int(row[f"{member}_size"])]
 
     def _column(self, name: str) -> np.ndarray:
         parts = [self._table(shard)[name] for shard in range(len(self.shards))]

@@ -14,7 +14,7 @@ import numpy as np
 
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing
-from lowalt.tiles.files import stored_array
+from lowalt.tiles.files import map_array
 
 SAMPLE = np.dtype(
     [
@@ -64,7 +64,7 @@ def map_samples(path: str | Path) -> np.ndarray:
 
     Raises: InputError naming the file where it is missing or damaged.
     """
-    samples = stored_array(existing(path, "shard table"), "samples.npy")
+    samples = map_array(existing(path, "shard table"), "samples.npy")
     if samples.dtype != SAMPLE:
         raise InputError(f"{path}: columns {samples.dtype.names}, expected {SAMPLE.names}")
     return samples

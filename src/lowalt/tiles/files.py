@@ -1,16 +1,16 @@
 """The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in an .npz.
 
-The archive is stored, not compressed, so that it is written as a stream and read through a memory map: neither
-needs more memory than one sample.
+The archive is stored, not compressed, so that it is written as a stream and read image by image: neither needs more
+memory than one sample.
 """
 
-import shutil
+import os
 import struct
-import tempfile
 import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
+import deflate
 import numpy as np
 
 from lowalt.errors import InputError
@@ -24,26 +24,37 @@ def _header(dtype: str, count: int) -> bytes:
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
 
 
+def _crc_behind(header: bytes, size: int) -> int:
+    """CRC-32 of a header followed by `size` zero bytes."""
+    crc, zeros = deflate.crc32(header), bytes(min(size, 1 << 20))
+    for _ in range(size >> 20):
+        crc = deflate.crc32(zeros, crc)
+    return deflate.crc32(zeros[: size & ((1 << 20) - 1)], crc)
+
+
 def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
     """Write encoded images in their order; return their number and bytes. Equal images give equal files."""
-    offsets = [0]
-    with replacing(path) as temporary, tempfile.TemporaryFile(dir=temporary.parent) as spool:
-        # An array's header holds its length, which is known only at the end.
-        for image in images:
-            spool.write(image)
-            offsets.append(offsets[-1] + len(image))
-        spool.seek(0)
-        with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
-            with archive.open(zipfile.ZipInfo("data.npy"), "w", force_zip64=True) as member:
-                member.write(_header("|u1", offsets[-1]))
-                shutil.copyfileobj(spool, member, 1 << 20)
-            table = np.array(offsets, "<i8")
-            archive.writestr(zipfile.ZipInfo("offsets.npy"), _header("<i8", len(table)) + table.tobytes())
+    offsets, blank = [0], _header("|u1", 0)
+    with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
+        info = zipfile.ZipInfo("data.npy")
+        with archive.open(info, "w", force_zip64=True) as member:
+            member.write(blank)
+            for image in images:
+                member.write(image)
+                offsets.append(offsets[-1] + len(image))
+        # The array's length is known only now; its header has room for it. A CRC is linear, so what the header
+        # changes in it does not depend on the data.
+        header = _header("|u1", offsets[-1])
+        info.CRC ^= _crc_behind(blank, offsets[-1]) ^ _crc_behind(header, offsets[-1])
+        archive.fp.seek(info.header_offset)
+        archive.fp.write(info.FileHeader(zip64=True) + header)
+        table = np.array(offsets, "<i8")
+        archive.writestr(zipfile.ZipInfo("offsets.npy"), _header("<i8", len(table)) + table.tobytes())
     return len(offsets) - 1, offsets[-1]
 
 
-def stored_array(path: Path, name: str) -> np.ndarray:
-    """Return a one-dimensional array of an uncompressed .npz as a read-only memory map.
+def stored_array(path: Path, name: str) -> tuple[np.dtype, int, int]:
+    """Return type, length and place in the file (bytes) of a one-dimensional array of an uncompressed .npz.
 
     Raises: InputError naming the file where it has no such array or is cut off.
     """
@@ -59,11 +70,18 @@ def stored_array(path: Path, name: str) -> np.ndarray:
             start = file.tell()
         if info.compress_type != zipfile.ZIP_STORED or len(shape) != 1:
             raise ValueError(f"{name} is compressed or not one-dimensional")
-        if shape[0] == 0:
-            return np.zeros(0, dtype)
-        return np.memmap(path, dtype, "r", start, shape)
+        return dtype, shape[0], start
     except (OSError, zipfile.BadZipFile, KeyError, ValueError, struct.error) as error:
         raise InputError(f"{path}: no array {name} ({error})") from error
+
+
+def map_array(path: Path, name: str) -> np.ndarray:
+    """Return a one-dimensional array of an uncompressed .npz as a read-only memory map.
+
+    Raises: InputError naming the file where it has no such array or is cut off.
+    """
+    dtype, count, start = stored_array(path, name)
+    return np.memmap(path, dtype, "r", start, (count,)) if count else np.zeros(0, dtype)
 
 
 class Tiles:
@@ -75,8 +93,10 @@ class Tiles:
         Raises: InputError naming the file where it is missing or not a tiles file.
         """
         self.path = existing(path, "tiles")
-        self.offsets = np.array(stored_array(self.path, "offsets.npy"))
-        self._data = stored_array(self.path, "data.npy")
+        self.offsets = np.array(map_array(self.path, "offsets.npy"))
+        _, _, self._start = stored_array(self.path, "data.npy")
+        # Plain reads, not a map: mapped pages of gigabytes would count as this process's memory.
+        self._file = self.path.open("rb")
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -84,4 +104,5 @@ class Tiles:
     def __getitem__(self, number: int) -> bytes:
         if not 0 <= number < len(self):
             raise IndexError(number)
-        return self._data[self.offsets[number] : self.offsets[number + 1]].tobytes()
+        first, last = (int(self.offsets[number + step]) for step in (0, 1))
+        return os.pread(self._file.fileno(), last - first, self._start + first)
