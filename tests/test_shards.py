@@ -19,6 +19,8 @@ from lowalt.network import Network
 from lowalt.shards import ShardSet, faults
 from lowalt.shards.__main__ import main
 from lowalt.shards.record import geometry, record, sample_key, snr_label
+from lowalt.shards.size import main as size_main
+from lowalt.shards.size import models_per_chunk, sample_bytes
 from lowalt.shards.table import map_samples
 from lowalt.splits import fold
 from lowalt.tiles import decode, encode, files, resize, split
@@ -318,3 +320,21 @@ def test_stations_and_views_are_selected_alike_from_both_kinds(images, signals):
         assert shards.images(3, size=224).shape == (9, 224, 224)
         with pytest.raises(InputError, match="'D'"):
             shards.images(3, stations=["D"])
+
+
+def test_chunks_are_sized_for_their_shards(images, signals, tmp_path, capsys):
+    """The promised space of a sample holds, and the number of models makes the train shard nearest the target."""
+    for folder, kind in ((images, "image"), (signals, "signal")):
+        promised = sample_bytes(kind, 3, 400)
+        found = map_samples(folder / "seen-train-00000.npz")["size"].mean()
+        assert found <= 1.3 * promised and promised <= 1.3 * found
+    split = {"by": "motion", "train": 8, "val": 1, "test": 1}
+    models = models_per_chunk(1e9, 300_000, subtypes=20, snrs=6, split=split)
+    assert models % 10 == 0 and abs(models * 0.8 * 20 * 6 * 300_000 - 1e9) <= 0.5 * 8 * 20 * 6 * 300_000
+    assert models_per_chunk(1, 300_000, 20, 6, split) == 10
+    with pytest.raises(InputError, match="target"):
+        models_per_chunk(0, 300_000, 20, 6, split)
+    block = {"network": NETWORK, "noise": {"snr_db": SNRS}, "split": split, "shards": {"kind": "signal"}}
+    (tmp_path / "config.yaml").write_text(json.dumps(block))
+    size_main(["--config", str(tmp_path / "config.yaml"), "--subtypes", "20", "--target-mb", "40"])
+    assert int(capsys.readouterr().out) == models_per_chunk(40e6, sample_bytes("signal", 3, 400), 20, 2, split)

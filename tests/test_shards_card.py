@@ -10,7 +10,7 @@ import yaml
 
 from lowalt.errors import InputError
 from lowalt.shards import ShardSet
-from lowalt.shards.__main__ import main
+from lowalt.shards.card import main
 from test_shards import RENDER, SEED, SNRS, SPLIT, build
 
 CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
@@ -21,7 +21,7 @@ def published(request, tmp_path_factory):
     folder = build(tmp_path_factory.mktemp(request.param), request.param)
     (folder / "config.yaml").write_text(yaml.safe_dump(CONFIG))
     arguments = ["--index", str(folder / "index.json"), "--config", str(folder / "config.yaml")]
-    main(["card", *arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    main([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
     return folder
 
 
@@ -80,7 +80,7 @@ def test_equal_data_sets_have_equal_cards(published, tmp_path):
     copy = shutil.copytree(published, tmp_path / "copy")
     before = {name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")}
     arguments = ["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml")]
-    main(["card", *arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
+    main([*arguments, "--date", "2026-01-31", "--url", "https://example.org/trial"])
     assert before == {name: (copy / name).read_bytes() for name in before}
     with pytest.raises(InputError, match="nowhere"):
-        main(["card", *arguments[:2], "--config", str(tmp_path / "nowhere.yaml")])
+        main([*arguments[:2], "--config", str(tmp_path / "nowhere.yaml")])

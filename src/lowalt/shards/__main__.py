@@ -1,4 +1,4 @@
-"""`python -m lowalt.shards write | index | verify | card`: pack samples, list shards, check every byte, describe."""
+"""`python -m lowalt.shards write | index | verify`: pack a chunk's samples, list the shards, check every byte."""
 
 import argparse
 
@@ -6,8 +6,6 @@ from lowalt.command import parser, pick, run
 from lowalt.errors import InputError
 from lowalt.motion import read_table
 from lowalt.network import Network
-from lowalt.shards.card import LICENSES
-from lowalt.shards.card import write as write_card
 from lowalt.shards.index import build
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
@@ -74,20 +72,23 @@ def verify(arguments: list[str]) -> None:
         raise SystemExit(1)
 
 
-def card(arguments: list[str]) -> None:
-    """Write the data card, the table of samples and the Croissant description beside the index."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards card", description=card.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
-    options.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
-    options.add_argument("--url", help="where the data set will be published")
-    options.add_argument("--date", help="day of publication, YYYY-MM-DD")
+def size(arguments: list[str]) -> None:
+    """Print the motion.models_per_chunk for which a run's largest shards come closest to a target size."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards size", description=size.__doc__)
+    options.add_argument("--config", required=True, help="the run's merged configuration (.yaml)")
+    options.add_argument("--subtypes", type=int, required=True, help="subtypes of the larger group")
+    options.add_argument(
+        "--target-mb", type=float, default=1000, help="wanted size of the train shards (default 1000 MB)"
+    )
     given = options.parse_args(arguments)
-    facts = {"url": given.url, "datePublished": given.date}
-    write_card(given.index, given.config, given.license, **{key: text for key, text in facts.items() if text})
+    config = load_yaml(given.config)
+    network = Network.from_settings(config["network"])
+    sample = sample_bytes(config["shards"]["kind"], len(network.stations), network.symbols)
+    snrs = len(config["noise"]["snr_db"])
+    print(models_per_chunk(1e6 * given.target_mb, sample, given.subtypes, snrs, config["split"]))
 
 
-COMMANDS = {"write": write, "index": index, "verify": verify, "card": card}
+COMMANDS = {"write": write, "index": index, "verify": verify}
 
 
 def main(arguments: list[str]) -> None:

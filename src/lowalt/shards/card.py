@@ -1,4 +1,7 @@
-"""The data card: README.md, samples.csv and croissant.json beside the index; the folder can be published as it is."""
+"""The data card: README.md, samples.csv and croissant.json beside the index; the folder can be published as it is.
+
+A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
+"""
 
 import csv
 import json
@@ -10,6 +13,7 @@ import numpy as np
 import yaml
 
 from lowalt import __version__
+from lowalt.command import run
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing, sha256
 from lowalt.shards.croissant import FIELDS, metadata
@@ -188,3 +192,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    run(main)
