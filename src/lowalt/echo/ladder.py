@@ -107,8 +107,8 @@ class _Sample:
         self.span = np.empty((len(refs), 5))
         first = scene.part[0] if len(scene.part) else 0
         self.spread = spans(
-            scene.rotation, scene.translation, first, self.lay.parts, self.lay.radii, refs, radar.sine, radar.cosine,
-            self.span,
+            scene.rotation, scene.translation, first, self.lay.parts, self.lay.centres, self.lay.radii, refs,
+            radar.sine, radar.cosine, self.span,
         )  # fmt: skip
         self.size_m = float(self.span[:, SIZE].max())
 

@@ -24,8 +24,10 @@ class Layout(NamedTuple):
     """(runs,) part of each run of points."""
     starts: np.ndarray
     """(runs + 1,) first point of each run; no run crosses a tile's end."""
+    centres: np.ndarray
+    """(runs, 3) m, the middle of each run's bounding box, in its part's frame."""
     radii: np.ndarray
-    """(runs,) largest |point| of the run (m)."""
+    """(runs,) largest distance of the run's points from its centre (m)."""
     total: float
     """Sum of all amplitudes."""
 
@@ -44,11 +46,17 @@ def layout(scene: Scene, peak: float) -> Layout:
     empty = np.zeros(0)
     if not rigid:
         nothing = np.zeros(0, np.int64)
-        return Layout(empty, empty, empty, amplitude, nothing, nothing, empty, float(amplitude.sum()))
+        return Layout(
+            empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, float(amplitude.sum())
+        )  # fmt: skip
     change = np.flatnonzero(part[1:] != part[:-1]) + 1
     starts = np.concatenate(([0], change))
     if count > TILE:
         starts = np.union1d(starts, np.arange(0, count, TILE))
+    centres = (np.maximum.reduceat(points, starts) + np.minimum.reduceat(points, starts)) / 2
+    ends = np.append(starts[1:], count)
+    away = points - np.repeat(centres, ends - starts, axis=0)
+    radii = np.sqrt(np.maximum.reduceat(np.einsum("li,li->l", away, away), starts))
     x, y, z = np.ascontiguousarray(points.T)
-    radii = np.sqrt(np.maximum.reduceat(x * x + y * y + z * z, starts))
-    return Layout(x, y, z, amplitude, part[starts], np.append(starts, count), radii, float(amplitude.sum()))
+    bounds = np.append(starts, count)
+    return Layout(x, y, z, amplitude, part[starts], bounds, centres, radii, float(amplitude.sum()))

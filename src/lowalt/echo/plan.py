@@ -64,7 +64,7 @@ def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
     excess, excess_error = smooth("excess", reach, part / max(wave, 1.0))
     cosine, cosine_error = smooth("cosine", 0.25, part)
     sine, sine_error = smooth("sine", 0.25, part)
-    rounding = (8 * wave + 8 * array_phase + 30) * unit + (300 + 80) * coarse + tiles * unit + 4 * np.pi * coarse
+    rounding = (16 * wave + 8 * array_phase + 30) * unit + (300 + 80) * coarse + tiles * unit + 4 * np.pi * coarse
     share = (
         wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
     )  # fmt: skip
@@ -81,5 +81,5 @@ def general_share(radar: Radar, size_m: float, points: int) -> tuple[float, floa
     """
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
     wave = 2 * np.pi * radar.turns * 2 * size_m
-    share = (12 * wave + 200 + points) * 2.0**-53
+    share = (20 * wave + 200 + points) * 2.0**-53
     return float(share), float(40 * (1 + np.pi * radar.kappa / 2 * (elements - 4)) * 2.0**-53)

@@ -4,18 +4,17 @@ import math
 
 import numpy as np
 
-from lowalt.echo.compile import PLAIN
+from lowalt.echo.compile import LEAN, PLAIN
 
 PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
 """Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
 
 
-@PLAIN
-def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
+@LEAN
+def spans(rotation, translation, first, parts, centres, radii, refs, sine, cosine, out):
     """Fill out (N, 5) and return the largest SPREAD.
 
-    A part's points lie within its matrix's norm (bounded by Frobenius and, for rotations, by 1 plus rounding) times
-    its radius of its translation.
+    A run's points lie within its radius, times a bound of its matrix's norm, of where its centre is taken.
     """
     worst = 0.0
     for n in range(len(refs)):
@@ -34,7 +33,11 @@ def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
                 x = translation[n, p, 0] - translation[n, first, 0]
                 y = translation[n, p, 1] - translation[n, first, 1]
                 z = translation[n, p, 2] - translation[n, first, 2]
-                size = max(size, math.sqrt(x * x + y * y + z * z) + norm(rotation[n, p]) * radii[run])
+                a, b, c = centres[run, 0], centres[run, 1], centres[run, 2]
+                x += rotation[n, p, 0, 0] * a + rotation[n, p, 0, 1] * b + rotation[n, p, 0, 2] * c
+                y += rotation[n, p, 1, 0] * a + rotation[n, p, 1, 1] * b + rotation[n, p, 1, 2] * c
+                z += rotation[n, p, 2, 0] * a + rotation[n, p, 2, 1] * b + rotation[n, p, 2, 2] * c
+                size = max(size, math.sqrt(x * x + y * y + z * z) + norm(rotation, n, p) * radii[run])
         size *= 1.0 + 1e-12
         out[n, PSI] = (cosine * refs[n, 1] - sine * refs[n, 0]) / r if r > 0.0 else 0.0
         out[n, OMEGA] = refs[n, 2] / r if r > 0.0 else 0.0
@@ -45,15 +48,14 @@ def spans(rotation, translation, first, parts, radii, refs, sine, cosine, out):
     return worst
 
 
-@PLAIN
-def norm(m):
-    """Bound of a 3 x 3 matrix's norm: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
-    a = m[0, 0] * m[0, 0] + m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2]
-    b = m[1, 0] * m[1, 0] + m[1, 1] * m[1, 1] + m[1, 2] * m[1, 2]
-    c = m[2, 0] * m[2, 0] + m[2, 1] * m[2, 1] + m[2, 2] * m[2, 2]
-    d = abs(m[0, 0] * m[1, 0] + m[0, 1] * m[1, 1] + m[0, 2] * m[1, 2])
-    e = abs(m[0, 0] * m[2, 0] + m[0, 1] * m[2, 1] + m[0, 2] * m[2, 2])
-    f = abs(m[1, 0] * m[2, 0] + m[1, 1] * m[2, 1] + m[1, 2] * m[2, 2])
+@LEAN
+def norm(rotation, n, p):
+    """Bound of the norm of rotation[n, p]: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
+    rows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for j in range(3):
+        x, y, z = rotation[n, p, 0, j], rotation[n, p, 1, j], rotation[n, p, 2, j]
+        rows = (rows[0] + x * x, rows[1] + y * y, rows[2] + z * z, rows[3] + x * y, rows[4] + x * z, rows[5] + y * z)
+    a, b, c, d, e, f = rows[0], rows[1], rows[2], abs(rows[3]), abs(rows[4]), abs(rows[5])
     return math.sqrt(max(a + d + e, b + d + f, c + e + f))
 
 

@@ -1,0 +1,146 @@
+"""The echo engine beside its peers, and the echo stage as the workflow runs it, files included.
+
+    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 50] [--out results/benchmarks/echo.csv]
+
+Writes echo.csv (method, category, points, tolerance, seconds a sample, error, ratios to the peers of the same run):
+one cloud of each category, resampled to 31, 185 and 400 points at 200 m. Writes echo_stage.csv beside it: the stage's
+rate on motion models of mixed subtypes, the share of time outside the kernels, and how it scales with points, symbols,
+stations and cores. One thread a process; run it on a quiet machine.
+"""
+
+import argparse
+import csv
+import dataclasses
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.command import settings as parse_settings
+from lowalt.config import canonical
+from lowalt.echo import cost, echo_signal
+from lowalt.echo.motion import Rigid
+from lowalt.files import replacing
+from lowalt.motion import poses, write_table
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.network import Network
+from lowalt.streams import stream
+from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.records import load_table
+from lowalt.yaml_files import load_yaml
+
+PAPER = 240_000
+"""Motion models of the paper, each seen by three stations."""
+
+
+def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> list[dict]:
+    """Rows of echo.csv: the first cloud of each category."""
+    first = list({cloud.category: cloud for cloud in reversed(clouds)}.values())
+    block = {
+        "motion": config["motion"], "seed": 1, "distances_m": [200.0], "points": [31, 185, 400], "repeats": repeats,
+        "tolerances": [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9], "direct": direct,
+    }  # fmt: skip
+    return cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
+
+
+def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
+    """Motion table of `count` models, subtypes in turn."""
+    network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
+    masts = np.array([station.position_m[:2] for station in network.stations])
+    corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
+    rows = []
+    for index in range(count):
+        cloud = clouds[index % len(clouds)]
+        rng = stream(1, "benchmark", cloud.subtype, index)
+        row = draw(rng, cloud, published[cloud.subtype], masts, corners, config["motion"])
+        rows.append(row | {"group": "seen", "model": index})
+    return rows
+
+
+def stage(config: dict, paths: list[str], rows: list[dict], processes: int, folder: Path) -> float:
+    """Seconds that the echo command takes for all rows at all stations, in `processes` processes at a time."""
+    table = folder / "motion.csv"
+    write_table(table, rows)
+    block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
+    parse_settings(block)
+    jobs = [
+        [sys.executable, "-m", "lowalt.echo", "--settings", block, "--motion", str(table), "--clouds", *paths,
+         "--station", name, "--out", str(folder / f"{name}.npy")]
+        for name in config["network"]["stations"]
+    ]  # fmt: skip
+    start, running = time.perf_counter(), []
+    for job in jobs:
+        if len(running) == processes:
+            running.pop(0).wait()
+        running.append(subprocess.Popen(job, stderr=subprocess.DEVNULL))
+    if any(process.wait() for process in running):
+        raise SystemExit("the echo command failed")
+    return time.perf_counter() - start
+
+
+def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
+    """Seconds of poses and of signals for all rows at all stations, without files and start-up."""
+    network = Network.from_settings(config["network"])
+    by_name = {cloud.subtype: cloud for cloud in clouds}
+    posing = computing = 0.0
+    for row in rows:
+        cloud = by_name[row["subtype"]]
+        for station in network.stations:
+            start = time.perf_counter()
+            motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+            middle = time.perf_counter()
+            echo_signal(network, station, motion, cloud.rcs_m2, np.array([row["x_m"], row["y_m"], row["z_m"]]),
+                        config["echo"]["tolerance"])  # fmt: skip
+            posing, computing = posing + middle - start, computing + time.perf_counter() - middle
+    return {"poses_s": posing, "signals_s": computing}
+
+
+def scaling(config: dict, cloud: Cloud) -> list[dict]:
+    """Seconds a signal over points and symbols, for one cloud resampled."""
+    network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
+    rows = []
+    for symbols, points in ((400, 31), (400, 100), (400, 400), (400, 1600), (100, 400), (1600, 400)):
+        longer = dataclasses.replace(network, symbols=symbols)
+        given = cost.sample(cloud, published[cloud.subtype], longer, config["motion"], 1, 200.0, points)
+        seconds, _ = cost.timed(lambda longer=longer, given=given: echo_signal(longer, longer.stations[0], *given), 9)
+        rows.append({"what": f"one signal, {symbols} symbols x {points} points", "seconds": seconds})
+    return rows
+
+
+def main() -> None:
+    """Run both parts and write both tables."""
+    line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    line.add_argument("--clouds", nargs="+", required=True)
+    line.add_argument("--config", default="config/default.yaml")
+    line.add_argument("--models", type=int, default=2000)
+    line.add_argument("--repeats", type=int, default=5)
+    line.add_argument("--no-direct", action="store_true", help="leave out the direct sum, seconds a call")
+    line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo.csv"))
+    given = line.parse_args()
+    config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
+    cost.write(given.out, tables(config, clouds, given.repeats, not given.no_direct))
+    rows = models(config, clouds, given.models)
+    stations = len(config["network"]["stations"])
+    result = scaling(config, clouds[0])
+    with tempfile.TemporaryDirectory() as folder:
+        for processes in (1, 2):
+            seconds = stage(config, given.clouds, rows, processes, Path(folder))
+            result.append({"what": f"echo stage, {len(rows)} models x {stations} stations, {processes} process(es)",
+                           "seconds": seconds, "models_per_s": len(rows) / seconds,
+                           "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip
+    result += [{"what": f"inside the stage: {name}", "seconds": value} for name, value in
+               inside(config, clouds, rows).items()]  # fmt: skip
+    path = given.out.with_name("echo_stage.csv")
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["what", "seconds", "models_per_s", "paper_minutes", "hardware"],
+                                lineterminator="\n")  # fmt: skip
+        writer.writeheader()
+        writer.writerows(row | {"hardware": cost.hardware()} for row in result)
+    print(path.read_text(), end="")
+
+
+if __name__ == "__main__":
+    main()
