@@ -86,6 +86,18 @@ def test_stations_may_be_swapped_and_spectra_may_not():
 
 
 @torch.inference_mode()
+def test_a_station_alone_answers_as_if_it_were_the_only_one():
+    model = recogniser()
+    index = images(4, 9)
+    together, alone = model(index, alone=True)
+    torch.testing.assert_close(together, model(index))
+    for station in range(3):
+        torch.testing.assert_close(
+            alone.unflatten(0, (4, 3))[:, station], model(index[:, 3 * station : 3 * station + 3]), atol=1e-5, rtol=1e-4
+        )
+
+
+@torch.inference_mode()
 def test_samples_do_not_see_each_other():
     model = recogniser()
     index = images(4, 9)

@@ -19,8 +19,9 @@ from lowalt.streams import stream
 
 TRAINING = {
     "steps": 24, "batch": 8, "snrs_per_model": 1, "rate": 3e-3, "backbone_rate": 1.0, "weight_decay": 0.05,
-    "warmup": 0.1, "clip": 5.0, "label_smoothing": 0.0, "ema": 0.99, "precision": "fp32", "channels_last": True,
-    "compile": False, "validate_every": 8, "patience": 0, "checkpoint_s": 1e9, "threads": 1, "workers": 0,
+    "warmup": 0.1, "clip": 5.0, "label_smoothing": 0.0, "alone": 0.5, "ema": 0.99, "precision": "fp32",
+    "channels_last": True, "compile": False, "validate_every": 8, "patience": 0, "checkpoint_s": 1e9,
+    "threads": 1, "workers": 0,
 }  # fmt: skip
 SETTINGS = {
     "seed": 3, "size": 32, "colour_map": "gray",

@@ -152,9 +152,16 @@ class Recogniser(nn.Module):
         features = self.backbone(images.flatten(0, 2))
         return features.view(samples, stations, spectra, -1)
 
-    def forward(self, index: torch.Tensor) -> torch.Tensor:
-        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, 4)."""
-        return self.classifier(self.fusion(self.tokens(index)))
+    def forward(self, index: torch.Tensor, alone: bool = False) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
+        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, 4).
+
+        alone: return as well the logits (B * K, 4) of each station as if it were the only one; the backbone runs once.
+        """
+        tokens = self.tokens(index)
+        logits = self.classifier(self.fusion(tokens))
+        if not alone:
+            return logits
+        return logits, self.classifier(self.fusion(tokens.flatten(0, 1).unsqueeze(1)))
 
 
 def parameters(model: nn.Module) -> int:

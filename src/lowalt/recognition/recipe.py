@@ -10,6 +10,8 @@ Settings of this module, the block `recognition.training`:
     warmup           share of the steps in which the rate rises linearly; then it falls as a cosine to 0
     clip             largest norm of the gradient
     label_smoothing  0..1
+    alone            weight of a second loss, on each station as if it were the only one; 0 for none. Several
+                     stations then teach the backbone as often as they are seen, not once a sample
     ema              largest decay of the moving average of the weights (it rises with the steps); 0 for none
     precision        bf16 (autocast) | fp32
     channels_last    memory layout of images and convolutions
@@ -35,7 +37,7 @@ from lowalt.streams import digest
 
 KEYS = (
     "steps", "batch", "snrs_per_model", "rate", "backbone_rate", "weight_decay", "warmup", "clip",
-    "label_smoothing", "ema", "precision", "channels_last", "compile", "validate_every", "patience",
+    "label_smoothing", "alone", "ema", "precision", "channels_last", "compile", "validate_every", "patience",
     "checkpoint_s", "threads", "workers",
 )  # fmt: skip
 
@@ -44,7 +46,7 @@ WHOLE = {"steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "pati
 """Smallest value of every whole number."""
 REAL = {
     "rate": math.inf, "backbone_rate": math.inf, "weight_decay": math.inf, "warmup": 1, "clip": math.inf,
-    "label_smoothing": 1, "ema": 1, "checkpoint_s": math.inf,
+    "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf,
 }  # fmt: skip
 """Largest value of every real number; the smallest is 0."""
 

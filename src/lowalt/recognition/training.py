@@ -137,6 +137,17 @@ class Trainer:
             generator=torch.Generator(),
         )  # fmt: skip
 
+    def _loss(self, images: torch.Tensor, labels: torch.Tensor) -> torch.Tensor:
+        stations = self.model.shape[0]
+        weight = self.block["alone"] if stations > 1 else 0
+        with self.machine.autocast():
+            found = self.step_model(images, alone=bool(weight))
+        if not weight:
+            return self.criterion(found.float(), labels)
+        together, alone = found
+        each = self.criterion(alone.float(), labels.repeat_interleave(stations))
+        return (self.criterion(together.float(), labels) + weight * each) / (1 + weight)
+
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         self.step_model.train()
         images = images.to(self.machine.device, non_blocking=True)
@@ -144,9 +155,7 @@ class Trainer:
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["factor"]
-        with self.machine.autocast():
-            logits = self.step_model(images)
-        loss = self.criterion(logits.float(), labels)
+        loss = self._loss(images, labels)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
         self.at.loss_sum += float(loss.detach())
