@@ -72,22 +72,6 @@ def verify(arguments: list[str]) -> None:
         raise SystemExit(1)
 
 
-def size(arguments: list[str]) -> None:
-    """Print the motion.models_per_chunk for which a run's largest shards come closest to a target size."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards size", description=size.__doc__)
-    options.add_argument("--config", required=True, help="the run's merged configuration (.yaml)")
-    options.add_argument("--subtypes", type=int, required=True, help="subtypes of the larger group")
-    options.add_argument(
-        "--target-mb", type=float, default=1000, help="wanted size of the train shards (default 1000 MB)"
-    )
-    given = options.parse_args(arguments)
-    config = load_yaml(given.config)
-    network = Network.from_settings(config["network"])
-    sample = sample_bytes(config["shards"]["kind"], len(network.stations), network.symbols)
-    snrs = len(config["noise"]["snr_db"])
-    print(models_per_chunk(1e6 * given.target_mb, sample, given.subtypes, snrs, config["split"]))
-
-
 COMMANDS = {"write": write, "index": index, "verify": verify}
 
 

@@ -3,6 +3,7 @@
 A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
 """
 
+import argparse
 import csv
 import json
 import re
@@ -192,6 +193,19 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+
+
+def main(arguments: list[str]) -> None:
+    """Write the data card, the table of samples and the Croissant description beside the index."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
+    options.add_argument("--index", required=True, help="the data set's index")
+    options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
+    options.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
+    options.add_argument("--url", help="where the data set will be published")
+    options.add_argument("--date", help="day of publication, YYYY-MM-DD")
+    given = options.parse_args(arguments)
+    facts = {"url": given.url, "datePublished": given.date}
+    write(given.index, given.config, given.license, **{key: text for key, text in facts.items() if text})
 
 
 if __name__ == "__main__":

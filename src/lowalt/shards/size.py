@@ -51,18 +51,5 @@ def main(arguments: list[str]) -> None:
     print(models_per_chunk(1e6 * given.target_mb, sample, given.subtypes, snrs, config["split"]))
 
 
-def card(arguments: list[str]) -> None:
-    """Write the data card, the table of samples and the Croissant description beside the index."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards card", description=card.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
-    options.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
-    options.add_argument("--url", help="where the data set will be published")
-    options.add_argument("--date", help="day of publication, YYYY-MM-DD")
-    given = options.parse_args(arguments)
-    facts = {"url": given.url, "datePublished": given.date}
-    write_card(given.index, given.config, given.license, **{key: text for key, text in facts.items() if text})
-
-
 if __name__ == "__main__":
     run(main)
