@@ -211,13 +211,13 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
     rotation, translation, lx, ly, lz = scene.rotation, scene.translation, lay.x, lay.y, lay.z
     parts, starts, amplitude = lay.parts, lay.starts, lay.amplitude
     ex, ey, ez, eps, inv, exc = work
-    real, imag, u, turn, amp, gain_h, gain_v, square, cos_t, sin_t = small
+    real, imag, u, sin_u, turn, amp, gain_h, gain_v, square, cos_t, sin_t = small
     q = scene.part[0] if len(scene.part) else 0
     psi0, omega0 = aims
     padded = len(amplitude)
-    together = max(1, lanes.TILE // padded)
-    chunk = min(padded, lanes.TILE)
     room, m, k, sums, more, weights, coefficients, typed, degrees = rooms
+    together = len(sums)
+    chunk, kept = lanes.chunk_of(padded), padded <= lanes.KEPT
     for index in range(len(segs)):
         start, end = int(segs[index, 0]), int(segs[index, 1])
         base = np.rint(segs[index, 6])
@@ -236,7 +236,7 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
         first, last = 0, window - 1
         for i in range(start, end, together):
             many = min(together, end - i)
-            if chunk == padded:
+            if kept:
                 first, last = window, -1
             for s in range(many):
                 constants(radar, refs, i + s, segs, index, psi0, omega0, base, k, s)
@@ -248,6 +248,9 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
             for point in range(0, padded, chunk):
                 size = min(chunk, padded - point)
                 whole = many * size
+                at = point if kept else 0
+                u_c, sin_c = u[at : at + whole], sin_u[at : at + whole]
+                real_c, imag_c = real[at : at + whole], imag[at : at + whole]
                 for s in range(many):
                     fill_tile(
                         rotation, translation, lx, ly, lz, parts, starts, q, radar.sine, radar.cosine,
@@ -257,25 +260,24 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
                 lanes.horner(eps, inverse, len(inverse) - 1, inv, whole)
                 lanes.horner(eps, excess, len(excess) - 1, exc, whole)
                 for s in range(many):
+                    # Until the waves are made, cos_t and sin_t hold the gains' arguments.
                     lanes.arguments(
-                        k, s, ey, ez, eps, inv, exc, amplitude, point, real, imag, u, turn, amp, s * size, size
+                        k, s, ey, ez, eps, inv, exc, amplitude, point, cos_t, sin_t, u_c, turn, amp, s * size, size
                     )
-                # Until the waves are made, real and imag hold the gains' arguments.
-                lanes.horner(real, row_h, degrees[H], gain_h, whole)
-                lanes.horner(imag, row_v, degrees[V], gain_v, whole)
+                lanes.horner(cos_t, row_h, degrees[H], gain_h, whole)
+                lanes.horner(sin_t, row_v, degrees[V], gain_v, whole)
                 lanes.squares(whole, turn, square)
                 lanes.horner(square, cosine, len(cosine) - 1, cos_t, whole)
                 lanes.horner(square, sine, len(sine) - 1, sin_t, whole)
-                lanes.waves(whole, amp, gain_h, gain_v, cos_t, sin_t, turn, real, imag)
-                sin_u, weight = gain_h, gain_v
-                lanes.horner(u, row_sine, degrees[SINE], sin_u, whole)
+                lanes.waves(whole, amp, gain_h, gain_v, cos_t, sin_t, turn, real_c, imag_c)
+                lanes.horner(u_c, row_sine, degrees[SINE], sin_c, whole)
                 for cell in range(first, last + 1):
-                    lanes.horner(u, typed[FIRST + cell], degree, weight, whole)
+                    lanes.horner(u_c, typed[FIRST + cell], degree, gain_v, whole)
                     for s in range(many):
-                        re, im = lanes.weigh(weight, real, imag, s * size, size)
+                        re, im = lanes.weigh(gain_v, real_c, imag_c, s * size, size)
                         sums[s, RING + cell] += complex(re, im)
                 for s in range(many):
-                    c0, c1, c2, c3, total, t1, t2 = lanes.far_sums(sin_u, u, real, imag, amp, s * size, size)
+                    c0, c1, c2, c3, total, t1, t2 = lanes.far_sums(sin_c, u_c, real_c, imag_c, amp, s * size, size)
                     more[s, 0] += complex(c0, c1)
                     more[s, 1] += complex(c2, c3)
                     weights[s, 0] += total
@@ -295,9 +297,9 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
                 c1 += total * bound_sine * 2.0 * segs[index, 7]
                 fate, which, tie, close = certify(
                     place - low, span[i + s, SIZE] * radar.cells, c0, c1, a2, total * bound_sine, bound, sums[s],
-                    first, last, window, s * size, size if chunk == padded else 0, typed, degree,
+                    first, last, window, s * padded, padded if kept else 0, typed, degree,
                     (radar.subcarriers, segs[index, 7], segs[index, 6] - base - low),
-                    (gain_h, u, real, imag, gain_v),
+                    (sin_u, u, real, imag, gain_v),
                 )  # fmt: skip
                 if close and plan[3] == 0.0:
                     fate = AGAIN
@@ -322,4 +324,4 @@ def rooms_for(points: int, rates: int, single: bool):
         np.empty((together, 3)), np.empty((FIRST + WIDEST, TOP + 1)), np.empty((FIRST + WIDEST, TOP + 1), kind),
         np.empty(FIRST + WIDEST, np.int64),
     )  # fmt: skip
-    return rooms, tuple(np.empty(lanes.ROW) for _ in range(6)), tuple(np.empty(lanes.ROW, kind) for _ in range(10))
+    return rooms, tuple(np.empty(lanes.ROW) for _ in range(6)), tuple(np.empty(lanes.ROW, kind) for _ in range(11))

@@ -9,12 +9,23 @@ views of arrays would do as well, but cost a counted reference each.
 
 import numpy as np
 
-from lowalt.echo.compile import VECTOR
+from lowalt.echo.compile import LEAN, VECTOR
 
-TILE = 512
-"""Points in a tile: some twenty arrays of 4 kB stay in the nearest caches."""
-ROW = TILE + 24
-"""Room for a tile's array: rows a whole 4096 bytes apart would make loads wait for unrelated stores."""
+TILE = 256
+"""Points worked on at a time: some fifteen arrays of 2 kB stay in the nearest cache."""
+KEPT = 512
+"""Largest target whose waves are all kept until its strongest cell is certain."""
+ROW = KEPT + 24
+"""Room of a work array, of odd length: rows a whole 4096 bytes apart would make loads wait for unrelated stores."""
+LANES = 16
+"""Tiles hold whole multiples of this many points; the padding has no amplitude."""
+
+
+@LEAN
+def chunk_of(points: int) -> int:
+    """Points of a tile when a target has `points` (padded): equal shares of at most TILE, whole multiples of LANES."""
+    shares = -(-points // TILE)
+    return -(-points // (shares * LANES)) * LANES
 
 
 @VECTOR

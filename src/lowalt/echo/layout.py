@@ -4,11 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.lanes import TILE
+from lowalt.echo.lanes import LANES, chunk_of
 from lowalt.echo.motion import Scene
-
-LANES = 16
-"""Tiles hold whole multiples of this many points; the padding has no amplitude."""
 
 
 class Layout(NamedTuple):
@@ -51,8 +48,7 @@ def layout(scene: Scene, peak: float) -> Layout:
         )  # fmt: skip
     change = np.flatnonzero(part[1:] != part[:-1]) + 1
     starts = np.concatenate(([0], change))
-    if count > TILE:
-        starts = np.union1d(starts, np.arange(0, count, TILE))
+    starts = np.union1d(starts, np.arange(0, count, chunk_of(len(amplitude))))
     centres = (np.maximum.reduceat(points, starts) + np.minimum.reduceat(points, starts)) / 2
     ends = np.append(starts[1:], count)
     away = points - np.repeat(centres, ends - starts, axis=0)
