@@ -1,0 +1,106 @@
+"""The echo command: a motion table and clouds in, complex64 signals out, and its faults by name."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from lowalt.echo import echo_signal
+from lowalt.echo.__main__ import main
+from lowalt.echo.cost import COLUMNS, rows_of, sample
+from lowalt.errors import InputError
+from lowalt.motion import positions, write_table
+from lowalt.motion.table import NUMBERS
+from lowalt.network import Network
+from lowalt.targets.cloud import Cloud, write
+
+NETWORK = {
+    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 256, "guard_subcarriers": 10,
+    "symbol_interval_s": 2.5e-3, "symbols": 30, "transmit_array": [16, 4], "receive_array": [16, 4], "power_w": 1.0,
+    "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 30}, "B": {"position_m": [500, 0, 25],
+                                                                            "normal_deg": 150}},
+}  # fmt: skip
+
+
+def craft() -> Cloud:
+    rng = np.random.default_rng(0)
+    count = 20
+    return Cloud(
+        points=rng.normal(scale=0.2, size=(count, 3)), part=np.repeat([0, 1], 10), kinds=("body", "rotor"),
+        names=("body", "rotor 1"), parents=np.array([-1, -1]), hinges=np.array([[np.nan] * 3, [0.2, 0.1, 0.05]]),
+        axes=np.array([[np.nan] * 3, [0.0, 0.0, 1.0]]), normals=np.full((count, 3), np.nan), rcs_m2=np.ones(count),
+        record={"subtype": "DJI Mini 2", "category": "UAV", "source": "test", "checksum": "0"},
+    )  # fmt: skip
+
+
+def row(model: int) -> dict:
+    rng = np.random.default_rng(model)
+    values = dict.fromkeys(NUMBERS, math.nan) | dict.fromkeys(("yaw_rad", "pitch_rad", "roll_rad"), 0.1)
+    place = dict(zip(("x_m", "y_m", "z_m"), (200.0, 100.0 + model, 60.0), strict=True))
+    speed = dict(zip(("vx_mps", "vy_mps", "vz_mps"), rng.normal(size=3), strict=True))
+    rotor = {"rate_hz": 80.0, "phase_0_rad": 0.3, "phase_1_rad": 0.3}
+    return {"subtype": "DJI Mini 2", "category": "UAV", "group": "seen", "model": model, **values, **place, **speed,
+            **rotor}  # fmt: skip
+
+
+def command(folder, **changes) -> list[str]:
+    given = {
+        "--settings": json.dumps({"network": NETWORK, "tolerance": None}), "--motion": str(folder / "chunk.csv"),
+        "--clouds": str(folder / "craft.npz"), "--station": "B", "--out": str(folder / "B.npy"),
+    } | changes  # fmt: skip
+    return [text for pair in given.items() for text in pair]
+
+
+@pytest.fixture
+def folder(tmp_path):
+    write(tmp_path / "craft.npz", craft())
+    write_table(tmp_path / "chunk.csv", [row(0), row(1)])
+    return tmp_path
+
+
+def test_signals_are_those_of_the_positions(folder):
+    main(command(folder))
+    found = np.load(folder / "B.npy")
+    assert found.shape == (2, 30) and found.dtype == np.complex64
+    network = Network.from_settings(NETWORK)
+    for model in (0, 1):
+        track = positions(craft(), row(model), network.times_s)
+        aim = [row(model)[name] for name in ("x_m", "y_m", "z_m")]
+        truth = echo_signal(network, network.station("B"), track, 1.0, aim).signal
+        assert abs(found[model] - truth).max() < 1e-6 * abs(truth).max()
+    first = (folder / "B.npy").read_bytes()
+    main(command(folder))
+    assert (folder / "B.npy").read_bytes() == first
+
+
+def test_faults_are_named_and_leave_nothing_behind(folder):
+    with pytest.raises(InputError, match="station 'D': not in the network"):
+        main(command(folder, **{"--station": "D"}))
+    with pytest.raises(InputError, match="tolerance is 2"):
+        main(command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 2})}))
+    with pytest.raises(InputError, match=r"DJI Mini 2, model 0, station B: .*below the floor"):
+        main(command(folder, **{"--settings": json.dumps({"network": NETWORK, "tolerance": 1e-15})}))
+    write_table(folder / "chunk.csv", [row(0) | {"subtype": "Crow"}])
+    with pytest.raises(InputError, match="Crow, model 0: no cloud"):
+        main(command(folder))
+    assert not list(folder.glob("*.npy"))
+
+
+def test_the_cost_table_has_every_method_and_its_error():
+    network = Network.from_settings(NETWORK)
+    published = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
+    motion = {
+        "region": {"polygon_m": [[0, -400], [400, -400], [400, 400], [0, 400]], "mast_clearance_m": 10.0},
+        "height_m": {"UAV": [30, 150]}, "tilt_deg": 20.0, "cadence": "free",
+    }  # fmt: skip
+    given = sample(craft(), published, network, motion, 1, 150.0, 40)
+    assert len(given[1]) == 40
+    assert np.linalg.norm(given[2] - [0, 0, 25]) == pytest.approx(150)
+    block = {"repeats": 1, "direct": True, "tolerances": [1e-3, 1e-9]}
+    pytest.importorskip("finufft")
+    rows = rows_of(network, craft(), given, 150.0, 1, block)
+    assert all(set(row) == set(COLUMNS) for row in rows) and len(rows) == 7
+    for line in rows:
+        allowed = line["tolerance"] if isinstance(line["tolerance"], float) else 1e-10
+        assert line["relative_error"] < max(allowed, 1e-10) and line["seconds"] > 0

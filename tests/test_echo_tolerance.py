@@ -1,0 +1,136 @@
+"""A tolerance is kept: bounds proved before, kept after, cheaper when looser; every shortcut has its own judge."""
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.echo import Path, echo_signal, explain, fits, range_cells
+from lowalt.echo.precise import reference as reference_ranges
+from lowalt.echo.radar import radar
+from test_echo import cloud_in_motion, network, positions, relative
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 10_000), points=st.integers(1, 700), size=st.floats(0.02, 3.0),
+    away=st.floats(30.0, 3000.0), tolerance=st.sampled_from([1e-2, 1e-3, 1e-5, 1e-7, 1e-9]),
+)  # fmt: skip
+def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tolerance):
+    net = network(symbols=40)
+    rng = np.random.default_rng(seed)
+    motion = cloud_in_motion(rng, 40, points, (away, 0.3 * away, 40.0), size, 20.0)
+    arguments = (net, net.stations[0], motion, rng.exponential(size=points), motion.translation[0, 0])
+    # Another kernel altogether: point by point, no polynomial, all cells where need be.
+    truth = echo_signal(*arguments, paths=[Path()])
+    for allowed in (tolerance, None):
+        result = echo_signal(*arguments, allowed)
+        error = relative(result.signal, truth.signal)
+        assert error <= result.bound + truth.bound
+        assert allowed is None or result.bound <= allowed
+        assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
+
+
+def test_a_looser_tolerance_takes_shorter_polynomials():
+    net = network()
+    motion = cloud_in_motion(np.random.default_rng(2), 400, 100, (200.0, 30.0, 60.0), 0.3)
+    orders = []
+    for tolerance in (1e-2, 1e-4, 1e-7, 1e-9, None):
+        result = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], tolerance)
+        orders.append(sum(result.choice.orders))
+        assert result.choice.cheap + result.choice.exact + result.choice.general == 400
+    assert orders == sorted(orders) and orders[0] < orders[-1] - 8
+    loose = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-2)
+    assert loose.choice.single and "float32" in explain(loose)
+
+
+def test_points_in_parts_and_plain_positions_agree():
+    net = network()
+    motion = cloud_in_motion(np.random.default_rng(3), 50, 90, (150.0, -30.0, 60.0), 1.0)
+    one = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0])
+    two = echo_signal(net, net.stations[0], positions(motion), 1.0, motion.translation[0, 0])
+    shuffled = np.random.default_rng(4).permutation(90)
+    three = echo_signal(net, net.stations[0], positions(motion)[:, shuffled], 1.0, motion.translation[0, 0])
+    assert relative(two.signal, one.signal) < 1e-11 and relative(three.signal, two.signal) < 1e-11
+
+
+def test_incoherent_clouds_are_certified_against_all_cells():
+    net = network()
+    motion = cloud_in_motion(np.random.default_rng(6), 120, 400, (150.0, -30.0, 60.0), 2.0, 30.0)
+    cells = abs(range_cells(net, net.stations[0], motion, 1.0, motion.translation[0, 0]))
+    result = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0])
+    assert (result.cell == cells.argmax(axis=1)).all()
+    assert len(set(result.cell)) > 2
+
+
+@pytest.mark.parametrize("band", [0.1, 1.0, 3.0, 6.0])
+@pytest.mark.parametrize("error", [1e-3, 1e-8, 1e-14])
+def test_fitted_cosines_keep_their_bound(band, error):
+    degree = fits.degree_for(band, error)
+    weights, rates = np.array([0.25, 0.45, 0.3]), np.array([1.0, 0.6, 0.1])
+    out, s = np.zeros(fits.TOP + 1), np.linspace(-1, 1, 401)
+    fits.economised(weights, rates, 0.3, 1.7, band, degree, fits.folding(), np.empty((3, 3)), out)
+    truth = np.cos(np.outer(1.7 + band * s, rates) + 0.3) @ weights
+    assert abs(np.polynomial.polynomial.polyval(s, out) - truth).max() <= fits.tail(band, degree) + 2e-15
+    assert fits.tail(band, degree) <= error
+
+
+@pytest.mark.parametrize("kind", ["inverse", "excess", "cosine", "sine"])
+@pytest.mark.parametrize("error", [1e-3, 1e-7, 1e-15])
+def test_fixed_functions_keep_their_bound(kind, error):
+    reach = 0.25 if kind in ("cosine", "sine") else 0.1
+    coefficients, bound = fits.smooth(kind, reach, error)
+    x = np.linspace(1e-6 if kind in ("cosine", "sine") else -reach, reach, 200)
+    exact = {
+        "inverse": lambda v: 1 / mpmath.sqrt(1 + v), "excess": lambda v: (mpmath.sqrt(1 + v) - 1) / v,
+        "cosine": lambda v: mpmath.cos(2 * mpmath.pi * mpmath.sqrt(v)),
+        "sine": lambda v: mpmath.sin(2 * mpmath.pi * mpmath.sqrt(v)) / mpmath.sqrt(v),
+    }[kind]  # fmt: skip
+    with mpmath.workdps(40):
+        truth = np.array([float(exact(mpmath.mpf(v))) for v in x])
+    found = np.polynomial.polynomial.polyval(x, coefficients)
+    assert abs(found - truth).max() <= bound + 1e-14
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 17, 24, 25, 256, 3300])
+def test_the_cell_kernel_is_a_short_cosine_sum(count):
+    weights, rates = fits.cell_rule(count)
+    m = np.arange(count) - (count - 1) / 2
+    for x in np.linspace(-fits.CELL_REACH, fits.CELL_REACH, 33):
+        truth = np.cos(2 * np.pi * m * x / count).mean()
+        assert abs((weights * np.cos(rates * x)).sum() - truth) < 5e-15
+    assert len(weights) <= 12 and (rates >= 0).all()
+
+
+@pytest.mark.parametrize("distance", [0.01, 1.0, 1e3, 1e5, 1e7])
+def test_reference_ranges_hold_more_than_a_double(distance):
+    net = network()
+    radio = radar(net, net.stations[0])
+    place = np.array([[0.6 * distance, -0.3 * distance, 25.0 + distance / 7]])
+    found = reference_ranges(place, radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo)[0]
+    with mpmath.workdps(50):
+        centre = mpmath.mpf(4.9e9) + mpmath.mpf(255) / 2 * 120000
+        d = [mpmath.mpf(a) - mpmath.mpf(b) for a, b in zip(place[0], radio.station, strict=True)]
+        r = mpmath.sqrt(sum(v * v for v in d))
+        turn = 2 * centre * r / 299792458
+        off = turn - mpmath.nint(turn) - mpmath.mpf(found[4])
+        assert abs(off - mpmath.nint(off)) < 1e-15
+        assert abs(2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[5]) - mpmath.mpf(found[6])) < 1e-15
+
+
+def test_machine_code_follows_every_source_of_the_folder():
+    from lowalt.echo import compile as compiling
+
+    key = compiling._SourceCache._index_key
+    from lowalt.echo.fast import run
+
+    assert isinstance(run._cache, compiling._SourceCache) and compiling.DIGEST in _key_of(run._cache, key)
+
+
+def _key_of(cache, key) -> tuple:
+    class Codegen:
+        def magic_tuple(self):
+            return ("any",)
+
+    return key(cache, ("signature",), Codegen())
