@@ -19,7 +19,7 @@ def test_random_scenes_keep_every_promise():
 
 
 def test_failures_are_seen():
-    good = {"tolerance": 1e-6, "error": 1e-8, "bound": 1e-7, "wrong_cells": 0}
+    good = {"tolerance": 1e-6, "error": 1e-8, "bound": 1e-7, "wrong_cells": 0, "carrier_hz": 5e9, "range_m": 100.0}
     assert not echo_scenes.failures([good])
     for change in ({"error": 2e-6, "bound": 1}, {"bound": 1e-9}, {"wrong_cells": 1}):
         assert echo_scenes.failures([good | change])
