@@ -139,12 +139,15 @@ def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> t
     for _ in range(count):
         entry = entries[rng.integers(len(entries))]
         path = folder / entry["path"]
-        whole = path.read_bytes()
-        place = int(rng.integers(len(whole)))
-        harmed = bytearray(whole) if rng.random() < 0.5 else whole[:place]
-        if len(harmed) == len(whole):
-            harmed[place] ^= int(rng.integers(1, 256))
-        path.write_bytes(harmed)
+        place, cut = int(rng.integers(entry["bytes"])), rng.random() < 0.5
+        with path.open("r+b") as file:
+            file.seek(place)
+            rest = file.read() if cut else file.read(1)
+            file.seek(place)
+            if cut:
+                file.truncate()
+            else:
+                file.write(bytes([rest[0] ^ int(rng.integers(1, 256))]))
         rows = map_samples(table_path(path))
         hit = [n for n, row in enumerate(rows) if row["offset"] <= place < row["offset"] + row["size"]]
         keys = [rows["key"][n].decode() for n in hit] or ["end of the archive", "bytes, expected"]
@@ -152,7 +155,9 @@ def damage(index: Path, folder: Path, count: int, rng: np.random.Generator) -> t
         found += bool(lines)
         named += any(entry["name"] in line and key in line for line in lines for key in keys)
         refused += refuses(index, entry, hit)
-        path.write_bytes(whole)
+        with path.open("r+b") as file:
+            file.seek(place)
+            file.write(rest)
     return count, found, named, refused
 
 
