@@ -70,7 +70,8 @@ def test_signals_are_those_of_the_positions(folder):
         truth = echo_signal(network, network.station("B"), track, 1.0, aim).signal
         assert abs(found[model] - truth).max() < 1e-6 * abs(truth).max()
     first = (folder / "B.npy").read_bytes()
-    main(command(folder))
+    main(command(folder, **{"--explain": str(folder / "why.txt")}))
+    assert (folder / "why.txt").read_text().count("error proved below") == 2
     assert (folder / "B.npy").read_bytes() == first
 
 

@@ -5,7 +5,7 @@ import sys
 import numpy as np
 
 from lowalt.command import parser, pick, run
-from lowalt.echo.engine import echo_signal
+from lowalt.echo.engine import echo_signal, explain
 from lowalt.echo.motion import Rigid
 from lowalt.errors import InputError
 from lowalt.files import replacing
@@ -15,11 +15,16 @@ from lowalt.targets.cloud import Cloud, read
 
 
 def signals(
-    network: Network, name: str, clouds: dict[str, Cloud], rows: list[dict], tolerance: float | None
+    network: Network,
+    name: str,
+    clouds: dict[str, Cloud],
+    rows: list[dict],
+    tolerance: float | None,
+    notes: list[str] | None = None,
 ) -> np.ndarray:
     """Return clean signals (models, N) complex64 of the motion table `rows` at station `name`.
 
-    The beams aim at each cloud's origin at the first symbol.
+    The beams aim at each cloud's origin at the first symbol. `notes` gets a text a model: how it was computed.
     Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
     """
     station, times_s = network.station(name), network.times_s
@@ -31,9 +36,10 @@ def signals(
             raise InputError(f"{sample}: no cloud of this subtype among {sorted(clouds)}")
         motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
-        result[index] = echo_signal(
-            network, station, motion, cloud.rcs_m2, aim, tolerance, sample=f"{sample}, station {name}"
-        ).signal
+        found = echo_signal(network, station, motion, cloud.rcs_m2, aim, tolerance, sample=f"{sample}, station {name}")
+        result[index] = found.signal
+        if notes is not None:
+            notes.append(f"{sample}, station {name}\n{explain(found)}\n")
     return result
 
 
@@ -44,11 +50,16 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
     options.add_argument("--station", required=True, help="name of the station that listens")
     options.add_argument("--out", required=True, help="clean signals to write (.npy), complex64 (models, symbols)")
+    options.add_argument("--explain", help="text to write: how each signal was computed, and by which bounds")
     given = options.parse_args(arguments)
     block, tolerance = pick(given.settings, "network", "tolerance")
     network = Network.from_settings(block)
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
-    result = signals(network, given.station, clouds, read_table(given.motion), tolerance)
+    notes: list[str] | None = [] if given.explain else None
+    result = signals(network, given.station, clouds, read_table(given.motion), tolerance, notes)
+    if given.explain:
+        with replacing(given.explain) as temporary:
+            temporary.write_text("\n".join(notes))
     with replacing(given.out) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {len(result)} signals", file=sys.stderr)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.echo import fast
+from lowalt.echo.certify import FINE
 from lowalt.echo.fits import folding
 from lowalt.echo.layout import layout
 from lowalt.echo.motion import Scene
@@ -80,7 +81,7 @@ def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float |
         chosen = sample.plan(error)
         if chosen.fits[2].size < exact.fits[2].size:
             sample.run(everyone, chosen, False, found)
-            good = (found.state == fast.FINE) & (found.bounds <= tolerance * _floor_of_largest(found))
+            good = (found.state == FINE) & (found.bounds <= tolerance * _floor_of_largest(found))
             cheap = int(good.sum())
             everyone = np.flatnonzero(~good)
         else:
@@ -93,7 +94,7 @@ def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float |
 
 def _floor_of_largest(found: Found) -> float:
     """What the largest |value| is at least, whatever the errors."""
-    done = found.state == fast.FINE
+    done = found.state == FINE
     return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
 
 
