@@ -6,7 +6,9 @@ BIN := .venv/bin
 SETUP := .venv/set-up
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-.PHONY: all default data real test test-slow lint format bench clean-results help
+REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
+
+.PHONY: all default data real test test-slow lint format bench cost tables estimate reference pictures pins help
 
 all: default
 
@@ -27,7 +29,7 @@ real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 	LOWALT_INPUTS=$(INPUTS) $(SNAKEMAKE) --configfile config/real.yaml
 
 test: $(SETUP)  ## the test suite
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
 test-slow: $(SETUP)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
@@ -42,6 +44,36 @@ format: $(SETUP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
+
+# Benchmarks need a finished `make data`, a quiet machine and the extra `bench` (FINUFFT, the echo's named peer).
+.venv/bench: $(SETUP)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c envs/constraints.txt -e '.[bench]'
+	touch $@
+
+bench: .venv/bench  ## all benchmarks, into results/benchmarks
+	$(SNAKEMAKE) -- data
+	$(BIN)/python benchmarks/echo.py --clouds results/default/clouds/*.npz
+	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
+	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
+
+cost: .venv/bench  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
+	$(SNAKEMAKE) -- cost
+
+tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data
+	$(SNAKEMAKE) --configfile config/tables.yaml
+
+estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
+	$(BIN)/python -m lowalt.report.estimate results/reference/default-stages.csv \
+		workflow/schemas/config.schema.yaml results/reference/scale.csv config/default.yaml config/workstation.yaml config/paper.yaml
+
+reference:  ## keep the small tables of the finished default and real runs
+	for run in default real; do for table in $(REFERENCE); do cp results/$$run/$$table results/reference/$$run-$$table; done; done
+
+pictures: $(SETUP)  ## the README's picture, from the finished default run
+	$(BIN)/python -m lowalt.report.cover results/default/shards/index.json design/pictures/tiles.png
+
+pins: $(SETUP)  ## write the installed versions as the pins
+	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'

@@ -70,13 +70,13 @@ def test_figures_are_pictures_with_ink_and_repeat_to_the_byte(draw):
 def test_an_estimate_scales_samples_and_bytes():
     config = load(["config/default.yaml", "config/paper.yaml"], "workflow/schemas/config.schema.yaml")
     stages = [
-        {"rule": rule, "wall_s": "100", "samples": "1000", "hardware": "x"}
+        {"rule": rule, "wall_s": "100", "samples": "1000", "sample_bytes": "250000", "hardware": "x"}
         for rule in ("motion", "echo", "noise", "tiles", "shard", "index")
     ]
-    row = estimate(stages, 2.5e5, config, "paper")
+    row = estimate(stages, config, "paper")
     assert (row["motion_models"], row["samples"]) == (240_000, 1_440_000)
     assert row["core_hours"] == pytest.approx(600 / 1000 * 1_440_000 / 3600)
     assert row["shards_gb"] == pytest.approx(360.0)
     assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
     with pytest.raises(InputError, match="index"):
-        estimate(stages[:-1], 2.5e5, config, "paper")
+        estimate(stages[:-1], config, "paper")

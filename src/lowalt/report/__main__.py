@@ -21,7 +21,7 @@ from lowalt.report.tiles import example_tiles
 from lowalt.shards import ShardSet
 from lowalt.targets.cloud import CATEGORIES, read
 
-STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "hardware")
+STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
 
 
 def picture(data: bytes) -> str:
@@ -60,14 +60,14 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
-def write_stages(path: str | Path, times: list[dict], samples: int) -> None:
-    """Write what each rule took as CSV, with the number of samples made and the hardware."""
+def write_stages(path: str | Path, times: list[dict], samples: int, size: float) -> None:
+    """Write what each rule took as CSV, with the number of samples made, bytes a sample and the hardware."""
     with replacing(path) as temporary, temporary.open("w", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(STAGE_COLUMNS)
         for entry in times:
             seconds = (f"{entry['wall_s']:.2f}", f"{entry['cpu_s']:.2f}", f"{entry['peak_mib']:.0f}")
-            writer.writerow([entry["rule"], entry["jobs"], *seconds, samples, describe()])
+            writer.writerow([entry["rule"], entry["jobs"], *seconds, samples, f"{size:.0f}", describe()])
 
 
 def main(arguments: list[str]) -> None:
@@ -89,7 +89,8 @@ def main(arguments: list[str]) -> None:
     config, published = pick(given.settings, "config", "published")
     shards = ShardSet(given.index)
     times = stage_times(given.benchmarks)
-    write_stages(given.stages, times, len(shards))
+    size = sum(shard["bytes"] for shard in shards.shards) / len(shards)
+    write_stages(given.stages, times, len(shards), size)
     ours = by_scheme(read_csv(given.accuracy, "protocol", "scheme", "snr_db", "accuracy_percent"))
     paper = by_scheme(read_csv(given.published, "protocol", "scheme", "snr_db", "accuracy_percent"))
     counts = confusion(read_csv(given.confusion, "protocol", "scheme", "category", "predicted", "samples"))
@@ -107,7 +108,7 @@ def main(arguments: list[str]) -> None:
     page = template.from_string(Path(__file__).with_name("page.html").read_text()).render(
         run=config["run"], seed=config["seed"], stations=list(config["network"]["stations"]), snrs=labels,
         models=len(shards) // len(labels), subtypes=len(clouds), samples=len(shards),
-        bytes=sum(shard["bytes"] for shard in shards.shards), hardware=describe(),
+        sample_bytes=size, kind=shards.kind, hardware=describe(),
         ours=ours, published=paper, comparisons=read_csv(given.comparisons), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
         clouds=clouds, times=times, versions=versions(), configuration=yaml.safe_dump(config, sort_keys=False),

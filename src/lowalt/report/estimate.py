@@ -29,7 +29,7 @@ def samples_of(config: dict) -> tuple[int, int]:
     return models, models * len(plan.snrs)
 
 
-def estimate(stages: list[dict[str, str]], bytes_a_sample: float, config: dict, name: str) -> dict[str, object]:
+def estimate(stages: list[dict[str, str]], config: dict, name: str) -> dict[str, object]:
     """Return one row of COLUMNS for `config`, scaled from measured `stages` (rows of stages.csv).
 
     Raises: InputError where a data stage was not measured.
@@ -42,7 +42,7 @@ def estimate(stages: list[dict[str, str]], bytes_a_sample: float, config: dict, 
     models, samples = samples_of(config)
     core_hours = sum(seconds[rule] for rule in DATA_RULES) / measured * samples / 3600
     signal = 8 * config["network"]["symbols"] * len(config["network"]["stations"])
-    disk = bytes_a_sample if config["shards"]["kind"] == "image" else signal
+    disk = float(stages[0]["sample_bytes"]) if config["shards"]["kind"] == "image" else signal
     row = (
         name,
         models,
@@ -55,10 +55,10 @@ def estimate(stages: list[dict[str, str]], bytes_a_sample: float, config: dict, 
 
 
 def main(arguments: list[str]) -> None:
-    """Write the estimate of every overlay: estimate.py STAGES BYTES_A_SAMPLE SCHEMA OUT BASE OVERLAY..."""
-    stages, size, schema, out, base, *overlays = arguments
-    rows = read_csv(stages, "rule", "wall_s", "samples", "hardware")
-    found = [estimate(rows, float(size), load([base, overlay], schema), Path(overlay).stem) for overlay in overlays]
+    """Write the estimate of every overlay: estimate.py STAGES SCHEMA OUT BASE OVERLAY..."""
+    stages, schema, out, base, *overlays = arguments
+    rows = read_csv(stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
+    found = [estimate(rows, load([base, overlay], schema), Path(overlay).stem) for overlay in overlays]
     with replacing(out) as temporary, temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()
