@@ -188,6 +188,7 @@ def main() -> None:
         tiles = Renderer(network, spectra, Images(256, common))
         palette = tiles.images.palette
         for label, code in {
+            "ours, on the samples of the rows below": lambda t: encode(t, palette),
             "our tile, palette PNG, sub, libdeflate 1": lambda t: libdeflate_png(t, palette, 1),
             "our tile, palette PNG, Paeth, libdeflate 1": lambda t: libdeflate_png(t, palette, 4),
             "our tile, palette PNG, Pillow 1": lambda t: pillow_palette_png(t, palette),
