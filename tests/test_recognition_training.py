@@ -140,7 +140,7 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
 def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys):
     table = tmp_path / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    settings = with_training(steps=60, validate_every=10, checkpoint_s=0)
+    settings = with_training(steps=20, validate_every=10, checkpoint_s=0)
     line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
             "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(tmp_path / "killed")]  # fmt: skip
     module = [sys.executable, "-m", "lowalt.recognition"]
@@ -156,7 +156,7 @@ def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys)
     main(line)
     assert ("resumed at step" in capsys.readouterr().err) == resumed
     name, state = checkpoint.load(tmp_path / "killed" / "model.pt")
-    whole = with_training(steps=60, validate_every=10)
+    whole = with_training(steps=20, validate_every=10)
     weights, history = train(views, tmp_path / "whole", whole)
     assert equal(state["weights"], weights)
     assert (tmp_path / "killed" / "history.csv").read_text() == history
