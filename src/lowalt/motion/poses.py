@@ -51,45 +51,108 @@ def rodrigues(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
 
 def attitude(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
     """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq. 18."""
-    turn = np.array([yaw_rad, pitch_rad, roll_rad])
-    yaw, pitch, roll = (rodrigues(axis, turn[i : i + 1])[0] for i, axis in enumerate(np.eye(3)[[2, 0, 1]]))
+    (a, b, c), (d, e, f) = np.cos([yaw_rad, pitch_rad, roll_rad]), np.sin([yaw_rad, pitch_rad, roll_rad])
+    yaw = np.array([[a, -d, 0.0], [d, a, 0.0], [0.0, 0.0, 1.0]])
+    pitch = np.array([[1.0, 0.0, 0.0], [0.0, b, -e], [0.0, e, b]])
+    roll = np.array([[c, 0.0, f], [0.0, 1.0, 0.0], [-f, 0.0, c]])
     return yaw @ pitch @ roll
 
 
-def _part_angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> dict[int, np.ndarray]:
-    """Angle (N,) in rad of every moving part of a rigid-part cloud."""
-    cycle = 2 * np.pi * turns(row["rate_hz"], times_s)
-    result = {}
-    for kind in ("rotor", "wheel"):
-        for order, part in enumerate(cloud.parts_of(kind)):
-            result[part] = row[f"phase_{order}_rad"] + cycle
-    wings = cloud.parts_of("wing")
-    if wings:
-        flap = cloud.record["flap"]
-        beat = row["phase_0_rad"] + cycle
-        shoulder = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * np.cos(beat)
-        fold = np.radians(flap["fold_amplitude_deg"]) * np.cos(beat - np.radians(flap["fold_lag_deg"]))
-        for part in wings:
-            result[part] = shoulder if cloud.parents[part] < 0 else fold
-    bad = [cloud.names[part] for part, angle in result.items() if not np.isfinite(angle).all()]
-    if bad:
-        raise InputError(f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts {bad}")
+def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+    """Matrices A (3, Q, 4, 4): A[0] + cos(angle) A[1] + sin(angle) A[2] turns about the hinged axes (Q, 3)."""
+    result = np.zeros((3, len(axes), 4, 4))
+    turn = result[..., :3, :3]
+    turn[0] = axes[:, :, None] * axes[:, None]
+    turn[1] = np.eye(3) - turn[0]
+    x, y, z = axes.T
+    turn[2, :, 2, 1], turn[2, :, 0, 2], turn[2, :, 1, 0] = x, y, z
+    turn[2] -= turn[2].swapaxes(1, 2)
+    result[..., :3, 3] = -(turn @ hinges[..., None])[..., 0]
+    result[0, :, :3, 3] += hinges
+    result[0, :, 3, 3] = 1.0
     return result
 
 
-def _track(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
-    """Node positions (N, L, 3) of a cyclic recording, linear between its frames (paper Eq. 21)."""
+def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.ndarray], dict[int, tuple[str, float]]]:
+    """Angles that change with time, (N,) rad by name, and the moving parts: part -> (name of its angle, phase in rad).
+
+    Rotors share one rate, and so do wheels: their angles differ by a constant only.
+    Raises: InputError naming the parts without a rate or phase.
+    """
+    angles, phases = {"cycle": 2 * np.pi * turns(row["rate_hz"], times_s)}, {}
+    for kind in ("rotor", "wheel"):
+        for order, part in enumerate(cloud.parts_of(kind)):
+            phases[part] = ("cycle", row[f"phase_{order}_rad"])
+    wings = cloud.parts_of("wing")
+    if wings:
+        flap = cloud.record["flap"]
+        beat = row["phase_0_rad"] + angles.pop("cycle")
+        angles["shoulder"] = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * np.cos(beat)
+        angles["fold"] = np.radians(flap["fold_amplitude_deg"]) * np.cos(beat - np.radians(flap["fold_lag_deg"]))
+        for part in wings:
+            phases[part] = ("shoulder" if cloud.parents[part] < 0 else "fold", 0.0)
+    known = {name: np.isfinite(angle).all() for name, angle in angles.items()}
+    bad = [cloud.names[part] for part, (name, phase) in phases.items() if not (known[name] and np.isfinite(phase))]
+    if bad:
+        raise InputError(f"motion of {cloud.subtype}, model {row['model']}: no finite rate or phase for parts {bad}")
+    return angles, phases
+
+
+def _series(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
+
+    A turn about a hinge is A + cos B + sin C; a part on a moving part multiplies such sums. So what costs time is a
+    few cosines a symbol and one matrix product, however many parts there are. The body's own motion is left out.
+    """
+    angles, phases = _angles(cloud, row, times_s)
+    one: tuple[str, ...] = ()
+    columns = {one: np.ones(len(times_s))}
+    for name in dict.fromkeys(name for name, _ in phases.values()):
+        columns["cos " + name,], columns["sin " + name,] = np.cos(angles[name]), np.sin(angles[name])
+    moving = list(phases)
+    shift = np.array([phase for _, phase in phases.values()])[:, None, None]
+    still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
+    c, s = np.cos(shift), np.sin(shift)
+    own = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
+    terms: list[tuple[list[tuple[str, ...]], np.ndarray]] = []
+    for part, parent in enumerate(cloud.parents):
+        names, matrices = [one], np.eye(4)[None]
+        if part in phases:
+            names = [one, ("cos " + phases[part][0],), ("sin " + phases[part][0],)]
+            matrices = own[:, moving.index(part)]
+        if parent >= 0:
+            before, carrier = terms[parent]
+            for outer in before:
+                for inner in names:
+                    if outer + inner not in columns:
+                        columns[outer + inner] = columns[outer] * columns[inner]
+            names = [outer + inner for outer in before for inner in names]
+            matrices = (carrier[:, None] @ matrices).reshape(-1, 4, 4)
+        terms.append((names, matrices))
+    places = {name: index for index, name in enumerate(columns)}
+    result = np.zeros((len(columns), len(terms), 4, 4))
+    for part, (names, matrices) in enumerate(terms):
+        result[[places[name] for name in names], part] = matrices
+    return np.stack(list(columns.values()), axis=1), result
+
+
+def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
+    """Node positions (N, L, 3) of a cyclic recording turned by `body`, linear between its frames (paper Eq. 21)."""
     frames = len(cloud.track)
     place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
     first = np.minimum(place.astype(np.int64), frames - 1)
-    part = (place - first)[:, None, None]
-    return cloud.track[first] + part * (cloud.track[(first + 1) % frames] - cloud.track[first])
+    turned = (cloud.track.reshape(-1, 3) @ body.T).reshape(frames, -1)
+    before, result = turned.take(first, axis=0), turned.take((first + 1) % frames, axis=0)
+    result -= before
+    result *= (place - first)[:, None]
+    result += before
+    return result.reshape(len(times_s), -1, 3)
 
 
 def poses(cloud: Cloud, row: dict, times_s: np.ndarray) -> Poses:
     """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at `times_s` (N,) s.
 
-    A node cloud gets zero rotations, and translations that carry the whole position.
+    A node cloud gets zero rotations (read-only), and translations that carry the whole position.
     Raises: InputError where the row lacks a value the cloud needs. Source: paper Eqs. 17-21, Rodrigues' formula.
     """
     times_s = np.asarray(times_s, dtype=np.float64)
@@ -101,23 +164,16 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray) -> Poses:
     path = origin + times_s[:, None] * velocity
     count, parts = len(times_s), len(cloud.kinds)
     if "node" in cloud.kinds:
-        translation = _track(cloud, row, times_s) @ body.T + path[:, None]
-        return Poses(np.zeros((count, parts, 3, 3)), np.ascontiguousarray(translation))
-    rotation = np.broadcast_to(np.eye(3), (count, parts, 3, 3)).copy()
-    translation = np.zeros((count, parts, 3))
-    angles = _part_angles(cloud, row, times_s)
-    for part in range(parts):
-        if part in angles:
-            turn, hinge = rodrigues(cloud.axes[part], angles[part]), cloud.hinges[part]
-            rotation[:, part] = turn
-            translation[:, part] = hinge - turn @ hinge
-        parent = cloud.parents[part]
-        if parent >= 0:
-            translation[:, part] = (rotation[:, parent] @ translation[:, part, :, None])[..., 0] + translation[
-                :, parent
-            ]
-            rotation[:, part] = rotation[:, parent] @ rotation[:, part]
-    return Poses(body @ rotation, translation @ body.T + path[:, None])
+        translation = _track(cloud, row, times_s, body)
+        translation += path[:, None]
+        return Poses(np.broadcast_to(np.zeros(()), (count, parts, 3, 3)), translation)
+    functions, matrices = _series(cloud, row, times_s)
+    matrices = body @ matrices[..., :3, :]
+    terms = functions.shape[1]
+    rotation = functions @ matrices[..., :3].reshape(terms, -1)
+    translation = (functions @ matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    translation += path[:, None]
+    return Poses(rotation.reshape(count, parts, 3, 3), translation)
 
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
