@@ -47,13 +47,20 @@ def degree_for(band, error):
 @lru_cache(maxsize=1)
 def folding() -> np.ndarray:
     """Weights (TOP + 1, EXTRA, TOP + 1): x^(d + 1 + j) on [-1, 1], truncated after T_d, as powers of x."""
+    top = TOP + EXTRA + 1
+    # x T_n = (T_{n+1} + T_{|n-1|}) / 2 takes x^p to Chebyshev polynomials, T_{n+1} = 2 x T_n - T_{n-1} takes these back.
+    shares, powers = np.zeros((top + 1, top + 1)), np.zeros((TOP + 1, TOP + 1))
+    shares[0, 0] = shares[1, 1] = powers[0, 0] = powers[1, 1] = 1.0
+    for p in range(1, top):
+        shares[p + 1, 1:] = shares[p, :-1] / 2
+        shares[p + 1, :-1] += shares[p, 1:] / 2
+        shares[p + 1, 1] += shares[p, 0] / 2
+    for n in range(1, TOP):
+        powers[n + 1, 1:] = 2 * powers[n, :-1]
+        powers[n + 1] -= powers[n - 1]
     result = np.zeros((TOP + 1, EXTRA, TOP + 1))
     for degree in range(TOP + 1):
-        for j in range(EXTRA):
-            power = np.zeros(degree + 2 + j)
-            power[-1] = 1.0
-            kept = chebyshev.cheb2poly(chebyshev.poly2cheb(power)[: degree + 1])
-            result[degree, j, : len(kept)] = kept
+        result[degree] = shares[degree + 1 : degree + 1 + EXTRA, : degree + 1] @ powers[: degree + 1]
     return result
 
 
