@@ -49,7 +49,7 @@ def command(folder, **changes) -> list[str]:
         "--settings": json.dumps({"network": NETWORK, "tolerance": None}), "--motion": str(folder / "chunk.csv"),
         "--clouds": str(folder / "craft.npz"), "--station": "B", "--out": str(folder / "B.npy"),
     } | changes  # fmt: skip
-    return [text for pair in given.items() for text in pair]
+    return [text for option, value in given.items() for text in (option, *value.split("|"))]
 
 
 @pytest.fixture
@@ -73,6 +73,15 @@ def test_signals_are_those_of_the_positions(folder):
     main(command(folder, **{"--explain": str(folder / "why.txt")}))
     assert (folder / "why.txt").read_text().count("error proved below") == 2
     assert (folder / "B.npy").read_bytes() == first
+
+
+def test_stations_heard_together_are_those_heard_alone(folder):
+    main(command(folder))
+    alone = (folder / "B.npy").read_bytes()
+    main(command(folder, **{"--station": "A|B", "--out": f"{folder}/both-A.npy|{folder}/both-B.npy"}))
+    assert (folder / "both-B.npy").read_bytes() == alone != (folder / "both-A.npy").read_bytes()
+    with pytest.raises(InputError, match="--out: 1 files, expected one for each of the stations"):
+        main(command(folder, **{"--station": "A|B"}))
 
 
 def test_faults_are_named_and_leave_nothing_behind(folder):

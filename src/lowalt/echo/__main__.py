@@ -1,4 +1,4 @@
-"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals at one station."""
+"""Command line of the echo stage: a chunk's motion table and clouds -> clean signals, one file a station."""
 
 import sys
 
@@ -16,19 +16,19 @@ from lowalt.targets.cloud import Cloud, read
 
 def signals(
     network: Network,
-    name: str,
+    names: list[str],
     clouds: dict[str, Cloud],
     rows: list[dict],
     tolerance: float | None,
     notes: list[str] | None = None,
 ) -> np.ndarray:
-    """Return clean signals (models, N) complex64 of the motion table `rows` at station `name`.
+    """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the stations `names`.
 
-    The beams aim at each cloud's origin at the first symbol. `notes` gets a text a model: how it was computed.
+    The beams aim at each cloud's origin at the first symbol. `notes` gets a text a signal: how it was computed.
     Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
     """
-    station, times_s = network.station(name), network.times_s
-    result = np.empty((len(rows), network.symbols), np.complex64)
+    stations, times_s = [network.station(name) for name in names], network.times_s
+    result = np.empty((len(stations), len(rows), network.symbols), np.complex64)
     for index, row in enumerate(rows):
         sample = f"{row['subtype']}, model {row['model']}"
         cloud = clouds.get(row["subtype"])
@@ -36,22 +36,28 @@ def signals(
             raise InputError(f"{sample}: no cloud of this subtype among {sorted(clouds)}")
         motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
-        found = echo_signal(network, station, motion, cloud.rcs_m2, aim, tolerance, sample=f"{sample}, station {name}")
-        result[index] = found.signal
-        if notes is not None:
-            notes.append(f"{sample}, station {name}\n{explain(found)}\n")
+        for place, station in enumerate(stations):
+            where = f"{sample}, station {station.name}"
+            found = echo_signal(network, station, motion, cloud.rcs_m2, aim, tolerance, sample=where)
+            result[place, index] = found.signal
+            if notes is not None:
+                notes.append(f"{where}\n{explain(found)}\n")
     return result
 
 
 def main(arguments: list[str]) -> None:
-    """Compute one chunk's echoes at one station and write one array file."""
+    """Compute one chunk's echoes and write one array file a station."""
     options = parser("lowalt.echo", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
-    options.add_argument("--station", required=True, help="name of the station that listens")
-    options.add_argument("--out", required=True, help="clean signals to write (.npy), complex64 (models, symbols)")
+    options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
+    options.add_argument(
+        "--out", nargs="+", required=True, help="clean signals to write (.npy), a file a station: complex64 (models, N)"
+    )
     options.add_argument("--explain", help="text to write: how each signal was computed, and by which bounds")
     given = options.parse_args(arguments)
+    if len(given.out) != len(given.station):
+        raise InputError(f"--out: {len(given.out)} files, expected one for each of the stations {given.station}")
     block, tolerance = pick(given.settings, "network", "tolerance")
     network = Network.from_settings(block)
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
@@ -60,9 +66,10 @@ def main(arguments: list[str]) -> None:
     if given.explain:
         with replacing(given.explain) as temporary:
             temporary.write_text("\n".join(notes))
-    with replacing(given.out) as temporary:
-        np.save(temporary, result)
-    print(f"{given.out}: {len(result)} signals", file=sys.stderr)
+    for path, found in zip(given.out, result, strict=True):
+        with replacing(path) as temporary:
+            np.save(temporary, found)
+        print(f"{path}: {len(found)} signals", file=sys.stderr)
 
 
 if __name__ == "__main__":
