@@ -53,7 +53,6 @@ wildcard_constraints:
     group="|".join(PLAN.groups),
     part=r"\d{5}",
     fold="train|val|test",
-    station="|".join(STATIONS),
     protocol="seen|unseen",
     scheme="|".join(scheme.slug for scheme in SCHEMES.values()),
     train_seed=r"\d+",
@@ -156,7 +155,7 @@ def benchmark_files(wildcards):
     names = [
         *(f"cloud/{subtype}" for subtype in SLUGS),
         *(f"motion/{chunk}" for chunk in PLAN.chunks),
-        *(f"echo/{chunk}-{station}" for chunk in PLAN.chunks for station in STATIONS),
+        *(f"echo/{chunk}" for chunk in PLAN.chunks),
         *(f"noise/{chunk}" for chunk in PLAN.chunks),
         *tiles,
         *(f"shard/{shard}" for shard in PLAN.shards),

@@ -48,7 +48,7 @@ def degree_for(band, error):
 def folding() -> np.ndarray:
     """Weights (TOP + 1, EXTRA, TOP + 1): x^(d + 1 + j) on [-1, 1], truncated after T_d, as powers of x."""
     top = TOP + EXTRA + 1
-    # x T_n = (T_{n+1} + T_{|n-1|}) / 2 takes powers to Chebyshev polynomials, T_{n+1} = 2 x T_n - T_{n-1} takes them back.
+    # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2 x T_n - T_{n-1}.
     shares, powers = np.zeros((top + 1, top + 1)), np.zeros((TOP + 1, TOP + 1))
     shares[0, 0] = shares[1, 1] = powers[0, 0] = powers[1, 1] = 1.0
     for p in range(1, top):
