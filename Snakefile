@@ -30,6 +30,7 @@ rule all:
     input:
         f"results/{RUN}/report.html",
         f"results/{RUN}/accuracy.csv",
+        f"results/{RUN}/shards/README.md",
 
 
 rule clouds:
@@ -46,4 +47,4 @@ rule signals:
 rule data:
     input:
         f"results/{RUN}/shards/index.json",
-        f"results/{RUN}/config.yaml",
+        f"results/{RUN}/shards/README.md",

@@ -18,8 +18,16 @@ from lowalt.files import existing
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """Return an argument parser for `python -m {module}` that already has `--settings`."""
     result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
-    result.add_argument("--settings", required=True, type=settings, metavar="JSON|@FILE", help="settings object")
+    result.add_argument("--settings", required=True, type=_argument, metavar="JSON|@FILE", help="settings object")
     return result
+
+
+def _argument(text: str) -> dict:
+    """`settings`, with its words kept: argparse replaces the message of any ValueError."""
+    try:
+        return settings(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def settings(text: str) -> dict:

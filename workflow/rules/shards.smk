@@ -1,6 +1,7 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples beside it, and one index.
 # REQUIRED INPUTS: motion table and noisy signals of a chunk; its tiles, unless the shards hold signals
-# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json
+# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json,
+#          and beside them the data card: README.md, samples.csv, croissant.json
 
 
 rule shard:
@@ -43,6 +44,21 @@ rule index:
         settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
     shell:
         "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q} --out {output:q} 2> {log:q}"
+
+
+rule card:
+    input:
+        code=code("lowalt.shards.card"),
+        index="results/{run}/shards/index.json",
+        configuration="results/{run}/config.yaml",
+    output:
+        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json"),
+    log:
+        "results/{run}/logs/card.log",
+    conda:
+        "../../envs/environment.yaml"
+    shell:
+        "python -m lowalt.shards.card --index {input.index:q} --config {input.configuration:q} 2> {log:q}"
 
 
 rule configuration:

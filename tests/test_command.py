@@ -1,0 +1,63 @@
+"""What the stages' command lines share: settings as JSON or a file, clear words, exit status 2."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from lowalt.command import pick, settings
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing, sha256
+
+
+def test_settings_come_as_json_or_as_a_file(tmp_path):
+    path = tmp_path / "settings.json"
+    path.write_text(json.dumps({"a": [1, "inf"]}))
+    assert settings(f"@{path}") == settings('{"a": [1, "inf"]}') == {"a": [1, "inf"]}
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("{", "not JSON"), ("[1]", "list, expected a JSON object"), ("@none.json", "no file at none.json")],
+)
+def test_bad_settings_are_refused(text, words):
+    with pytest.raises(InputError, match=words):
+        settings(text)
+
+
+def test_pick_wants_exactly_its_keys():
+    assert pick({"b": 2, "a": 1}, "a", "b") == [1, 2]
+    with pytest.raises(InputError, match=r"missing \['b'\], unknown \['c'\]"):
+        pick({"a": 1, "c": 3}, "a", "b")
+
+
+@pytest.mark.parametrize("stage", ["targets", "motion", "echo", "noise", "tiles", "report"])
+def test_a_stage_says_in_one_line_what_is_wrong(stage):
+    run = subprocess.run(
+        [sys.executable, "-m", f"lowalt.{stage}", "--settings", "@nowhere.json"], capture_output=True, text=True
+    )
+    assert run.returncode == 2
+    assert "no file at nowhere.json" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
+def test_a_failed_write_leaves_nothing_and_keeps_what_was(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("old")
+    with pytest.raises(RuntimeError), replacing(path) as temporary:
+        temporary.write_text("half")
+        raise RuntimeError
+    assert [item.name for item in tmp_path.iterdir()] == ["table.csv"]
+    assert path.read_text() == "old"
+    with replacing(path) as temporary:
+        temporary.write_text("new")
+    assert path.read_text() == "new"
+
+
+def test_checksum_and_missing_file(tmp_path):
+    path = tmp_path / "x"
+    path.write_bytes(b"abc")
+    assert sha256(path) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+    with pytest.raises(InputError, match="mesh: no file at"):
+        existing(tmp_path / "y", "mesh")
