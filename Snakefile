@@ -13,6 +13,7 @@ include: "workflow/rules/motion.smk"
 include: "workflow/rules/echo.smk"
 include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
+include: "workflow/rules/cost.smk"
 include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
 include: "workflow/rules/report.smk"
@@ -23,6 +24,7 @@ localrules:
     clouds,
     signals,
     data,
+    cost,
 
 
 rule all:
@@ -48,3 +50,10 @@ rule data:
     input:
         f"results/{RUN}/shards/index.json",
         f"results/{RUN}/shards/README.md",
+
+
+rule cost:
+    input:
+        f"results/{RUN}/cost.csv",
+        f"results/{RUN}/cost_pixels.csv",
+        f"results/{RUN}/cost.png",

@@ -104,6 +104,20 @@ def motion_span(wildcards):
     return "--first {} --count {}".format(*PLAN.span(f"{wildcards.group}-{wildcards.part}"))
 
 
+def cost_clouds(wildcards):
+    """Cloud files of the first subtype of each category, in the table's order."""
+    first = {}
+    for name, record in RECORDS.items():
+        first.setdefault(record["published"]["category"], name)
+    return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
+
+
+def cost_settings(*kept, **more):
+    """The configuration's blocks `kept`, with the distances and tolerances at which accuracy is priced."""
+    grid = {"distances_m": [30.0, 200.0, 1000.0], "tolerances": [float(f"1e-{order}") for order in range(2, 13)]}
+    return canonical({key: config[key] for key in kept} | grid | more)
+
+
 def chunk_echoes(wildcards):
     """The stations' clean echoes of a chunk, in the order of the stations."""
     stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"

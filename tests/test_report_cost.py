@@ -1,0 +1,124 @@
+"""The price of accuracy down the chain: pixels that change, the time saved, the figure."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lowalt.echo.cost import COLUMNS as MEASURED
+from lowalt.errors import InputError
+from lowalt.report.cost import changes, figure, main, pixels, saved, signals
+from lowalt.report.tables import read_csv
+from lowalt.tiles.__main__ import renderer
+from test_echo_command import craft
+
+TARGETS = Path(__file__).parents[1] / "config/targets.csv"
+NETWORK = {
+    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 64, "guard_subcarriers": 10,
+    "symbol_interval_s": 2.5e-3, "symbols": 24, "transmit_array": [4, 2], "receive_array": [4, 2], "power_w": 1.0,
+    "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 0}, "B": {"position_m": [400, 0, 25],
+                                                                          "normal_deg": 180}},
+}  # fmt: skip
+SPECTRA = {
+    "vrp": {"window": 8, "hop": 1, "points": 16}, "trp": {"window": 4, "hop": 1, "points": 32},
+    "vt": {"window": 4, "hop": 1, "speed_min_mps": -6.0, "speed_max_mps": 6.0, "speed_step_mps": 0.5},
+}  # fmt: skip
+IMAGES = {"size": 16, "scale": "decibel", "floor_db": 40.0, "gamma": 1.0, "colour_map": "viridis"}
+BLOCK = {
+    "motion": {
+        "region": {"polygon_m": [[0, -300], [400, -300], [400, 300], [0, 300]], "mast_clearance_m": 10.0},
+        "height_m": {"UAV": [30, 150]}, "tilt_deg": 20.0, "cadence": "free",
+    },
+    "seed": 1, "distances_m": [150.0], "tolerances": [0.3, 1e-9], "models": 2,
+}  # fmt: skip
+SETTINGS = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES, **BLOCK}
+
+
+@pytest.fixture
+def cloud():
+    return craft()
+
+
+PUBLISHED = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
+
+
+def measured_row(**values) -> dict:
+    """A row of the measured table, every column text as a CSV file gives it."""
+    row = dict.fromkeys(MEASURED, "") | {"method": "engine", "category": "UAV", "subtype": "DJI Mini 2",
+                                         "points": "20", "range_m": "150.0", "relative_error": "1e-5"}  # fmt: skip
+    return row | values
+
+
+def test_changes_counts_pixels_and_their_largest_step_both_ways():
+    before = np.array([[0, 255], [7, 7]], np.uint8)
+    after = np.array([[255, 0], [7, 8]], np.uint8)
+    assert changes(before, before) == (0, 0)
+    assert changes(before, after) == changes(after, before) == (3, 255)
+    with pytest.raises(InputError, match=r"shapes \(2, 2\) and \(1, 2\)"):
+        changes(before, after[:1])
+
+
+def test_pixels_are_those_of_rendered_tiles_and_a_fine_tolerance_changes_none(cloud, monkeypatch):
+    tiles = renderer({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    coarse, fine = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, BLOCK)
+    assert (coarse["tolerance"], fine["tolerance"]) == (0.3, 1e-9)
+    assert coarse["pixels"] == fine["pixels"] == 2 * (2 * 16) * (3 * 16)
+    assert (fine["changed_pixels"], fine["largest_step"]) == (0, 0)
+    # A signal that is really off by its tolerance must be seen.
+    rng = np.random.default_rng(0)
+
+    def off(network, given, tolerance):
+        signal = signals(network, given, None)
+        noise = rng.normal(size=signal.shape) * abs(signal).max()
+        return signal if tolerance is None else (signal + tolerance * noise).astype(np.complex64)
+
+    monkeypatch.setattr("lowalt.report.cost.signals", off)
+    coarse, fine = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, BLOCK)
+    assert coarse["changed_share"] == coarse["changed_pixels"] / coarse["pixels"] > 0.3
+    assert coarse["largest_step"] > 5 and fine["changed_share"] < 0.01
+
+
+def test_a_tolerance_below_the_floor_keeps_the_exact_signal(cloud):
+    from lowalt.echo.cost import sample
+    from lowalt.network import Network
+
+    network = Network.from_settings(NETWORK)
+    given = sample(cloud, PUBLISHED, network, BLOCK["motion"], 1, 150.0, None)
+    assert np.array_equal(signals(network, given, 1e-15), signals(network, given, None))
+    with pytest.raises(InputError, match="tolerance is 2"):
+        signals(network, given, 2)
+
+
+def test_time_saved_is_taken_from_the_same_cloud_and_distance():
+    table = [
+        measured_row(tolerance="exact", seconds="4.0"), measured_row(tolerance="0.001", seconds="3.0"),
+        measured_row(tolerance="exact", seconds="9.0", range_m="30.0"),
+        measured_row(method="FINUFFT", tolerance="1e-09", seconds="1.0"),
+    ]  # fmt: skip
+    row = {"subtype": "DJI Mini 2", "range_m": 150.0, "tolerance": 1e-3}
+    assert saved(table, row) == pytest.approx(0.25)
+    assert saved(table, row | {"tolerance": 1e-9}) == saved(table, row | {"range_m": 30.0}) == ""
+
+
+def test_the_command_writes_a_table_and_a_figure(cloud, tmp_path):
+    from lowalt.targets.cloud import write
+
+    write(tmp_path / "craft.npz", cloud)
+    table = [measured_row(tolerance=name, seconds=time) for name, time in (("exact", "2e-3"), ("0.3", "1e-3"))]
+    table.append(measured_row(method="FINUFFT", tolerance="1e-09", seconds="5e-2"))
+    lines = [",".join(MEASURED), *(",".join(row[name] for name in MEASURED) for row in table)]
+    (tmp_path / "cost.csv").write_text("\n".join(lines) + "\n")
+    arguments = ["--settings", json.dumps(SETTINGS), "--table", str(tmp_path / "cost.csv"), "--clouds",
+                 str(tmp_path / "craft.npz"), "--targets", str(TARGETS)]  # fmt: skip
+    main([*arguments, "--out-table", str(tmp_path / "pixels.csv"), "--figure", str(tmp_path / "cost.png")])
+    coarse, fine = read_csv(tmp_path / "pixels.csv", "tolerance", "changed_pixels", "time_saved")
+    assert (coarse["time_saved"], fine["time_saved"], fine["changed_pixels"]) == ("0.5", "", "0")
+    picture = (tmp_path / "cost.png").read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    rows = [
+        {**row, "range_m": 150.0, "tolerance": float(row["tolerance"]), "changed_share": 0.5} for row in (coarse, fine)
+    ]
+    panels = figure(table, rows).axes
+    assert [panel.get_xlabel() for panel in panels] == ["measured error / largest value", "tolerance asked for"]
+    assert panels[0].get_title() == "UAV, 20 points" and len(panels[0].lines) == 1 + len(table)

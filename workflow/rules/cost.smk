@@ -1,0 +1,46 @@
+# Cost: what the echo's accuracy costs in time, and how many pixels change at each tolerance; one cloud a category.
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; the extra `bench` (FINUFFT); a quiet machine
+# OUTPUTS: results/{run}/cost.csv, results/{run}/cost_pixels.csv, results/{run}/cost.png
+
+
+rule cost_table:
+    input:
+        code=code("lowalt.echo.cost"),
+        targets=config["targets"]["table"],
+        clouds=cost_clouds,
+    output:
+        "results/{run}/cost.csv",
+    log:
+        "results/{run}/logs/cost.log",
+    benchmark:
+        "results/{run}/benchmarks/cost.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=cost_settings("network", "motion", "seed", points=[], repeats=5, direct=True),
+    shell:
+        "python -m lowalt.echo.cost --settings {params.settings:q} --clouds {input.clouds:q}"
+        " --targets {input.targets:q} --out {output:q} 2> {log:q}"
+
+
+rule cost_figure:
+    input:
+        code=code("lowalt.report.cost"),
+        targets=config["targets"]["table"],
+        table="results/{run}/cost.csv",
+        clouds=cost_clouds,
+    output:
+        table="results/{run}/cost_pixels.csv",
+        figure="results/{run}/cost.png",
+    log:
+        "results/{run}/logs/cost_figure.log",
+    benchmark:
+        "results/{run}/benchmarks/cost_figure.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=cost_settings("network", "motion", "spectra", "images", "seed", models=5),
+    shell:
+        "python -m lowalt.report.cost --settings {params.settings:q} --table {input.table:q}"
+        " --clouds {input.clouds:q} --targets {input.targets:q} --out-table {output.table:q}"
+        " --figure {output.figure:q} 2> {log:q}"
