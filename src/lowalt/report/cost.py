@@ -109,8 +109,8 @@ def _time_panel(panel, measured: list[dict[str, str]], methods: list[str], dista
     """Time a sample over its error for one category: colour says the method, marker the distance."""
     for distance in distances:
         curve = [line for line in measured if line["method"] == "engine" and float(line["range_m"]) == distance]
-        errors, times = ([float(line[key]) for line in curve] for key in ("relative_error", "seconds"))
-        panel.plot(errors, [1e3 * time for time in times], color=f"C{methods.index('engine')}", lw=0.7, alpha=0.5)
+        steps = sorted((float(line["relative_error"]), 1e3 * float(line["seconds"])) for line in curve)
+        panel.plot(*np.reshape(steps, (-1, 2)).T, color=f"C{methods.index('engine')}", lw=0.7, alpha=0.5)
     for line in measured:
         error = max(float(line["relative_error"]), 1e-17)
         engine = line["method"] == "engine"
