@@ -44,7 +44,7 @@ if "LOWALT_TEST_IMPORTS" in os.environ:
 RULES = {
     "targets/__main__.py": "cloud", "targets/gallery.py": "gallery", "motion/__main__.py": "motion",
     "echo/__main__.py": "echo", "noise/__main__.py": "noise", "tiles/__main__.py": "tiles",
-    "shards/__main__.py write": "shard", "shards/__main__.py index": "index",
+    "shards/__main__.py write": "shard", "shards/__main__.py index": "index", "shards/card.py": "card",
 }  # fmt: skip
 
 
@@ -105,7 +105,7 @@ def test_a_finished_run_has_nothing_to_do(finished):
     assert planned(finished, "--", "data") == set()
 
 
-DOWNSTREAM = ["cloud", "motion", "echo", "noise", "tiles", "shard", "index"]
+DOWNSTREAM = ["cloud", "motion", "echo", "noise", "tiles", "shard", "index", "card"]
 
 
 def following(first: str) -> set[str]:
