@@ -135,6 +135,35 @@ def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, n
     return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
 
 
+@lru_cache(maxsize=1)
+def _nodes() -> tuple[np.ndarray, np.ndarray]:
+    """The 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
+
+    Extended precision where the machine has it, so that the transform's own rounding does not look like a tail.
+    """
+    count = 96
+    angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count) + np.longdouble(0.5)) / count
+    matrix = 2 * np.cos(np.arange(count)[:, None] * angle) / count
+    matrix[0] /= 2
+    return np.cos(angle), matrix
+
+
+@lru_cache(maxsize=1024)
+def _expansion(kind: str, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Chebyshev coefficients (96,) of a function of `smooth`, and for each degree the error of stopping there."""
+    s, matrix = _nodes()
+    if kind in ("cosine", "sine"):
+        turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt(reach / 2 + reach / 2 * s)
+        value = np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
+    else:
+        root = np.sqrt(1 + reach * s)
+        value = 1 / root if kind == "inverse" else 1 / (1 + root)
+    coefficients = matrix @ value
+    noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
+    size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
+    return coefficients, np.append(np.cumsum(size[::-1])[::-1][1:], 0.0) + 2e-16
+
+
 @lru_cache(maxsize=1024)
 def smooth(kind: str, reach: float, error: float) -> tuple[np.ndarray, float]:
     """Coefficients of a polynomial for one of the fixed functions on [-reach, reach], and its error bound.
@@ -143,25 +172,12 @@ def smooth(kind: str, reach: float, error: float) -> tuple[np.ndarray, float]:
     "cosine", "sine": cos(2 pi t), sin(2 pi t) / t as functions of x = t^2, from 0 to reach. The bound is the sum of the
     Chebyshev coefficients left out, computed with 96 nodes, plus rounding.
     """
-    nodes = 96
-    # Extended precision where the machine has it, so that the transform's own rounding does not look like a tail.
-    pi = 4 * np.arctan(np.longdouble(1))
-    angle = pi * (np.arange(nodes) + np.longdouble(0.5)) / nodes
-    s = np.cos(angle)
-    if kind in ("cosine", "sine"):
-        centre, half = reach / 2, reach / 2
-        turn = 2 * pi * np.sqrt(centre + half * s)
-        value = np.cos(turn) if kind == "cosine" else 2 * pi * np.sin(turn) / turn
-    else:
-        centre, half = 0.0, reach
-        root = np.sqrt(1 + half * s)
-        value = 1 / root if kind == "inverse" else 1 / (1 + root)
-    coefficients = 2 * (np.cos(np.arange(nodes)[:, None] * angle) @ value) / nodes
-    coefficients[0] /= 2
-    noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
-    size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
-    tails = np.append(np.cumsum(size[::-1])[::-1][1:], 0.0) + 2e-16
+    coefficients, tails = _expansion(kind, reach)
     degree = int(np.argmax(tails <= max(error, 4e-16)))
-    powers = np.polynomial.Polynomial(chebyshev.cheb2poly(coefficients[: degree + 1]))
-    shifted = powers(np.polynomial.Polynomial(np.array([-centre / half, 1 / half], np.longdouble)))
-    return shifted.coef.astype(np.float64), float(tails[degree])
+    powers = chebyshev.cheb2poly(coefficients[: degree + 1])
+    if kind in ("cosine", "sine"):
+        inner = np.polynomial.Polynomial(np.array([-1, 2 / np.longdouble(reach)], np.longdouble))
+        powers = np.polynomial.Polynomial(powers)(inner).coef
+    else:
+        powers = powers / np.longdouble(reach) ** np.arange(len(powers))
+    return powers.astype(np.float64), float(tails[degree])

@@ -46,12 +46,12 @@ def layout(scene: Scene, peak: float) -> Layout:
         return Layout(
             empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, float(amplitude.sum())
         )  # fmt: skip
-    change = np.flatnonzero(part[1:] != part[:-1]) + 1
-    starts = np.concatenate(([0], change))
-    starts = np.union1d(starts, np.arange(0, count, chunk_of(len(amplitude))))
+    fresh = np.ones(count, np.bool_)
+    np.not_equal(part[1:], part[:-1], out=fresh[1:])
+    fresh[:: chunk_of(len(amplitude))] = True
+    starts = np.flatnonzero(fresh)
     centres = (np.maximum.reduceat(points, starts) + np.minimum.reduceat(points, starts)) / 2
-    ends = np.append(starts[1:], count)
-    away = points - np.repeat(centres, ends - starts, axis=0)
+    away = points - centres[np.cumsum(fresh) - 1]
     radii = np.sqrt(np.maximum.reduceat(np.einsum("li,li->l", away, away), starts))
     x, y, z = np.ascontiguousarray(points.T)
     bounds = np.append(starts, count)

@@ -3,6 +3,7 @@
 Rigid parts are the better form: no array of symbols x points ever exists, and slow motion can be seen as such.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -46,11 +47,19 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # Least and largest say whether all are finite (NaN passes through both); only a fault pays for finding it.
-    if not (np.isfinite(array.min()) and np.isfinite(array.max())):
+    # A sum is finite unless a term is not (or it overflows); only then is it worth looking for the place.
+    if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")
     return array
+
+
+def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
+    """Return the checked rotations, and whether they are one zero repeated, as nodes have it: those take no memory."""
+    repeated = isinstance(value, np.ndarray) and value.ndim == 4 and value.size and not any(value.strides)
+    if repeated and not _float("motion.rotation", value[:1, :1], ("N", "P", 3, 3), sample).any():
+        return value, True
+    return _float("motion.rotation", value, ("N", "P", 3, 3), sample), False
 
 
 def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> Scene:
@@ -61,7 +70,7 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     """
     where = f"{sample}: " if sample else ""
     if hasattr(motion, "rotation"):
-        rotation = _float("motion.rotation", motion.rotation, ("N", "P", 3, 3), where)
+        rotation, still = _rotation(motion.rotation, where)
         symbols, parts = rotation.shape[:2]
         translation = _float("motion.translation", motion.translation, (symbols, parts, 3), where)
         points = _float("motion.points", motion.points, ("L", 3), where)
@@ -73,8 +82,10 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
             raise InputError(f"{where}motion.part spans {part.min()}..{part.max()}, expected 0..{parts - 1}")
         part = part.astype(np.int64)
         count = len(points)
-        if count == parts and not rotation.any() and np.array_equal(part, np.arange(count)):
+        if count == parts and np.array_equal(part, np.arange(count)) and (still or not rotation.any()):
             rotation, points, part = _no_rotation()
+        elif still:
+            rotation = np.zeros(rotation.shape)
     else:
         translation = _float("positions", motion, ("N", "L", 3), where)
         count = translation.shape[1]
