@@ -227,3 +227,22 @@ def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
         region_polygon(square, square.tolist())
     with pytest.raises(InputError, match="flat"):
         region_polygon(square, [[0, 0], [1, 1], [2, 2]])
+
+
+@pytest.mark.parametrize(("cadence", "tied"), [("free", False), ("tied", True)])
+def test_cadence_follows_speed_only_where_tied(cadence, tied):
+    track = np.random.default_rng(3).normal(size=(12, 31, 3))
+    nothing = np.full((31, 3), np.nan)
+    record = {"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "origin_height_m": 0.9}
+    cloud = Cloud(
+        points=track[0], part=np.arange(31), kinds=("node",) * 31, names=tuple(map(str, range(31))),
+        parents=np.full(31, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(31), track=track,
+        record={**record, "track_rate_hz": 120.0, "track_speed_mps": 1.25},
+    )  # fmt: skip
+    settings, ranges = {**MOTION, "cadence": cadence}, {"speed_lo": 0.2, "speed_hi": 1.5}
+    drawn = draw(stream(1, "m"), cloud, ranges, MASTS, region_polygon(MASTS, None), settings)
+    speed = math.hypot(drawn["vx_mps"], drawn["vy_mps"])
+    assert 0.2 <= speed <= 1.5
+    assert drawn["z_m"] == 0.9
+    assert 0 <= drawn["start_s"] < 12 / 120
+    assert drawn["playback"] == pytest.approx(speed / 1.25 if tied else 1.0)

@@ -11,7 +11,7 @@ from lowalt.config import load
 from lowalt.errors import InputError
 from lowalt.report import figures
 from lowalt.report.estimate import estimate
-from lowalt.report.tables import by_scheme, confusion, read_csv, stage_times
+from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, stage_times
 
 
 def test_accuracy_is_pivoted_in_order(tmp_path):
@@ -32,16 +32,17 @@ def test_a_table_without_a_column_is_refused(tmp_path):
 
 def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
     lines = [
-        {"rule_name": "echo", "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0},
-        {"rule_name": "echo", "s": 3.0, "cpu_time": "NA", "max_rss": None},
-        {"rule_name": "noise", "s": 1.0, "cpu_time": 0.5, "max_rss": 50.0},
+        {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0},
+        {"rule_name": "echo", "wildcards": {}, "s": 3.0, "cpu_time": "NA", "max_rss": None},
+        {"rule_name": "cloud", "wildcards": {"subtype": "crow"}, "s": 1.0, "cpu_time": 0.5, "max_rss": 50.0},
     ]
     paths = [tmp_path / f"{index}.jsonl" for index in range(3)]
     for path, line in zip(paths, lines, strict=True):
         path.write_text(json.dumps(line) + "\n")
-    echo, noise = stage_times(paths)
+    echo, cloud = stage_times(paths)
     assert echo == {"rule": "echo", "jobs": 2, "wall_s": 5.0, "cpu_s": 1.5, "peak_mib": 100.0}
-    assert noise["jobs"] == 1
+    assert cloud["jobs"] == 1
+    assert cloud_seconds(paths) == {"crow": 1.0}
     paths[0].write_text("not json\n")
     with pytest.raises(InputError, match=r"0\.jsonl: not an extended benchmark"):
         stage_times(paths)

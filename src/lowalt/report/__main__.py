@@ -16,7 +16,7 @@ from lowalt.motion import read_table
 from lowalt.report import figures
 from lowalt.report.made_with import versions
 from lowalt.report.strip import motion_strip
-from lowalt.report.tables import by_scheme, confusion, read_csv, stage_times
+from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, stage_times
 from lowalt.report.tiles import example_tiles
 from lowalt.shards import ShardSet
 from lowalt.targets.cloud import CATEGORIES, read
@@ -24,13 +24,33 @@ from lowalt.targets.cloud import CATEGORIES, read
 STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
 
 
+COMPARISON_COLUMNS = (
+    "protocol", "scheme", "over", "difference_points", "low", "high", "unit", "only_first", "only_second", "mcnemar_p",
+)  # fmt: skip
+
+
+def network_words(block: dict) -> str:
+    """Return the network and its training in words, from the configuration's `recognition` block."""
+    network, training = block["network"], block["training"]
+    start = {"none": "random initial weights", "hub": "ImageNet weights from the hub"}
+    weights = start.get(network["weights"], f"weights from the file {Path(network['weights']).name}")
+    seeds = len(block["seeds"])
+    return (
+        f"{network['backbone']} at {block['size']} pixels, {weights}, at most {training['steps']} steps of "
+        f"{training['batch']} samples, {seeds} training seed{'s' if seeds > 1 else ''}"
+    )
+
+
 def picture(data: bytes) -> str:
     """Return PNG bytes as the address of an embedded picture."""
     return "data:image/png;base64," + base64.b64encode(data).decode()
 
 
-def cloud_rows(paths: list[str], published: dict[str, dict]) -> list[dict]:
-    """Return one row a cloud file: subtype, category, group, source, points, the published count, checksum."""
+def cloud_rows(paths: list[str], published: dict[str, dict], seconds: dict[str, float]) -> list[dict]:
+    """Return one row a cloud file: subtype, category, group, source, points, the published count, time, checksum.
+
+    seconds: time of each cloud by file name. `foot_speed` is a walker's or runner's mean speed of the standing foot.
+    """
     rows = []
     for path in paths:
         cloud = read(path)
@@ -43,6 +63,8 @@ def cloud_rows(paths: list[str], published: dict[str, dict]) -> list[dict]:
                 "source": cloud.record["source"],
                 "points": len(cloud.points),
                 "published": row["points_in_published_cloud_approx"],
+                "seconds": seconds.get(Path(path).stem, float("nan")),
+                "foot_speed": cloud.record.get("stance_foot_speed_mps"),
                 "sha256": sha256(path),
             }
         )
@@ -95,7 +117,7 @@ def main(arguments: list[str]) -> None:
     paper = by_scheme(read_csv(given.published, "protocol", "scheme", "snr_db", "accuracy_percent"))
     counts = confusion(read_csv(given.confusion, "protocol", "scheme", "category", "predicted", "samples"))
     columns, subtypes = subtype_table(read_csv(given.subtypes, "protocol", "scheme", "subtype", "accuracy_percent"))
-    clouds = cloud_rows(given.clouds, published)
+    clouds = cloud_rows(given.clouds, published, cloud_seconds(given.benchmarks))
     pictures = {
         "accuracy": figures.accuracy_over_snr(ours, paper),
         "confusion": figures.confusion_matrices(counts, CATEGORIES),
@@ -109,7 +131,8 @@ def main(arguments: list[str]) -> None:
         run=config["run"], seed=config["seed"], stations=list(config["network"]["stations"]), snrs=labels,
         models=len(shards) // len(labels), subtypes=len(clouds), samples=len(shards),
         sample_bytes=size, kind=shards.kind, hardware=describe(),
-        ours=ours, published=paper, comparisons=read_csv(given.comparisons), subtype_columns=columns,
+        ours=ours, published=paper, network=network_words(config["recognition"]),
+        comparisons=read_csv(given.comparisons, *COMPARISON_COLUMNS), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
         clouds=clouds, times=times, versions=versions(), configuration=yaml.safe_dump(config, sort_keys=False),
         images={name: picture(data) for name, data in pictures.items()},

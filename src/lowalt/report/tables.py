@@ -31,6 +31,24 @@ def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, f
     return {protocol: dict(schemes) for protocol, schemes in result.items()}
 
 
+def measurement(path: str | Path) -> dict:
+    """Return one job's measurement from Snakemake's benchmark file (JSON lines, extended; the last run counts).
+
+    Raises: InputError for a file that is no such benchmark.
+    """
+    try:
+        last = json.loads(existing(path, "benchmark").read_text().splitlines()[-1])
+        return {name: last[name] for name in ("rule_name", "wildcards", "s", "cpu_time", "max_rss")}
+    except (ValueError, IndexError, KeyError) as error:
+        raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
+
+
+def cloud_seconds(paths: Iterable[str | Path]) -> dict[str, float]:
+    """Return the wall time (s) each subtype's cloud took, by the subtype's file name."""
+    jobs = map(measurement, paths)
+    return {job["wildcards"]["subtype"]: float(job["s"]) for job in jobs if job["rule_name"] == "cloud"}
+
+
 def stage_times(paths: Iterable[str | Path]) -> list[dict]:
     """Return what each rule took, from Snakemake's benchmark files (JSON lines, extended), in order of first sight.
 
@@ -40,11 +58,8 @@ def stage_times(paths: Iterable[str | Path]) -> list[dict]:
     """
     rules: dict[str, dict] = {}
     for path in paths:
-        try:
-            last = json.loads(existing(path, "benchmark").read_text().splitlines()[-1])
-            name, wall, cpu, memory = last["rule_name"], last["s"], last["cpu_time"], last["max_rss"]
-        except (ValueError, IndexError, KeyError) as error:
-            raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
+        job = measurement(path)
+        name, wall, cpu, memory = job["rule_name"], job["s"], job["cpu_time"], job["max_rss"]
         entry = rules.setdefault(name, {"rule": name, "jobs": 0, "wall_s": 0.0, "cpu_s": 0.0, "peak_mib": 0.0})
         entry["jobs"] += 1
         entry["wall_s"] += float(wall)
