@@ -1,9 +1,11 @@
 """How the points lie in memory for the fast kernel: by part, coordinate by coordinate, padded to whole vectors."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.echo.compile import LEAN
 from lowalt.echo.lanes import LANES, chunk_of
 from lowalt.echo.motion import Scene
 
@@ -29,6 +31,30 @@ class Layout(NamedTuple):
     """Sum of all amplitudes."""
 
 
+@LEAN
+def _runs(points, part, chunk, x, y, z, starts, parts, centres, radii):
+    """Copy the points by coordinate and cut them into runs of one part; returns how many runs there are."""
+    count, runs = len(points), 0
+    for i in range(count):
+        x[i], y[i], z[i] = points[i, 0], points[i, 1], points[i, 2]
+        if i == 0 or part[i] != part[i - 1] or i % chunk == 0:
+            starts[runs], parts[runs] = i, part[i]
+            runs += 1
+    starts[runs] = count
+    for run in range(runs):
+        for j in range(3):
+            low = high = points[starts[run], j]
+            for i in range(starts[run], starts[run + 1]):
+                low, high = min(low, points[i, j]), max(high, points[i, j])
+            centres[run, j] = 0.5 * (low + high)
+        widest = 0.0
+        for i in range(starts[run], starts[run + 1]):
+            a, b, c = points[i, 0] - centres[run, 0], points[i, 1] - centres[run, 1], points[i, 2] - centres[run, 2]
+            widest = max(widest, a * a + b * b + c * c)
+        radii[run] = math.sqrt(widest)
+    return runs
+
+
 def layout(scene: Scene, peak: float) -> Layout:
     """Return the points' layout; `peak` multiplies the square roots of their cross sections."""
     rigid = scene.rotation.shape[0] > 0
@@ -46,13 +72,9 @@ def layout(scene: Scene, peak: float) -> Layout:
         return Layout(
             empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, float(amplitude.sum())
         )  # fmt: skip
-    fresh = np.ones(count, np.bool_)
-    np.not_equal(part[1:], part[:-1], out=fresh[1:])
-    fresh[:: chunk_of(len(amplitude))] = True
-    starts = np.flatnonzero(fresh)
-    centres = (np.maximum.reduceat(points, starts) + np.minimum.reduceat(points, starts)) / 2
-    away = points - centres[np.cumsum(fresh) - 1]
-    radii = np.sqrt(np.maximum.reduceat(np.einsum("li,li->l", away, away), starts))
-    x, y, z = np.ascontiguousarray(points.T)
-    bounds = np.append(starts, count)
-    return Layout(x, y, z, amplitude, part[starts], bounds, centres, radii, float(amplitude.sum()))
+    x, y, z = np.empty((3, count))
+    starts, parts = np.empty(count + 1, np.int64), np.empty(count, np.int64)
+    centres, radii = np.empty((count, 3)), np.empty(count)
+    runs = _runs(points, part, chunk_of(len(amplitude)), x, y, z, starts, parts, centres, radii)
+    total = float(amplitude.sum())
+    return Layout(x, y, z, amplitude, parts[:runs], starts[: runs + 1], centres[:runs], radii[:runs], total)

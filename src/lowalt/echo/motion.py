@@ -95,7 +95,7 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     if rcs.min() < 0:
         raise InputError(f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0")
     aim = _float("aim_m", aim_m, (3,), where)
-    if (aim == station.position_m).all():
+    if aim.tolist() == list(station.position_m):
         raise InputError(f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at")
     check_station(network, station)
     return Scene(rotation, translation, points, part, np.sqrt(rcs), aim)
@@ -105,7 +105,7 @@ def check_station(network: Network, station: Station) -> None:
     """Raise InputError for a station whose place or frequency cannot be computed with."""
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
         raise InputError(f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number")
-    if np.shape(station.position_m) != (3,) or not np.isfinite([*station.position_m, station.normal_rad]).all():
+    if np.shape(station.position_m) != (3,) or not all(map(math.isfinite, (*station.position_m, station.normal_rad))):
         raise InputError(f"station {station.name}: position_m {station.position_m} or normal_rad "
                          f"{station.normal_rad} is not finite")  # fmt: skip
 
