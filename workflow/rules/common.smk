@@ -52,6 +52,7 @@ wildcard_constraints:
     subtype="|".join(SLUGS),
     group="|".join(PLAN.groups),
     part=r"\d{5}",
+    station="|".join(STATIONS),
     fold="train|val|test",
     protocol="seen|unseen",
     scheme="|".join(scheme.slug for scheme in SCHEMES.values()),
@@ -169,7 +170,7 @@ def benchmark_files(wildcards):
     names = [
         *(f"cloud/{subtype}" for subtype in SLUGS),
         *(f"motion/{chunk}" for chunk in PLAN.chunks),
-        *(f"echo/{chunk}" for chunk in PLAN.chunks),
+        *(f"echo/{chunk}-{station}" for chunk in PLAN.chunks for station in STATIONS),
         *(f"noise/{chunk}" for chunk in PLAN.chunks),
         *tiles,
         *(f"shard/{shard}" for shard in PLAN.shards),

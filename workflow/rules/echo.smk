@@ -1,6 +1,6 @@
-# Echo: the clean symbol-domain signals that every base station hears of a chunk's motion models, a file a station.
+# Echo: the clean symbol-domain signals that one base station hears of a chunk's motion models.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
-# OUTPUTS: results/{run}/echo/{group}-{part}/*.npy, one a station, complex64 (models, symbols)
+# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
 
 
 rule echo:
@@ -9,16 +9,15 @@ rule echo:
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=group_clouds,
     output:
-        expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=STATIONS),
+        "results/{run}/echo/{group}-{part}/{station}.npy",
     log:
-        "results/{run}/logs/echo/{group}-{part}.log",
+        "results/{run}/logs/echo/{group}-{part}-{station}.log",
     benchmark:
-        "results/{run}/benchmarks/echo/{group}-{part}.jsonl"
+        "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
-        stations=STATIONS,
         settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
     shell:
         "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " --station {params.stations:q} --out {output:q} 2> {log:q}"
+        " --station {wildcards.station} --out {output:q} 2> {log:q}"
