@@ -8,10 +8,17 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
+from lowalt.config import load_yaml
+from lowalt.echo import Rigid, echo_signal
+from lowalt.files import slug
+from lowalt.motion import poses, read_table
+from lowalt.network import Network
 from lowalt.sources import PACKAGE, sources
+from lowalt.targets.cloud import read
 
 pytest.importorskip("snakemake")
 pytestmark = pytest.mark.workflow
@@ -189,3 +196,15 @@ def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
     for rule, imported in seen.items():
         assert imported <= declared(rule), rule
         assert "errors.py" in imported
+
+
+def test_any_one_sample_is_made_again_alone_from_its_row(finished):
+    base = finished / "results/test"
+    network = Network.from_settings(load_yaml(finished / "config/default.yaml")["network"])
+    number, row = 7, read_table(base / "motion/unseen-00001.csv")[7]
+    cloud = read(base / "clouds" / f"{slug(row['subtype'])}.npz")
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+    alone = echo_signal(network, network.station("B"), motion, cloud.rcs_m2, aim).signal
+    stored = np.load(base / "echo/unseen-00001/B.npy")[number]
+    np.testing.assert_array_equal(alone.astype(np.complex64), stored)
