@@ -2,8 +2,9 @@
 
     python benchmarks/stages.py --run results/default --out results/benchmarks/stages.csv
 
-Reads Snakemake's own measurements (results/<run>/benchmarks) and the run's index; runs nothing. Seconds are summed over
-jobs, so they are those of one core however many worked. Time of a stage grows with the samples, except that of the
+Reads Snakemake's own measurements (results/<run>/benchmarks) and the run's index; runs nothing. Seconds are wall time summed
+over jobs of one thread each, start-up and compilation included (its processor times are sampled and miss what comes after
+the last look), so they are at most those of one core however many worked. Time of a stage grows with the samples, except that of the
 clouds, which are made once. A run of signal shards skips tiles: its figure counts neither the tiles nor their bytes.
 """
 
@@ -22,7 +23,7 @@ from lowalt.shards.size import sample_bytes
 WHOLE = 1_440_000
 STAGES = ("cloud", "motion", "echo", "noise", "tiles", "shard", "index")
 COLUMNS = (
-    "stage", "jobs", "samples", "wall_s", "processor_s", "ms_per_sample", "share_percent", "peak_mb",
+    "stage", "jobs", "samples", "wall_s", "ms_per_sample", "share_percent", "peak_mb",
     "largest_input_mb", "hours_of_1440000", "gb_of_1440000", "hardware",
 )  # fmt: skip
 
@@ -52,18 +53,18 @@ def main() -> None:
         jobs = found.get(stage, [])
         if not jobs:
             continue
-        wall, processor = (sum(float(job[key] or 0) for job in jobs) for key in ("s", "cpu_time"))
-        hours = processor / 3600 * (1 if stage == "cloud" else WHOLE / samples)
+        wall = sum(float(job["s"]) for job in jobs)
+        hours = wall / 3600 * (1 if stage == "cloud" else WHOLE / samples)
         rows.append(
             {
-                "stage": stage, "jobs": len(jobs), "samples": samples, "wall_s": wall, "processor_s": processor,
-                "ms_per_sample": 1e3 * processor / samples, "hours_of_1440000": hours,
+                "stage": stage, "jobs": len(jobs), "samples": samples, "wall_s": wall,
+                "ms_per_sample": 1e3 * wall / samples, "hours_of_1440000": hours,
                 "peak_mb": max(float(job["max_rss"] or 0) for job in jobs),
                 "largest_input_mb": max(sum(job["input_size_mb"].values()) for job in jobs),
             }
         )  # fmt: skip
     for row in rows:
-        row["share_percent"] = 100 * row["processor_s"] / sum(other["processor_s"] for other in rows)
+        row["share_percent"] = 100 * row["wall_s"] / sum(other["wall_s"] for other in rows)
     stations = index["render"]["network"]["stations"]
     size = {
         kind: sample_bytes(kind, len(stations), index["render"]["network"]["symbols"]) for kind in ("image", "signal")
@@ -77,7 +78,7 @@ def main() -> None:
             {
                 "stage": f"all, {kind} shards", "samples": samples, "gb_of_1440000": size[kind] * WHOLE / 1e9,
                 **{key: sum(row[key] for row in kept if not row["stage"].startswith("all"))
-                   for key in ("processor_s", "ms_per_sample", "hours_of_1440000")},
+                   for key in ("wall_s", "ms_per_sample", "hours_of_1440000")},
             }
         )  # fmt: skip
     with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
