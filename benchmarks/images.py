@@ -25,6 +25,7 @@ import numpy as np
 import scipy.signal
 import yaml
 from PIL import Image
+from zlib_ng import zlib_ng
 
 from lowalt.files import replacing
 from lowalt.hardware import describe
@@ -118,6 +119,14 @@ def libdeflate_png(tile: np.ndarray, palette: np.ndarray, kind: int) -> bytes:
     return packed(tile.shape, palette, bytes(deflate.zlib_compress(rows, 1)))
 
 
+def zlib_ng_png(tile: np.ndarray, palette: np.ndarray) -> bytes:
+    """Palette PNG with zlib-ng behind the Paeth filter, its Huffman codes only: no strings are looked for."""
+    rows = np.empty((tile.shape[0], tile.shape[1] + 1), np.uint8)
+    apply_paeth(tile, rows)
+    coder = zlib_ng.compressobj(1, zlib_ng.DEFLATED, 15, 9, zlib_ng.Z_HUFFMAN_ONLY)
+    return packed(tile.shape, palette, coder.compress(rows.tobytes()) + coder.flush())
+
+
 def least(function, *arguments, repeats: int = 5) -> tuple[object, float]:
     """Result of a call and its least processor time (ms)."""
     best = np.inf
@@ -191,6 +200,7 @@ def main() -> None:
             "ours, on the samples of the rows below": lambda t: encode(t, palette),
             "our tile, palette PNG, sub, libdeflate 1": lambda t: libdeflate_png(t, palette, 1),
             "our tile, palette PNG, Paeth, libdeflate 1": lambda t: libdeflate_png(t, palette, 4),
+            "our tile, palette PNG, Paeth, zlib-ng Huffman only": lambda t: zlib_ng_png(t, palette),
             "our tile, palette PNG, Pillow 1": lambda t: pillow_palette_png(t, palette),
         }.items():
             rows.append(measure(label, common, few, tiles.tile, code, ours, palette))

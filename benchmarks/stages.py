@@ -2,10 +2,11 @@
 
     python benchmarks/stages.py --run results/default --out results/benchmarks/stages.csv
 
-Reads Snakemake's own measurements (results/<run>/benchmarks) and the run's index; runs nothing. Seconds are wall time summed
-over jobs of one thread each, start-up and compilation included (its processor times are sampled and miss what comes after
-the last look), so they are at most those of one core however many worked. Time of a stage grows with the samples, except that of the
-clouds, which are made once. A run of signal shards skips tiles: its figure counts neither the tiles nor their bytes.
+Reads Snakemake's own measurements (results/<run>/benchmarks) and the run's index; runs nothing. Seconds are wall time
+summed over jobs of one thread each, start-up and compilation included, so they are at most those of one core however
+many worked; the processor times in those files are sampled and miss the end of a job. Time of a stage grows with the
+samples, except that of the clouds, which are made once. A run of signal shards skips tiles: its figure counts neither
+the tiles nor their bytes.
 """
 
 import argparse
