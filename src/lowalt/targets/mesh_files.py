@@ -158,10 +158,12 @@ def read_mesh(path: str | Path, unit: str, geometry: list[str] | None = None) ->
     vertices, faces = _triangles(path, unit, geometry)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
-    used = vertices[faces.ravel()] if faces.min() >= 0 and faces.max() < len(vertices) else np.array([np.nan])
-    if not np.isfinite(used).all():
+    # By a mark a vertex, not a copy of every corner: millions of corners would double the memory.
+    finite = np.isfinite(vertices).all(axis=1)
+    if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():
         raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")
-    vertices, faces = _repaired(vertices * UNITS_M[unit], faces)
+    vertices *= UNITS_M[unit]
+    vertices, faces = _repaired(vertices, faces)
     if len(faces) < 4:
         raise InputError(f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4")
     component = components(faces, len(vertices))
