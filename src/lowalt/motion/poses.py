@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.errors import InputError
+from lowalt.motion.perturbation import Perturbation
 from lowalt.targets.cloud import Cloud
 
 
@@ -98,13 +99,30 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
     return angles, phases
 
 
-def _series(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _perturbed(
+    cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], more: dict[int, np.ndarray]
+) -> None:
+    """Give each part of `more` an angle of its own: its kind's plus what `more` adds (N,) rad.
+
+    Raises: InputError naming the parts that do not move.
+    """
+    still = sorted(set(more) - set(phases))
+    if still:
+        raise InputError(f"motion of {cloud.subtype}: angles added to parts {still}, expected some of {sorted(phases)}")
+    for part, angle in more.items():
+        name, phase = phases[part]
+        angles[f"{name} {part}"] = angles[name] + angle
+        phases[part] = f"{name} {part}", phase
+
+
+def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
 
     A turn about a hinge is A + cos B + sin C; a part on a moving part multiplies such sums. So what costs time is a
     few cosines a symbol and one matrix product, however many parts there are. The body's own motion is left out.
     """
     angles, phases = _angles(cloud, row, times_s)
+    _perturbed(cloud, angles, phases, more)
     one: tuple[str, ...] = ()
     columns = {one: np.ones(len(times_s))}
     for name in dict.fromkeys(name for name, _ in phases.values()):
@@ -136,6 +154,15 @@ def _series(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[np.ndarray, n
     return np.stack(list(columns.values()), axis=1), result
 
 
+def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
+    """Attitudes (N, 3, 3) of the row's yaw, pitch and roll with `tilt_rad` (N, 3) added; order as `attitude`."""
+    yaw, pitch, roll = (
+        row[name] + more for name, more in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
+    )
+    right, front, up = np.eye(3)
+    return rodrigues(up, yaw) @ rodrigues(right, pitch) @ rodrigues(front, roll)
+
+
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Node positions (N, L, 3) of a cyclic recording turned by `body`, linear between its frames (paper Eq. 21)."""
     frames = len(cloud.track)
@@ -149,31 +176,44 @@ def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np
     return result.reshape(len(times_s), -1, 3)
 
 
-def poses(cloud: Cloud, row: dict, times_s: np.ndarray) -> Poses:
+def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbation | None = None) -> Poses:
     """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at `times_s` (N,) s.
 
-    A node cloud gets zero rotations (read-only), and translations that carry the whole position.
-    Raises: InputError where the row lacks a value the cloud needs. Source: paper Eqs. 17-21, Rodrigues' formula.
+    `perturbation` is added to that motion. A node cloud gets zero rotations (read-only), and translations that carry
+    the whole position.
+    Raises: InputError where the row lacks a value the cloud needs, or a part that does not move is to be turned.
+    Source: paper Eqs. 17-21, Rodrigues' formula.
     """
     times_s = np.asarray(times_s, dtype=np.float64)
+    more, offset, tilt = perturbation or Perturbation()
     body = attitude(row["yaw_rad"], row["pitch_rad"], row["roll_rad"])
     origin = np.array([row["x_m"], row["y_m"], row["z_m"]])
     velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
     if not np.isfinite([*origin, *velocity, *body.flat]).all():
         raise InputError(f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not finite")
     path = origin + times_s[:, None] * velocity
+    if offset is not None:
+        path += offset
+    if tilt is not None:
+        turned, body = _attitudes(row, tilt), np.eye(3)
     count, parts = len(times_s), len(cloud.kinds)
     if "node" in cloud.kinds:
+        _perturbed(cloud, {}, {}, more or {})
         translation = _track(cloud, row, times_s, body)
+        if tilt is not None:
+            translation = np.einsum("nij,nlj->nli", turned, translation)
         translation += path[:, None]
         return Poses(np.broadcast_to(np.zeros(()), (count, parts, 3, 3)), translation)
-    functions, matrices = _series(cloud, row, times_s)
+    functions, matrices = _series(cloud, row, times_s, more or {})
     matrices = body @ matrices[..., :3, :]
     terms = functions.shape[1]
-    rotation = functions @ matrices[..., :3].reshape(terms, -1)
+    rotation = (functions @ matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
     translation = (functions @ matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    if tilt is not None:
+        rotation = turned[:, None] @ rotation
+        translation = np.einsum("nij,npj->npi", turned, translation)
     translation += path[:, None]
-    return Poses(rotation.reshape(count, parts, 3, 3), translation)
+    return Poses(rotation, translation)
 
 
 def positions(cloud: Cloud, row: dict, times_s: np.ndarray) -> np.ndarray:
