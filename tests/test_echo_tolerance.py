@@ -134,3 +134,21 @@ def _key_of(cache, key) -> tuple:
             return ("any",)
 
     return key(cache, ("signature",), Codegen())
+
+
+@pytest.mark.parametrize("size, tolerance", [(0.4, None), (2.0, None), (2.0, 1e-2), (60.0, None)])
+def test_the_gap_is_a_lower_bound_that_says_something(size, tolerance):
+    net = network(symbols=60)
+    seen = net.stations[0]
+    motion = cloud_in_motion(np.random.default_rng(8), 60, 80, (150.0, -30.0, 60.0), size, 30.0)
+    arguments = (net, seen, motion, 1.0, motion.translation[0, 0])
+    result = echo_signal(*arguments, tolerance)
+    strengths = np.sort(abs(range_cells(*arguments)), axis=1)
+    truth = strengths[:, -1] - strengths[:, -2]
+    assert (result.gap <= truth * (1 + 1e-9)).all() and (result.gap >= 0).all()
+    # The bound on far cells seldom hides a clear lead, and so the gap is mostly all there is.
+    assert np.median(result.gap / truth) > 0.5
+    assert (strengths.sum(axis=1) > 0).all() and (result.totals >= strengths[:, -1] * (1 - 1e-9)).all()
+    general = echo_signal(*arguments, paths=[Path(), Path(0.0, -0.5j)])
+    assert (general.gap <= np.abs(1 - 0.5j) * truth * (1 + 1e-9)).all() and general.gap.max() > 0
+    assert relative(general.totals, 1.5 * result.totals) < (1e-2 if tolerance else 1e-9)

@@ -44,8 +44,9 @@ def far_bound(z, u, low, high, count):
 
 @PLAIN
 def strongest(z, u, base, count):
-    """Arg max over all cells of one symbol: (value, cell, near-tie)."""
+    """Arg max over all cells of one symbol: (value, cell, near-tie, lead over every other cell but for rounding)."""
     low, high = math.floor(u.min()), math.ceil(u.max())
+    far = 0.0
     for grow in range(3):
         if grow == 1:
             low, high = low - 8, high + 8
@@ -60,10 +61,11 @@ def strongest(z, u, base, count):
                 second, best, value, cell = best, size, there * cell_phase(base + j, count), index
             elif size > second:
                 second = size
-        if high - low + 1 >= count or far_bound(z, u, low, high, count) < best * (1.0 - NEAR_TIE):
+        far = 0.0 if high - low + 1 >= count else far_bound(z, u, low, high, count)
+        if far < best * (1.0 - NEAR_TIE):
             break
     tie = best - second <= NEAR_TIE * best and count > 1
-    return value, cell, tie
+    return value, cell, tie, best - max(second, far)
 
 
 @PLAIN
@@ -94,8 +96,8 @@ def symbol(scene, radar, ref, n, aims, delays, gains, e, z, u, risk):
 
 
 @PLAIN
-def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, totals, risks):
-    """Fill values, cells, ties and sums of |amplitude| and risk at `symbols`; returns 0, or n L + l + 1 at r = 0."""
+def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties, totals, gaps, risks):
+    """Fill values, cells, ties, leads, sums of |amplitude| and risk at `symbols`; returns 0, or n L + l + 1, r = 0."""
     count = scene.translation.shape[1] if scene.rotation.shape[0] == 0 else len(scene.points)
     size = count * max(1, delays.shape[0])
     e, z, u, risk = np.empty((count, 3)), np.empty(size, np.complex128), np.empty(size), np.empty(size)
@@ -103,7 +105,7 @@ def signal(scene, radar, refs, symbols, aims, delays, gains, values, cells, ties
         fault = symbol(scene, radar, refs[n], n, aims, delays, gains, e, z, u, risk)
         if fault:
             return n * count + fault
-        values[n], cells[n], ties[n] = strongest(z, u, int(refs[n, 5]), radar.subcarriers)
+        values[n], cells[n], ties[n], gaps[n] = strongest(z, u, int(refs[n, 5]), radar.subcarriers)
         totals[n], risks[n] = np.abs(z).sum(), risk.sum()
     return 0
 

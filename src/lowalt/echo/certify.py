@@ -57,8 +57,9 @@ def one_cell(row, degree, at, size, u, weight, real, imag):
 def certify(
     place, deep, c0, c1, a2, slack, bound, sums, first, last, window, at, size, typed, degree, shape, arrays
 ):  # fmt: skip
-    """Strongest cell of one symbol: (state, place in `sums`, near-tie, close call), more cells as the bound asks.
+    """Strongest cell of one symbol: (state, place in `sums`, near-tie, gap), more cells as the bound asks.
 
+    gap: lower bound of how much larger |sum| is there than in any other cell, negative where none is proved.
     sums: (RING + WIDEST + RING,), the window's cells from RING on. shape: (count, half-width, centre) of the cells.
     arrays: sin(pi u), u, real and imaginary parts and room for weights, needed only where the first bound fails.
     """
@@ -86,7 +87,7 @@ def certify(
         gap = min(place - (lowest - 1 - RING), highest + 1 - RING - place, 0.5 * count)
         far = far_limit(c0, c1, a2, gap, deep, count)
         if far + bound < best * (1.0 - NEAR_TIE) - bound:
-            return FINE, which, best - second <= NEAR_TIE * best, second >= best - 2.0 * bound
+            return FINE, which, best - second <= NEAR_TIE * best, best - max(second, far) - 2.0 * bound
         if size == 0:
             break
-    return AGAIN, 0, False, True
+    return AGAIN, 0, False, 0.0

@@ -31,7 +31,9 @@ class EchoResult(NamedTuple):
 
     signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: how
     many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding); bound: proved
-    bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why.
+    bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why;
+    gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
+    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included.
     """
 
     signal: np.ndarray
@@ -39,6 +41,8 @@ class EchoResult(NamedTuple):
     near_ties: int
     bound: float
     choice: Choice
+    gap: np.ndarray
+    totals: np.ndarray
 
 
 def echo_signal(
@@ -67,11 +71,23 @@ def echo_signal(
     if len(again):
         risks = np.zeros(len(refs))
         fault = answers.signal(
-            scene, radio, refs, again, aims, *ways, found.values, found.cells, found.ties, found.totals, risks
+            scene,
+            radio,
+            refs,
+            again,
+            aims,
+            *ways,
+            found.values,
+            found.cells,
+            found.ties,
+            found.totals,
+            found.gaps,
+            risks,
         )
         _check_fault(fault, scene, station, sample)
         share, direction = choice.general_share
         found.bounds[again] = found.totals[again] * share + risks[again] * direction
+        found.gaps[again] = np.maximum(found.gaps[again] - 2 * found.bounds[again], 0.0)
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
@@ -80,7 +96,9 @@ def echo_signal(
             f"{where}tolerance is {tolerance}, below the floor of this sample: float64 can promise {bound:.1e} of its "
             f"largest value, expected a larger tolerance or null"
         )
-    return EchoResult(found.values, found.cells, int(found.ties.sum()), bound, choice)
+    return EchoResult(
+        found.values, found.cells, int(found.ties.sum()), bound, choice, found.gaps, found.totals
+    )  # fmt: skip
 
 
 def explain(result: EchoResult) -> str:

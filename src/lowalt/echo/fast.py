@@ -22,10 +22,10 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
     symbols: indices that refs, span and segs are cut from; fits: polynomials of inverse, excess (float64), cosine and
     sine (the tile's type); plan: error of the segments' fits, slack relative to the sum of amplitudes and to the sum
     of peak amplitudes, 1 where close calls are final; rooms, work, small: see `rooms_for`; out: values, cells, state,
-    totals, bounds, ties, each (N,).
+    totals, bounds, ties, gaps, each (N,).
     """
     inverse, excess, cosine, sine = fits
-    values, cells, state, totals, bounds, ties = out
+    values, cells, state, totals, bounds, ties, gaps = out
     rotation, translation, lx, ly, lz = scene.rotation, scene.translation, lay.x, lay.y, lay.z
     parts, starts, amplitude = lay.parts, lay.starts, lay.amplitude
     ex, ey, ez, eps, inv, exc = work
@@ -113,19 +113,19 @@ def run(scene, lay, radar, refs, span, segs, symbols, aims, rules, fits, fold, p
                 a2 = half * half * weights[s, 2] + 2.0 * half * shift * weights[s, 1] + shift * shift * total
                 a2 = abs(a2) + 1e-3 * total * min(1.0, (half + abs(shift)) ** 2)
                 c1 += total * bound_sine * 2.0 * segs[index, 7]
-                fate, which, tie, close = certify(
+                fate, which, tie, lead = certify(
                     place - low, span[i + s, SIZE] * radar.cells, c0, c1, a2, total * bound_sine, bound, sums[s],
                     first, last, window, s * padded, padded if kept else 0, typed, degree,
                     (radar.subcarriers, segs[index, 7], segs[index, 6] - base - low),
                     (sin_u, u, real, imag, gain_v),
                 )  # fmt: skip
-                if close and plan[3] == 0.0:
+                if lead <= 0.0 and plan[3] == 0.0:
                     fate = AGAIN
                 state[n] = fate
                 if fate == FINE:
                     cell = int(base) + low + which - RING
                     values[n] = sums[s, which] * cell_phase(cell, radar.subcarriers)
-                    cells[n], ties[n] = cell % radar.subcarriers, tie
+                    cells[n], ties[n], gaps[n] = cell % radar.subcarriers, tie, max(lead, 0.0)
 
 
 def rooms_for(points: int, rates: int, single: bool):

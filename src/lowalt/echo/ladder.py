@@ -30,13 +30,14 @@ class Found(NamedTuple):
     totals: np.ndarray
     bounds: np.ndarray
     ties: np.ndarray
+    gaps: np.ndarray
 
     @classmethod
     def empty(cls, count: int) -> "Found":
         """Return room for `count` symbols, none of them computed."""
         return cls(
             np.zeros(count, np.complex128), np.zeros(count, np.int64), np.ones(count, np.int64), np.zeros(count),
-            np.zeros(count), np.zeros(count, np.bool_),
+            np.zeros(count), np.zeros(count, np.bool_), np.zeros(count),
         )  # fmt: skip
 
 
