@@ -1,0 +1,1 @@
+"""Effects on range cells and on the choice of the strongest one."""

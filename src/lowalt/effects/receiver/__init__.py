@@ -1,0 +1,1 @@
+"""Effects on the time samples of a station's receiver."""

@@ -1,0 +1,83 @@
+"""The OFDM waveform of a look: the data that was sent, the samples that were received, and what a receiver knows of both.
+
+Samples are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in NR
+(3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept; its
+cyclic prefix is taken to cover every echo, which is what Eq. 7 assumes. Impairments are in `effects.receiver`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lowalt.network import Network, Station
+
+QPSK = np.exp(1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
+"""The four data symbols, of unit modulus."""
+
+
+def sent(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
+    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus, all four values equally likely.
+
+    Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
+    """
+    return QPSK[rng.integers(0, 4, (symbols, subcarriers), dtype=np.uint8)]
+
+
+def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N, M).
+
+    Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
+    response's. Source: 3GPP TS 38.211, 5.3.1.
+    """
+    return np.fft.ifft(np.fft.ifftshift(response * data, axes=-1), axis=-1)
+
+
+def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the responses (N, M) of time samples (N, M): to subcarriers, divided by what was sent; inverse of `transmit`."""
+    return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) * np.conj(data)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One look as the receiver of one station has it."""
+
+    network: Network
+    station: Station
+    sent: np.ndarray
+    """(N, M) complex128, unit-modulus data."""
+    reference: float = 0.0
+    """The target echo's mean |Y_bin|^2 (W)."""
+    delay_s: float = 0.0
+    """Two-way delay of the target's reference point at n = 0, 2 r / c (s)."""
+
+    @property
+    def sample_s(self) -> float:
+        """Time between two samples, 1 / (M df) (s)."""
+        return 1 / (self.network.subcarriers * self.network.subcarrier_spacing_hz)
+
+    @cached_property
+    def symbol_times_s(self) -> np.ndarray:
+        """Start n T_r of each symbol's useful part (s), shape (N,)."""
+        return np.arange(len(self.sent)) * self.network.symbol_interval_s
+
+    @cached_property
+    def sample_times_s(self) -> np.ndarray:
+        """Time i / (M df) of each sample in its symbol (s), shape (M,)."""
+        return np.arange(self.sent.shape[1]) * self.sample_s
+
+    @cached_property
+    def times_s(self) -> np.ndarray:
+        """Absolute time of every sample (s), shape (N, M)."""
+        return self.symbol_times_s[:, None] + self.sample_times_s
+
+    @cached_property
+    def baseband_hz(self) -> np.ndarray:
+        """Frequency of each subcarrier from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
+        subcarriers = self.sent.shape[1]
+        return (np.arange(subcarriers) - subcarriers // 2) * self.network.subcarrier_spacing_hz
+
+    @property
+    def oscillator_hz(self) -> float:
+        """Frequency of the local oscillator, f_k + (M // 2) df (Hz)."""
+        return self.station.frequency_hz + self.sent.shape[1] // 2 * self.network.subcarrier_spacing_hz
