@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from lowalt.errors import InputError
-from lowalt.recognition import checkpoint, predictions, recipe, runs, samples, schemes
+from lowalt.recognition import checkpoint, inference, predictions, recipe, runs, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.streams import stream
 
@@ -185,9 +185,11 @@ def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trai
         runs.load(tmp_path / "empty.pt")
 
 
-def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(views, tmp_path):
+@pytest.mark.parametrize("precision", ["fp32", "bf16"])
+def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(views, tmp_path, precision):
+    overflow = with_training(rate=1e30, clip=1e30, warmup=0.0, checkpoint_s=0, ema=0.0, precision=precision)
     with pytest.raises(InputError, match=r"loss is .* at step"):
-        train(views, tmp_path, with_training(rate=1e30, clip=1e30, warmup=0.0, checkpoint_s=0, ema=0.0))
+        train(views, tmp_path, overflow)
     kept = tmp_path / "checkpoint.pt"
     if kept.exists():
         _, state = checkpoint.load(kept)
@@ -223,6 +225,14 @@ def test_a_batch_of_one_class_is_survived_and_a_set_without_one_refused(views, t
     found["train"].facts, found["train"].images = facts.take(few), found["train"].images[few]
     with pytest.raises(InputError, match=r"no training sample of class \[2\]"):
         runs.train(found, SCHEME, "seen", SETTINGS, tmp_path / "none")
+
+
+def test_arithmetic_is_bf16_only_where_the_processor_has_it(monkeypatch):
+    for units, expected in (({"avx2": True}, "fp32"), ({"avx2": True, "amx_bf16": False}, "fp32"),
+                            ({"avx512_bf16": True}, "bf16"), ({"amx_bf16": True}, "bf16")):  # fmt: skip
+        monkeypatch.setattr(torch.cpu, "get_capabilities", lambda units=units: units)
+        assert inference.arithmetic("auto", "cpu") == expected
+    assert (inference.arithmetic("fp32", "cpu"), inference.arithmetic("bf16", "cpu")) == ("fp32", "bf16")
 
 
 def test_early_stopping_counts_validations_without_gain(views, tmp_path):

@@ -12,9 +12,23 @@ from torch import distributed, nn
 from lowalt.recognition.samples import ViewSamples
 
 
+def arithmetic(precision: str, device: str) -> str:
+    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware multiplies in it.
+
+    device: "cpu" or "cuda". A processor without such units emulates bf16 and takes ten times as long as in fp32.
+    """
+    if precision != "auto":
+        return precision
+    if device == "cuda":
+        return "bf16" if torch.cuda.is_bf16_supported(including_emulation=False) else "fp32"
+    known = torch.cpu.get_capabilities()
+    # Arm processors name their units otherwise.
+    return "bf16" if any(known.get(unit) for unit in ("amx_bf16", "avx512_bf16", "bf16")) else "fp32"
+
+
 @dataclass(frozen=True)
 class Machine:
-    """Where torch runs: device, precision, and this process's place among the ranks of torchrun."""
+    """Where torch runs: device, arithmetic ("bf16" or "fp32"), this process's place among the ranks of torchrun."""
 
     device: torch.device
     precision: str
@@ -23,13 +37,16 @@ class Machine:
 
     @classmethod
     def here(cls, precision: str) -> "Machine":
-        """Return this process's machine: a GPU where there is one; gloo (CPU) or nccl (GPU) under torchrun."""
+        """Return this process's machine: a GPU where there is one; gloo (CPU) or nccl (GPU) under torchrun.
+
+        precision: "auto", "bf16" or "fp32".
+        """
         gpu = torch.cuda.is_available()
         ranks = int(os.environ.get("WORLD_SIZE", "1"))
         device = torch.device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")
-        return cls(device, precision, int(os.environ.get("RANK", "0")), ranks)
+        return cls(device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks)
 
     def autocast(self) -> contextlib.AbstractContextManager:
         """Return the context of mixed precision (bfloat16), or none for fp32."""

@@ -13,7 +13,7 @@ Settings of this module, the block `recognition.training`:
     alone            weight of a second loss, on each station as if it were the only one; 0 for none. Several
                      stations then teach the backbone as often as they are seen, not once a sample
     ema              largest decay of the moving average of the weights (it rises with the steps); 0 for none
-    precision        bf16 (autocast) | fp32
+    precision        auto (bf16 where the hardware has it, else fp32) | bf16 (autocast) | fp32
     channels_last    memory layout of images and convolutions
     compile          torch.compile the network
     validate_every   steps between validations
@@ -49,6 +49,7 @@ REAL = {
     "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf,
 }  # fmt: skip
 """Largest value of every real number; the smallest is 0."""
+PRECISIONS = ("auto", "bf16", "fp32")
 
 
 def check(block: dict) -> dict:
@@ -64,8 +65,8 @@ def check(block: dict) -> dict:
         value = block[key]
         if not isinstance(value, (int, float)) or isinstance(value, bool) or not 0 <= value <= most:
             raise InputError(f"training: {key} is {value!r}, expected a number in 0..{most}")
-    if block["precision"] not in ("bf16", "fp32"):
-        raise InputError(f"training: precision is {block['precision']!r}, expected 'bf16' or 'fp32'")
+    if block["precision"] not in PRECISIONS:
+        raise InputError(f"training: precision is {block['precision']!r}, expected one of {PRECISIONS}")
     return block
 
 

@@ -40,14 +40,15 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
     block = recipe.check(settings["training"])
     augment.check(settings["augmentation"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
-    kept = {"checkpoint_s": None, "workers": None}
+    machine = Machine.here(block["precision"])
+    # What decides no weight is left out; the arithmetic stands as this machine does it.
+    kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
         scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
         samples={part: len(source.facts) for part, source in samples.items()}, torch=torch.__version__,
     )  # fmt: skip
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
-    machine = Machine.here(block["precision"])
     model = network.Recogniser(scheme, settings["network"], settings["size"], palettes)
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
     resumed = trainer.resume()
@@ -67,6 +68,7 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
+            "precision": machine.precision,
             "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
             "torch": torch.__version__, "timm": timm.__version__,
         })  # fmt: skip
