@@ -9,7 +9,7 @@ import pytest
 
 from lowalt.config import load_yaml
 from lowalt.errors import InputError
-from lowalt.motion import Perturbation, combined, poses
+from lowalt.motion import Perturbation, poses
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.streams import stream
 from lowalt.targets.__main__ import make
@@ -35,7 +35,7 @@ def target(name: str) -> tuple[Cloud, dict]:
 @pytest.mark.parametrize("name", [QUAD, BIRD, CAR, WALKER])
 def test_nothing_added_leaves_every_bit_of_the_motion(name):
     plain = poses(*target(name), TIMES)
-    for nothing in (None, Perturbation(), Perturbation({}), combined([])):
+    for nothing in (None, Perturbation(), Perturbation({})):
         found = poses(*target(name), TIMES, nothing)
         assert found.rotation.tobytes() == plain.rotation.tobytes()
         assert found.translation.tobytes() == plain.translation.tobytes()
@@ -81,15 +81,6 @@ def test_an_added_angle_of_an_inner_wing_carries_the_outer_one():
     slow = poses(higher, row, TIMES)
     np.testing.assert_allclose(found.rotation, slow.rotation, atol=1e-12)
     np.testing.assert_allclose(found.translation, slow.translation, atol=1e-10)
-
-
-def test_perturbations_add():
-    angle, offset, tilt = np.ones(4), np.ones((4, 3)), np.full((4, 3), 2.0)
-    found = combined([Perturbation({1: angle}, offset), Perturbation({1: angle, 2: angle}, offset, tilt)])
-    assert found.angle_rad[1].tolist() == [2] * 4
-    assert found.angle_rad[2].tolist() == [1] * 4
-    assert (found.offset_m == 2).all()
-    assert (found.tilt_rad == 2).all()
 
 
 @pytest.mark.parametrize("name", [QUAD, WALKER])

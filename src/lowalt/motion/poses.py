@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.errors import InputError
-from lowalt.motion.perturbation import Perturbation
 from lowalt.targets.cloud import Cloud
 
 
@@ -20,6 +19,18 @@ class Poses(NamedTuple):
 
     rotation: np.ndarray
     translation: np.ndarray
+
+
+class Perturbation(NamedTuple):
+    """What is added to a target's own motion at N symbols; every field may be None.
+
+    angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole target's place,
+    global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
+    """
+
+    angle_rad: dict[int, np.ndarray] | None = None
+    offset_m: np.ndarray | None = None
+    tilt_rad: np.ndarray | None = None
 
 
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
