@@ -1,1 +1,1 @@
-"""Effects on range cells and on the choice of the strongest one."""
+"""Effects on range cells: what happens before the strongest is taken, and which one is taken."""

@@ -1,1 +1,1 @@
-"""Effects on the time samples of a station's receiver."""
+"""Effects on the time samples of the OFDM symbols: noise, offsets, oscillator, mixer, converter."""

@@ -34,4 +34,6 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     power = variance(settings, frame.network.subcarrier_spacing_hz) / samples.shape[1]
     noise = rng.standard_normal((*samples.shape, 2)).view(np.complex128)[..., 0]
-    return samples + math.sqrt(power / 2) * noise
+    noise *= math.sqrt(power / 2)
+    noise += samples
+    return noise

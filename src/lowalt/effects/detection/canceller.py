@@ -1,0 +1,87 @@
+"""Canceller of static clutter on range cells, over the symbols of a look.
+
+The filters that let noise through stronger or weaker are scaled to unit noise gain, so that a set SNR means the same
+before and behind them.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+
+from lowalt.effects.waveform import Frame
+
+SOURCE = (
+    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
+    "noise gain); M. I. Skolnik, Radar Handbook, 3rd ed. 2008, ch. 2 (recursive MTI filters)"
+)
+DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95}
+
+
+def idle(settings: dict) -> bool:
+    """Return True for kind none, or a difference of order 0."""
+    return settings["kind"] == "none" or (settings["kind"] == "pulse" and settings["order"] == 0)
+
+
+def gain(settings: dict) -> float:
+    """Return the root of the filter's gain on white noise, by which it is divided.
+
+    pulse: sum of squared binomials, C(2k, k); exponential: 2 a^2 / (1 + a); mean: taken as 1 (it is 1 - 1/N).
+    """
+    if settings["kind"] == "pulse":
+        return math.sqrt(math.comb(2 * settings["order"], settings["order"]))
+    if settings["kind"] == "exponential":
+        return settings["memory"] * math.sqrt(2 / (1 + settings["memory"]))
+    return 1.0
+
+
+def response(settings: dict, turns: np.ndarray) -> np.ndarray:
+    """Return the settled amplitude response at Doppler frequencies of `turns` cycles a symbol interval (f T_r).
+
+    pulse: |2 sin(pi f T_r)|^k; exponential: a |1 - z^-1| / |1 - a z^-1|; mean: 1 except at 0. Divided by `gain`.
+    Source: Richards 2014, 5.2.
+    """
+    delay = np.exp(-2j * np.pi * np.asarray(turns, float))
+    if settings["kind"] == "pulse":
+        return np.abs(1 - delay) ** settings["order"] / gain(settings)
+    if settings["kind"] == "exponential":
+        memory = settings["memory"]
+        return memory * np.abs(1 - delay) / np.abs(1 - memory * delay) / gain(settings)
+    return np.where(np.mod(turns, 1.0) == 0, 0.0, 1.0)
+
+
+def amplifies(settings: dict) -> float:
+    """Return a bound of the filter's 2-norm, start-up included."""
+    if settings["kind"] == "pulse":
+        return 2 ** settings["order"] / gain(settings)
+    if settings["kind"] == "exponential":
+        # Largest settled response, 2 a / (1 + a), and the first sample's share that dies away as a^n.
+        memory = settings["memory"]
+        return memory * (2 / (1 + memory) + 1 / math.sqrt(1 - memory**2)) / gain(settings)
+    return 1.0
+
+
+def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return range cells (N, M) without what stands still.
+
+    mean: less the look's mean. pulse: `order` first differences over symbols. exponential: less a mean that forgets
+    as memory^n. The last two start as if the first symbol had lasted forever: their first output is zero, and clutter
+    leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
+    """
+    if settings["kind"] == "mean":
+        return cells - cells.mean(axis=0)
+    if settings["kind"] == "pulse":
+        for _ in range(settings["order"]):
+            cells = _step(cells)
+        return cells / gain(settings)
+    result = _step(cells) * (settings["memory"] / gain(settings))
+    for earlier, now in pairwise(result):
+        now += settings["memory"] * earlier
+    return result
+
+
+def _step(cells: np.ndarray) -> np.ndarray:
+    """First difference over symbols (N, M), zero at the first."""
+    result = np.zeros_like(cells)
+    np.subtract(cells[1:], cells[:-1], out=result[1:])
+    return result

@@ -1,0 +1,165 @@
+"""Phase noise of a given spectrum at the scattered instants of a look: N symbols of M samples, long pauses between.
+
+The spectrum is split by smooth windows that add up to one. Below 16 / T_r it is a sum of lines 1 / (2 N T_r) apart,
+each with a Gaussian amplitude: exact from symbol to symbol, and inside a symbol interpolated to 1e-9. Above, two symbols
+are independent, and the M samples of each are Gaussian with exactly the covariance of that part of the spectrum.
+Source: D. B. Percival, A. T. Walden, Spectral Analysis for Univariate Time Series, 2020, ch. 11 (simulation by lines).
+"""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from lowalt.effects.waveform import turned
+
+SPACING = 90
+"""Fewest samples from one symbol to the next: fewer leave no room between what is slow and half the sample rate."""
+
+
+class Grid(NamedTuple):
+    """Where a spectrum is taken and how phases follow from it; weights hold the windows and the widths (Hz)."""
+
+    slow_hz: np.ndarray
+    slow_weight: np.ndarray
+    """(J,) lines of the slow part."""
+    node_s: np.ndarray
+    blend: np.ndarray
+    """(Q,) s into a symbol where the slow part is taken, and (Q, M) polynomial that carries it to every sample."""
+    low_hz: np.ndarray
+    low_width: np.ndarray
+    low_weight: np.ndarray
+    low_cosine: np.ndarray
+    """(K,) nodes, evenly in log f, of the fast part's lower end, with their cosines at all lags (K, M)."""
+    high_hz: np.ndarray
+    high_weight: np.ndarray
+    """(H,) even nodes up to half the sample rate, for an inverse FFT."""
+
+
+def density(points: tuple, frequency_hz: np.ndarray) -> np.ndarray:
+    """Return the two-sided spectral density of phase (rad^2/Hz) at offsets (Hz) from (offset Hz, dBc/Hz) pairs.
+
+    Straight lines between the points in dB over log f, flat beyond them. Source: IEEE Std 1139-2008: L(f) is half the
+    one-sided density of phase, which is the two-sided density.
+    """
+    offset, level = np.array(points, float).T
+    return 10 ** (np.interp(np.log(frequency_hz), np.log(offset), level) / 10)
+
+
+def _above(frequency_hz: np.ndarray, edge_hz: float) -> np.ndarray:
+    """Window from 0 to 1 over the octave around `edge_hz`, smooth in log f."""
+    place = np.clip(np.log2(frequency_hz / edge_hz) + 0.5, 0.0, 1.0)
+    return place**3 * (10 + place * (6 * place - 15))
+
+
+@lru_cache(maxsize=8)
+def grid(symbols: int, subcarriers: int, interval_s: float, sample_s: float) -> Grid:
+    """Return the grid of a look of N symbols, `interval_s` apart, of M samples, `sample_s` apart.
+
+    Needs interval_s of at least SPACING samples.
+    """
+    useful_s, band_hz = subcarriers * sample_s, 1 / sample_s
+    slow_edge = 16 / interval_s
+    high_edge = max(min(8, subcarriers / 8) / useful_s, 2 * slow_edge)
+
+    step = 1 / (2 * symbols * interval_s)
+    slow_hz = step * np.arange(1, math.ceil(math.sqrt(2) * slow_edge / step))
+    slow_weight = step * (1 - _above(slow_hz, slow_edge))
+    # Chebyshev nodes of a tone of a radians to either side err by 2 (a / 2)^Q / Q!.
+    reach = math.pi * slow_hz[-1] * useful_s
+    nodes = next(q for q in range(4, 1000) if 2 * (reach / 2) ** q < 1e-9 * math.factorial(q))
+    roots = chebyshev.chebpts1(nodes)
+    place = 2 * (np.arange(subcarriers) + 0.5) / subcarriers - 1
+    vander = chebyshev.chebvander(roots, nodes - 1)
+    blend = np.linalg.solve(vander.T, chebyshev.chebvander(place, nodes - 1).T)
+    node_s = (roots + 1) / 2 * useful_s - 0.5 * sample_s
+
+    octave = max(64, math.ceil(8 * high_edge * useful_s))
+    count = math.ceil(octave * (1 + math.log2(high_edge / slow_edge)))
+    low_hz = slow_edge / math.sqrt(2) * 2 ** (np.arange(count) / octave)
+    low_width = low_hz * math.log(2) / octave
+    low_weight = 2 * low_width * _above(low_hz, slow_edge) * (1 - _above(low_hz, high_edge))
+    low_cosine = np.cos(2 * np.pi * sample_s * np.outer(low_hz, np.arange(subcarriers)))
+
+    period = subcarriers * math.ceil(max(8, 8 / (high_edge * useful_s)))
+    high_hz = np.arange(1, period // 2 + 1) * band_hz / period
+    high_weight = _above(high_hz, high_edge) * band_hz / period
+    return Grid(
+        slow_hz, slow_weight, node_s, blend, low_hz, low_width, low_weight, low_cosine, high_hz, high_weight
+    )  # fmt: skip
+
+
+def correlated(frequency_hz: np.ndarray, width_hz: np.ndarray | float, delay_s: float | None) -> np.ndarray | float:
+    """Return the factor on the density of phi(t) - phi(t - delay): 4 sin^2(pi f delay), mean over each node's width.
+
+    None for an oscillator that is not shared, which leaves the density alone. Source: M. C. Budge, M. P. Burt, Range
+    correlation effects on phase and amplitude noise, IEEE Southeastcon 1993.
+    """
+    if delay_s is None:
+        return 1.0
+    plain = 4 * np.sin(np.pi * frequency_hz * delay_s) ** 2
+    share = np.sinc(width_hz * delay_s)
+    return plain * share + 2 * (1 - share)
+
+
+def covariance(points: tuple, at: Grid, delay_s: float | None) -> np.ndarray:
+    """Return the covariance (M,) in rad^2 of the fast part at lags 0 .. M - 1 samples."""
+    subcarriers = at.low_cosine.shape[1]
+    low = density(points, at.low_hz) * correlated(at.low_hz, at.low_width, delay_s) * at.low_weight
+    high = density(points, at.high_hz) * correlated(at.high_hz, at.high_hz[0], delay_s) * at.high_weight
+    period = 2 * len(high)
+    return low @ at.low_cosine + period * np.fft.irfft(np.append(0.0, high), period)[:subcarriers]
+
+
+@lru_cache(maxsize=8)
+def _lines(points: tuple, at_key: tuple) -> np.ndarray:
+    at = grid(*at_key)
+    return np.sqrt(2 * density(points, at.slow_hz) * at.slow_weight)
+
+
+@lru_cache(maxsize=4)
+def _twist(at_key: tuple) -> np.ndarray:
+    """Turn (Q, J) of every line up to each node of a symbol."""
+    at = grid(*at_key)
+    return turned(2 * np.pi * np.outer(at.node_s, at.slow_hz))
+
+
+@lru_cache(maxsize=4)
+def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
+    """Lower Cholesky root (M, M) of the fast part's covariance."""
+    lags = covariance(points, grid(*at_key), delay_s)
+    index = np.arange(len(lags))
+    matrix = lags[np.abs(index[:, None] - index)]
+    # A floor far below any oscillator's keeps a spectrum without one positive definite in double precision.
+    matrix[index, index] += 4 * np.finfo(float).eps * len(lags) ** 2 * lags[0]
+    return np.linalg.cholesky(matrix)
+
+
+def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
+    """Return the slow part (N, M) in rad of a drawn phase; `at_key` are the arguments of `grid`."""
+    at, symbols = grid(*at_key), at_key[0]
+    amplitude = _lines(points, at_key)
+    if delay_s is not None:
+        amplitude = amplitude * 2 * np.abs(np.sin(np.pi * at.slow_hz * delay_s))
+    drawn = rng.standard_normal((len(amplitude), 2)).view(np.complex128)[:, 0] * amplitude
+    # Lines 2 N apart are one and the same at the symbols' starts: fold them, then one short transform a node.
+    turns = 2 * symbols
+    padded = np.zeros((len(at.node_s), -(-(len(drawn) + 1) // turns) * turns), np.complex128)
+    np.multiply(_twist(at_key), drawn, out=padded[:, 1 : len(drawn) + 1])
+    folded = padded.reshape(len(padded), -1, turns).sum(axis=1)
+    at_nodes = turns * np.fft.ifft(folded, axis=1)[:, :symbols].real
+    return at_nodes.T @ at.blend
+
+
+def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
+    """Return drawn phase noise (N, M) in rad of the spectrum `points` at the instants of `grid(*at_key)`.
+
+    delay_s: return phi(t) - phi(t - delay) instead, None for phi itself.
+    """
+    slow = slow_phase(points, at_key, delay_s, rng)
+    fast = rng.standard_normal(slow.shape)
+    if covariance(points, grid(*at_key), delay_s)[0] == 0:
+        return slow
+    return slow + fast @ _root(points, at_key, delay_s).T

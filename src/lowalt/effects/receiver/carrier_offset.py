@@ -1,0 +1,43 @@
+"""Carrier offset: the receiver's oscillator is off its frequency, so every line moves and subcarriers leak."""
+
+import numpy as np
+
+from lowalt.effects.receiver import _offsets
+from lowalt.effects.waveform import Frame, turned
+
+SOURCE = (
+    "P. H. Moose, A technique for orthogonal frequency division multiplexing frequency offset correction, "
+    "IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
+)
+DEFAULTS = {"fixed_hz": 0.0, "sigma_hz": 0.0, "fixed_ppm": 0.0, "sigma_ppm": 0.017}
+
+
+def idle(settings: dict) -> bool:
+    """Return True where no station's oscillator is off."""
+    return all(_offsets.idle(settings[f"fixed_{unit}"], settings[f"sigma_{unit}"]) for unit in ("hz", "ppm"))
+
+
+def check(settings: dict, facts) -> None:
+    """Raise InputError for an unknown station."""
+    for key in ("fixed_hz", "fixed_ppm"):
+        _offsets.check_stations(f"effects.carrier_offset.{key}", settings[key], facts.network)
+
+
+def offset_hz(settings: dict, frame: Frame, rng: np.random.Generator) -> float:
+    """Return by how much all frequencies rise (Hz): what is given in Hz and in ppm of the oscillator, added up."""
+    name = frame.station.name
+    hz = _offsets.fixed(settings["fixed_hz"], name) + settings["sigma_hz"] * _offsets.drawn(rng)
+    ppm = _offsets.fixed(settings["fixed_ppm"], name) + settings["sigma_ppm"] * _offsets.drawn(rng)
+    return hz + 1e-6 * ppm * frame.oscillator_hz
+
+
+def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) turned by exp(j 2 pi F t) at their absolute times t = n T_r + i / (M df).
+
+    A positive F is a receiver's oscillator that is too low: lines rise by F, folded at half the symbol rate.
+    Source: Moose 1994; two draws a sample and station.
+    """
+    shift = offset_hz(settings, frame, rng)
+    between = turned(2 * np.pi * np.mod(shift * frame.symbol_times_s, 1.0))
+    within = turned(2 * np.pi * shift * frame.sample_times_s)
+    return samples * between[:, None] * within

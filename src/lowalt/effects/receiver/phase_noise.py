@@ -1,0 +1,65 @@
+"""Phase noise of the oscillator: one random phase that wanders from symbol to symbol and jitters inside each.
+
+What wanders turns the whole symbol (common phase error, seen in Doppler); what jitters leaks between subcarriers.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+from lowalt.effects.receiver import _oscillator
+from lowalt.effects.waveform import Frame, turned
+from lowalt.errors import InputError
+
+SOURCE = (
+    "IEEE Std 1139-2008 (L(f)); D. Petrovic, W. Rave, G. Fettweis, Effects of phase noise on OFDM systems with and "
+    "without PLL, IEEE Trans. Commun. 55(8), 2007; M. C. Budge, M. P. Burt, Range correlation effects on phase and "
+    "amplitude noise, IEEE Southeastcon 1993; default: 3GPP TR 38.803, Table 6.1.10-1, scaled from 29.55 to 4.9 GHz by "
+    "20 log10"
+)
+DEFAULTS = {
+    "points": [
+        [1.0, 13.4], [10.0, -16.6], [100.0, -49.6], [1e3, -82.3], [3e3, -95.4], [1e4, -103.0], [1e5, -112.5],
+        [5.5e5, -116.6], [1.6e6, -114.2], [3e6, -116.3], [1e7, -124.6], [3e7, -133.7],
+    ],
+    "level_db": 0.0,
+    "shared": True,
+}  # fmt: skip
+
+
+def idle(settings: dict) -> bool:
+    """Return True for a spectrum without points."""
+    return not settings["points"]
+
+
+def check(settings: dict, facts) -> None:
+    """Raise InputError for offsets that do not rise, or symbols too close together to tell slow from fast."""
+    offsets = [offset for offset, _ in settings["points"]]
+    if offsets[0] <= 0 or any(later <= earlier for earlier, later in pairwise(offsets)):
+        raise InputError(f"effects.phase_noise.points: offsets {offsets}, expected positive and rising (Hz)")
+    network = facts.network
+    band = network.subcarriers * network.subcarrier_spacing_hz
+    if network.symbol_interval_s * band < _oscillator.SPACING:
+        raise InputError(
+            f"effects.phase_noise: network.symbol_interval_s is {network.symbol_interval_s:g}, expected at least "
+            f"{_oscillator.SPACING} samples of 1 / (M df), {_oscillator.SPACING / band:g}"
+        )
+
+
+def phase(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the drawn phase (N, M) in rad at every sample's instant."""
+    points = tuple((float(offset), float(level) + settings["level_db"]) for offset, level in settings["points"])
+    look = (*frame.sent.shape, frame.network.symbol_interval_s, frame.sample_s)
+    return _oscillator.phase(points, look, frame.delay_s if settings["shared"] else None, rng)
+
+
+def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) turned by exp(j phi(t)), phi of the spectrum `points` raised by `level_db`.
+
+    shared: transmitter and receiver have one oscillator, so that phi(t) - phi(t - tau) is left, with the delay tau of
+    the target's reference point; all echoes are taken to have it. Noise beyond half the sample rate is filtered out.
+    Source: Petrovic et al. 2007 (within a symbol); Budge and Burt 1993 (range correlation).
+    """
+    result = turned(phase(settings, frame, rng))
+    result *= samples
+    return result
