@@ -10,7 +10,7 @@ configfile: "config/default.yaml"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/targets.smk"
 include: "workflow/rules/motion.smk"
-include: "workflow/rules/echo.smk"
+include: "workflow/rules/effects.smk" if config["effects"] else "workflow/rules/echo.smk"
 include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
 include: "workflow/rules/cost.smk"
@@ -33,6 +33,7 @@ rule all:
         f"results/{RUN}/report.html",
         f"results/{RUN}/accuracy.csv",
         f"results/{RUN}/shards/README.md",
+        [f"results/{RUN}/transfer.csv"] if OTHERS else [],
 
 
 rule clouds:

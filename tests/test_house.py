@@ -10,7 +10,7 @@ import pytest
 from lowalt.sources import PACKAGE
 
 ROOT = Path(__file__).parent.parent
-STREET = ["targets", "motion", "echo", "noise", "spectra", "tiles", "shards", "recognition", "report"]
+STREET = ["targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition", "report"]
 
 
 def stages_imported(path: Path) -> set[str]:

@@ -30,7 +30,14 @@ def prepared(config):
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
         Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
         Images.from_settings(config["images"])
-        schemes = {name: named(config["recognition"]["table"], name) for name in config["recognition"]["schemes"]}
+        block = config["recognition"]
+        schemes = {name: named(block["table"], name) for name in (*block["schemes"], *block["timed"])}
+        if RUN in block["transfer"]:
+            raise InputError(f"recognition.transfer: {RUN!r} is this run, expected other runs")
+        if config["effects"]:
+            from lowalt.effects.facts import check as check_effects
+
+            check_effects(config, tuple({record["published"]["category"] for record in chosen.values()}))
         lacking = missing_inputs(chosen, INPUTS)
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
@@ -40,11 +47,15 @@ def prepared(config):
 
 
 INPUTS = prepare(Path(workflow.basedir) / "src", config["inputs"])
-RECORDS, PLAN, SCHEMES = prepared(config)
 RUN = config["run"]
+RECORDS, PLAN, SCHEMES = prepared(config)
 STATIONS = list(config["network"]["stations"])
 BY_SLUG = {slug(name): name for name in RECORDS}
 SLUGS = list(BY_SLUG)
+BY_SCHEME = {scheme.slug: scheme for scheme in SCHEMES.values()}
+TRAINED = [SCHEMES[name] for name in config["recognition"]["schemes"]]
+TIMED = [SCHEMES[name] for name in config["recognition"]["timed"]]
+OTHERS = config["recognition"]["transfer"]
 
 
 wildcard_constraints:
@@ -55,13 +66,16 @@ wildcard_constraints:
     station="|".join(STATIONS),
     fold="train|val|test",
     protocol="seen|unseen",
-    scheme="|".join(scheme.slug for scheme in SCHEMES.values()),
+    scheme="|".join(BY_SCHEME),
+    # Without other runs nothing matches.
+    other="|".join(OTHERS) or "(?!)",
+    size=r"\d+",
     train_seed=r"\d+",
 
 
 TRAININGS = [
     f"{protocol}/{scheme.slug}/{seed}"
-    for scheme in SCHEMES.values()
+    for scheme in TRAINED
     for protocol in config["recognition"]["protocols"]
     if protocol in scheme.protocols
     for seed in config["recognition"]["seeds"]
@@ -78,6 +92,24 @@ def code(*modules):
 def group_clouds(wildcards):
     """Cloud files of a group's subtypes, in the table's order."""
     return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in PLAN.groups[wildcards.group]]
+
+
+def effect_modules():
+    """The modules of the effects that this scene names, and of no other."""
+    from lowalt.effects.catalogue import dotted
+
+    return [dotted(name) for name in config["effects"]]
+
+
+def group_occluders(wildcards):
+    """Surface files of a group's subtypes where the scene hides points behind surfaces, none elsewhere."""
+    if "occlusion" not in config["effects"]:
+        return []
+    return [f"results/{wildcards.run}/occluders/{slug(name)}.npz" for name in PLAN.groups[wildcards.group]]
+
+
+def occluders_option(wildcards, input):
+    return f"--occluders {input.occluders}" if input.occluders else ""
 
 
 def record_files(wildcards):
@@ -125,6 +157,16 @@ def chunk_echoes(wildcards):
     return [f"{stem}/{station}.npy" for station in STATIONS]
 
 
+def chunk_powers(wildcards):
+    """What set SNRs refer to in a scene with effects: the powers of the targets' own echoes, a file a station."""
+    stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+    return [f"{stem}/{station}.power.npy" for station in STATIONS] if config["effects"] else []
+
+
+def powers_option(wildcards, input):
+    return f"--powers {input.powers}" if input.powers else ""
+
+
 def shard_tiles(wildcards):
     """A chunk's tiles, where shards hold images; signal shards need none, so none are rendered."""
     if config["shards"]["kind"] == "signal":
@@ -144,11 +186,17 @@ def shard_settings(wildcards):
     )
 
 
+def pixels(scheme):
+    """Pixels a side that a scheme's network sees."""
+    return scheme.size or config["recognition"]["size"]
+
+
 def sample_source(wildcards):
-    """What training and evaluation read: the shared caches of shrunk images, or the shards themselves."""
+    """What training and evaluation read: the shared caches of images shrunk to the scheme's size, or the shards."""
     base = f"results/{wildcards.run}"
     if config["recognition"]["cache"]:
-        return {"views": [f"{base}/views/{shard}.npz" for shard in PLAN.shards]}
+        size = pixels(BY_SCHEME[wildcards.scheme])
+        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in PLAN.shards]}
     return {"index": f"{base}/shards/index.json"}
 
 
@@ -166,7 +214,8 @@ def benchmark_files(wildcards):
     """Benchmarks of all jobs, in pipeline order."""
     base = f"results/{wildcards.run}/benchmarks"
     tiles = [f"tiles/{chunk}" for chunk in PLAN.chunks] if config["shards"]["kind"] == "image" else []
-    views = [f"views/{shard}" for shard in PLAN.shards] if config["recognition"]["cache"] else []
+    sizes = sorted({pixels(scheme) for scheme in TRAINED}) if config["recognition"]["cache"] else []
+    views = [f"views/{size}/{shard}" for size in sizes for shard in PLAN.shards]
     names = [
         *(f"cloud/{subtype}" for subtype in SLUGS),
         *(f"motion/{chunk}" for chunk in PLAN.chunks),

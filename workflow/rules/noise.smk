@@ -8,6 +8,7 @@ rule noise:
         code=code("lowalt.noise"),
         motion="results/{run}/motion/{group}-{part}.csv",
         echoes=chunk_echoes,
+        powers=chunk_powers,
     output:
         "results/{run}/noisy/{group}-{part}.npy",
     log:
@@ -18,6 +19,7 @@ rule noise:
         "../../envs/environment.yaml"
     params:
         settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
+        powers=powers_option,
     shell:
         "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
-        " --echoes {input.echoes:q} --out {output:q} 2> {log:q}"
+        " --echoes {input.echoes:q} {params.powers} --out {output:q} 2> {log:q}"

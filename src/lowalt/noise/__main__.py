@@ -13,18 +13,24 @@ from lowalt.streams import stream
 
 
 def noisy_signals(
-    echoes: np.ndarray, rows: list[dict], stations: list[str], snrs: list[float], seed: int
+    echoes: np.ndarray,
+    rows: list[dict],
+    stations: list[str],
+    snrs: list[float],
+    seed: int,
+    powers: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations, models, N).
 
-    rows: the motion table. Each (subtype, model, station, SNR) has a noise stream of its own.
+    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default. Each (subtype, model, station, SNR) has a noise stream of its own.
     """
     result = np.empty((len(rows), len(snrs), len(stations), echoes.shape[-1]), np.complex64)
     for model, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
             for place, name in enumerate(stations):
                 rng = None if np.isposinf(snr_db) else stream(seed, "noise", row["subtype"], row["model"], name, snr_db)
-                result[model, level, place] = add_noise(echoes[place, model], snr_db, rng)
+                power = None if powers is None else float(powers[place, model])
+                result[model, level, place] = add_noise(echoes[place, model], snr_db, rng, power)
     return result
 
 
@@ -33,6 +39,7 @@ def main(arguments: list[str]) -> None:
     options = parser("lowalt.noise", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument("--echoes", nargs="+", required=True, help="clean echoes, one file a station")
+    options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station")
     options.add_argument("--out", required=True, help="noisy signals to write (.npy)")
     given = options.parse_args(arguments)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
@@ -43,7 +50,14 @@ def main(arguments: list[str]) -> None:
     for path, echo in zip(given.echoes, echoes, strict=True):
         if echo.ndim != 2 or len(echo) != len(rows) or echo.shape != echoes[0].shape:
             raise InputError(f"{path}: shape {echo.shape}, expected ({len(rows)}, symbols) as in {given.motion}")
-    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed)
+    powers = None
+    if given.powers:
+        if len(given.powers) != len(stations):
+            raise InputError(f"--powers: {len(given.powers)} files, expected one for each station of {stations}")
+        powers = np.stack([np.load(existing(path, "power")) for path in given.powers])
+        if powers.shape != (len(stations), len(rows)):
+            raise InputError(f"--powers: shape {powers.shape}, expected ({len(stations)}, {len(rows)})")
+    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers)
     with replacing(given.out) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {result.shape[0] * result.shape[1]} samples", file=sys.stderr)

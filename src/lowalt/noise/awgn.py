@@ -7,12 +7,15 @@ import numpy as np
 from lowalt.errors import InputError
 
 
-def add_noise(signal: np.ndarray, snr_db: float, rng: np.random.Generator | None) -> np.ndarray:
+def add_noise(
+    signal: np.ndarray, snr_db: float, rng: np.random.Generator | None, power: float | None = None
+) -> np.ndarray:
     """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 of the same shape (N,).
 
-    The noise power is mean |signal|^2 / 10^(snr_db / 10). At an SNR of +inf nothing is drawn and the signal comes
+    The noise power is `power` / 10^(snr_db / 10), by default of mean |signal|^2; give the target's own where the signal
+    holds more than its echo. At an SNR of +inf nothing is drawn and the signal comes
     back as it is; a signal of zeros has no power to set noise against and stays zeros.
-    Raises: InputError for an empty or non-finite signal, or an SNR that is NaN or -inf.
+    Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, or a negative power.
     Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.
     """
     signal = np.asarray(signal, dtype=np.complex128)
@@ -22,10 +25,12 @@ def add_noise(signal: np.ndarray, snr_db: float, rng: np.random.Generator | None
         raise InputError(f"noise: SNR is {snr_db} dB, expected a number or +inf")
     if snr_db == math.inf:
         return signal.copy()
+    if power is not None and not 0 <= power < math.inf:
+        raise InputError(f"noise: power is {power} W, expected a finite number >= 0")
     # Scaling by the peak first keeps the mean square of very small or large signals out of under- and overflow.
     peak = np.abs(signal).max()
-    if peak == 0:
+    if (peak if power is None else power) == 0:
         return signal.copy()
-    rms = peak * math.sqrt(np.mean(np.abs(signal / peak) ** 2))
+    rms = math.sqrt(power) if power is not None else peak * math.sqrt(np.mean(np.abs(signal / peak) ** 2))
     pair = rng.standard_normal((2, *signal.shape))
     return signal + rms * 10 ** (-snr_db / 20) * math.sqrt(0.5) * (pair[0] + 1j * pair[1])

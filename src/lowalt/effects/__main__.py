@@ -1,0 +1,65 @@
+"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals and reference powers."""
+
+import sys
+
+import numpy as np
+
+from lowalt.command import parser, pick, run
+from lowalt.effects.catalogue import called
+from lowalt.effects.chain import Scene, hear
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.motion import read_table
+from lowalt.network import Network
+from lowalt.targets.cloud import Cloud, read
+
+
+def signals(
+    scene: Scene, name: str, clouds: dict[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
+
+    occluders: each subtype's surfaces, where the scene hides points behind them.
+    Raises: InputError naming the sample where a subtype has no cloud or cannot be computed with.
+    """
+    station = scene.network.station(name)
+    result = np.empty((len(rows), scene.network.symbols), np.complex64)
+    power = np.empty(len(rows))
+    for index, row in enumerate(rows):
+        cloud = clouds.get(row["subtype"])
+        if cloud is None:
+            raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}")
+        heard = hear(scene, station, cloud, row, None if occluders is None else occluders.get(row["subtype"]))
+        result[index], power[index] = heard.signal, heard.power
+    return result, power
+
+
+def main(arguments: list[str]) -> None:
+    """Compute one chunk's signals at one station under the scene's effects."""
+    options = parser("lowalt.effects", __doc__)
+    options.add_argument("--motion", required=True, help="the chunk's motion table")
+    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
+    options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes")
+    options.add_argument("--station", required=True, help="name of the station that listens")
+    options.add_argument("--out", required=True, help="signals to write (.npy), complex64 (models, N)")
+    options.add_argument("--power", required=True, help="the echoes' own mean powers to write (.npy), (models,) W")
+    given = options.parse_args(arguments)
+    seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
+    scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
+    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    occluders = None
+    if given.occluders:
+        from lowalt.effects.channel.occlusion import read as read_occluders
+
+        occluders = {
+            cloud.subtype: read_occluders(path) for cloud, path in zip(clouds.values(), given.occluders, strict=True)
+        }
+    found, power = signals(scene, given.station, clouds, read_table(given.motion), occluders)
+    for path, values in ((given.out, found), (given.power, power)):
+        with replacing(path) as temporary:
+            np.save(temporary, values)
+        print(f"{path}: {len(values)} models", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run(main)

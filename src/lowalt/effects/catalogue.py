@@ -1,0 +1,85 @@
+"""All effects there are, in the order the chain applies them, and the loading of those a scene names.
+
+Only names live here: a module is imported when a scene calls for it, and never otherwise.
+"""
+
+import importlib
+from collections.abc import Iterable
+from types import ModuleType
+from typing import NamedTuple
+
+from lowalt.errors import InputError
+
+ORDER = (
+    "motion/rotor_spread",
+    "motion/gusts",
+    "channel/cross_sections",
+    "channel/occlusion",
+    "channel/ground_reflection",
+    "channel/squint",
+    "channel/wavefront",
+    "channel/symbol_motion",
+    "channel/clutter",
+    "receiver/receiver_noise",
+    "receiver/timing_offset",
+    "receiver/clock_offset",
+    "receiver/carrier_offset",
+    "receiver/phase_noise",
+    "receiver/iq_imbalance",
+    "receiver/adc",
+    "detection/canceller",
+    "detection/cell_error",
+)
+"""Place and name of every effect, in the order of the chain: motion, channel, receiver, detection."""
+PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
+"""Place of every effect by its name."""
+BY_NEED = ("squint", "wavefront", "symbol_motion")
+"""Physics beyond Eq. 7 that is left out where its bound allows it."""
+
+
+class Effect(NamedTuple):
+    """An effect a scene calls for: its module, and its parameters with the module's defaults filled in."""
+
+    name: str
+    place: str
+    module: ModuleType
+    settings: dict
+
+
+def dotted(name: str) -> str:
+    """Return the module of an effect, such as lowalt.effects.receiver.adc.
+
+    Raises: InputError for a name that is no effect.
+    """
+    if name not in PLACES:
+        raise InputError(f"effects: unknown effect {name!r}, expected some of {sorted(PLACES)}")
+    return f"lowalt.effects.{PLACES[name]}.{name}"
+
+
+def called(block: dict[str, dict | None]) -> list[Effect]:
+    """Return the effects of a scene's `effects` block in the chain's order, without those that are the identity.
+
+    Raises: InputError for an unknown effect or parameter.
+    """
+    modules = [dotted(name) for name in block]
+    found = dict(zip(block, map(importlib.import_module, modules), strict=True))
+    result = []
+    for entry in ORDER:
+        place, _, name = entry.partition("/")
+        if name not in found:
+            continue
+        module, given = found[name], block[name] or {}
+        unknown = sorted(set(given) - set(module.DEFAULTS))
+        if unknown:
+            raise InputError(
+                f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
+            )
+        settings = {**module.DEFAULTS, **given}
+        if not module.idle(settings):
+            result.append(Effect(name, place, module, settings))
+    return result
+
+
+def placed(effects: Iterable[Effect], *places: str) -> list[Effect]:
+    """Return the effects of these places, order kept."""
+    return [effect for effect in effects if effect.place in places]

@@ -1,0 +1,41 @@
+"""Beam squint: the arrays' phases follow each subcarrier's frequency, the beams' weights are set for the lowest one."""
+
+import numpy as np
+
+from lowalt.effects.view import View
+
+SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 (phase-steered arrays over a bandwidth)"
+DEFAULTS: dict[str, float] = {}
+FACTOR = {"squint": True}
+
+
+def idle(settings: dict) -> bool:
+    """Return False: named means asked for."""
+    return False
+
+
+def bound(settings: dict, view: View) -> np.ndarray:
+    """Return a bound of squint's change of any range cell, relative to the sum of peak amplitudes; shape (N, 1).
+
+    Element i of a row sees pi i x (kappa_m - kappa_k) more phase; averaged over elements that is half the row's end,
+    and out and back add. Direction cosines are bounded by the target's own and its extent.
+    """
+    network = view.network
+    span = (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
+    across, up = _cosines(view)
+    wide = 0.5 * (network.transmit[0] + network.receive[0] - 2)
+    high = 0.5 * (network.transmit[1] + network.receive[1] - 2)
+    return np.pi * span * (wide * across + high * up)[:, None]
+
+
+def _cosines(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of |Psi| and |Omega| over the target's points at each symbol, (N,) each."""
+    if view.reflected:
+        return np.ones(len(view.times_s)), np.ones(len(view.times_s))
+    d = view.middles[:, 0] - np.asarray(view.station.position_m)
+    r, extent = np.linalg.norm(d, axis=1), view.extent_m()
+    # Two unit vectors, of ranges r and at least r - extent, are at most 2 extent / (r + r - extent) apart.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        turn = np.where(extent < r, 2.0 * extent / (2.0 * r - extent), 2.0)
+        across, up = abs(d @ view.station.horizontal) / r, abs(d[:, 2]) / r
+    return np.minimum(np.nan_to_num(across, nan=1.0) + turn, 1.0), np.minimum(np.nan_to_num(up, nan=1.0) + turn, 1.0)

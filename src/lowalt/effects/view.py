@@ -1,0 +1,137 @@
+"""What one station sees of one moving target: poses, places and normals, each computed when first asked for."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from lowalt.echo import Rigid
+from lowalt.motion.poses import Perturbation, poses
+from lowalt.network import Network, Station
+from lowalt.targets.cloud import Cloud
+
+
+@dataclass(frozen=True)
+class View:
+    """A target's motion as one station sees it.
+
+    row: its row of the motion table; times_s: (N,) s; perturbations: what motion effects add, given at `grid_s`
+    (G,) s, which spans the look and one symbol more; occluders: a target's surfaces (see `channel.occlusion`) or None.
+    """
+
+    network: Network
+    station: Station
+    cloud: Cloud
+    row: dict
+    times_s: np.ndarray
+    tolerance: float | None = None
+    grid_s: np.ndarray | None = None
+    perturbations: tuple[Perturbation, ...] = ()
+    occluders: dict | None = field(default=None, repr=False)
+    reflected: bool = False
+    """Whether the station sees images of the points beside the points: their directions are then anywhere."""
+
+    @cached_property
+    def motion(self) -> Rigid:
+        """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points."""
+        moved = summed([_at(item, self.grid_s, self.times_s) for item in self.perturbations])
+        return Rigid(*poses(self.cloud, self.row, self.times_s, moved), self.cloud.points, self.cloud.part)
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Every point's place (N, L, 3) in metres, global frame."""
+        rotation, translation, points, part = self.motion
+        if self.nodes:
+            return translation
+        return _turned(rotation, points, part) + translation[:, part]
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
+        if self.nodes:
+            return np.full(self.places.shape, np.nan)
+        return _turned(self.motion.rotation, self.cloud.normals, self.motion.part)
+
+    @property
+    def nodes(self) -> bool:
+        """Whether the points are the nodes of a recording, which have places but no attitude."""
+        return "node" in self.cloud.kinds
+
+    @property
+    def aim_m(self) -> np.ndarray:
+        """Where both beams point: the target's origin at the first symbol, (3,) m."""
+        return np.array([self.row["x_m"], self.row["y_m"], self.row["z_m"]])
+
+    def at(self, times_s: np.ndarray) -> "View":
+        """Return the same target seen at other times (K,) s of the look."""
+        return replace(self, times_s=times_s)
+
+    @cached_property
+    def centres(self) -> np.ndarray:
+        """Middle (P, 3) of each part's points, in the part's own frame (m)."""
+        return np.array([0.5 * (box[0] + box[1]) for box in self._boxes])
+
+    @cached_property
+    def radii(self) -> np.ndarray:
+        """Largest distance (P,) of each part's points from the part's middle (m)."""
+        if self.nodes:
+            return np.zeros(len(self.cloud.kinds))
+        away = np.linalg.norm(self.cloud.points - self.centres[self.cloud.part], axis=1)
+        result = np.zeros(len(self.cloud.kinds))
+        np.maximum.at(result, self.cloud.part, away)
+        return result * (1 + 1e-12)
+
+    @cached_property
+    def middles(self) -> np.ndarray:
+        """Place (N, P, 3) of each part's middle at each symbol (m)."""
+        if self.nodes:
+            return self.motion.translation
+        return self.motion.translation + np.einsum("npij,pj->npi", self.motion.rotation, self.centres)
+
+    @cached_property
+    def _boxes(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        mine = [self.cloud.points[self.cloud.part == part] for part in range(len(self.cloud.kinds))]
+        return [(p.min(axis=0), p.max(axis=0)) if len(p) else (np.zeros(3), np.zeros(3)) for p in mine]
+
+    def extent_m(self) -> np.ndarray:
+        """Return a bound (N,) of how far any point is from the first part's middle (m)."""
+        return (np.linalg.norm(self.middles - self.middles[:, :1], axis=2) + self.radii).max(axis=1)
+
+    def nearest_m(self) -> np.ndarray:
+        """Return a lower bound (N, P) of the range of any point of each part (m)."""
+        centre = np.linalg.norm(self.middles - np.asarray(self.station.position_m), axis=2)
+        return np.maximum(centre - self.radii, 0.0)
+
+
+def _turned(rotation: np.ndarray, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """rotation[n, part[l]] @ vectors[l] for all n and l, part by part: (N, L, 3)."""
+    result = np.empty((len(rotation), len(vectors), 3))
+    for index in np.unique(part):
+        mine = part == index
+        result[:, mine] = vectors[mine] @ rotation[:, index].swapaxes(1, 2)
+    return result
+
+
+def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturbation:
+    """A perturbation at other times: linear between the symbols, exact on them."""
+
+    def table(values: np.ndarray | None) -> np.ndarray | None:
+        if values is None:
+            return None
+        return np.stack([np.interp(times_s, grid_s, values[:, axis]) for axis in range(3)], axis=1)
+
+    angles = {part: np.interp(times_s, grid_s, angle) for part, angle in item.angle_rad.items()}
+    return Perturbation(angles, table(item.offset_m), table(item.tilt_rad))
+
+
+def summed(items: list[Perturbation]) -> Perturbation | None:
+    """Return the sum of perturbations, None for none."""
+    if not items:
+        return None
+    angles: dict[int, np.ndarray] = {}
+    for item in items:
+        for part, angle in item.angle_rad.items():
+            angles[part] = angles[part] + angle if part in angles else angle
+    offsets = [item.offset_m for item in items if item.offset_m is not None]
+    tilts = [item.tilt_rad for item in items if item.tilt_rad is not None]
+    return Perturbation(angles, sum(offsets) if offsets else None, sum(tilts) if tilts else None)

@@ -1,0 +1,33 @@
+# Echo in a scene with effects: the signals one base station hears, and the powers of the targets' own echoes.
+# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
+# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
+
+
+rule echo:
+    input:
+        code=code("lowalt.effects", *effect_modules()),
+        motion="results/{run}/motion/{group}-{part}.csv",
+        clouds=group_clouds,
+        occluders=group_occluders,
+    output:
+        signals="results/{run}/echo/{group}-{part}/{station}.npy",
+        power="results/{run}/echo/{group}-{part}/{station}.power.npy",
+    log:
+        "results/{run}/logs/echo/{group}-{part}-{station}.log",
+    benchmark:
+        "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=canonical(
+            {
+                "seed": config["seed"],
+                "network": config["network"],
+                "tolerance": config["echo"]["tolerance"],
+                "effects": config["effects"],
+            }
+        ),
+        occluders=occluders_option,
+    shell:
+        "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
+        " {params.occluders} --station {wildcards.station} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
