@@ -67,6 +67,30 @@ def test_wrong_schemes_are_refused(tmp_path, line, words):
         schemes.read(path)
 
 
+def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
+    path = tmp_path / "schemes.csv"
+    head = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
+    path.write_text(f"{head}\nsmall,A,VT,mean,,seen,24,70,0.25\nplain,A,VT,mean,,seen,,,\n")
+    small, plain = schemes.read(path).values()
+    block = {"size": 48, "training": {"steps": 100, "batch": 4}, "seed": 1}
+    assert small.settled(block) == {"size": 24, "training": {"steps": 70, "batch": 4}, "seed": 1}
+    assert plain.settled(block) == block
+    assert (small.share, plain.share) == (0.25, 1.0)
+    for column, value in (("size", "4"), ("steps", "0"), ("share", "1.5"), ("share", "half")):
+        path.write_text(f"{','.join((*schemes.COLUMNS, column))}\nx,A,VT,mean,,seen,{value}\n")
+        with pytest.raises(InputError, match=f"{column} '{value}'"):
+            schemes.read(path)
+
+
+def test_a_share_takes_the_first_models_of_every_subtype_and_all_their_snrs():
+    found = facts(models=10)
+    for share, models in ((0.125, 1), (0.25, 2), (0.5, 5), (1.0, 10), (0.01, 1)):
+        kept = found.take(samples.first_models(found, share))
+        assert len(kept) == models * len(SUBTYPES) * len(SNRS)
+        assert set(kept.model.tolist()) == set(range(models))
+        assert set(kept.subtype.tolist()) == set(SUBTYPES)
+
+
 def test_protocols_never_share_a_fold_between_their_parts():
     everything = {(group, fold) for group in ("seen", "unseen") for fold in ("train", "val", "test")}
     for protocol, parts in protocols.FOLDS.items():

@@ -1,6 +1,7 @@
 # Recognition: freeze what was simulated, train every scheme in its protocols, predict, and make the tables.
 # REQUIRED INPUTS: results/{run}/shards/index.json and its shards, all clouds and motion tables
-# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions
+# OUTPUTS: results/{run}/models/, results/{run}/predictions/, results/{run}/accuracy.csv and its companions; where the
+#          configuration names other runs, results/{run}/transfer.csv: their models on this run's test samples
 
 
 rule views:
@@ -9,15 +10,15 @@ rule views:
         index="results/{run}/shards/index.json",
         shard="results/{run}/shards/{group}-{fold}-{part}.tar",
     output:
-        "results/{run}/views/{group}-{fold}-{part}.npz",
+        "results/{run}/views/{size}/{group}-{fold}-{part}.npz",
     log:
-        "results/{run}/logs/views/{group}-{fold}-{part}.log",
+        "results/{run}/logs/views/{size}/{group}-{fold}-{part}.log",
     benchmark:
-        "results/{run}/benchmarks/views/{group}-{fold}-{part}.jsonl"
+        "results/{run}/benchmarks/views/{size}/{group}-{fold}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"size": config["recognition"]["size"]}),
+        settings=lambda wildcards: canonical({"size": int(wildcards.size)}),
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
         " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
@@ -116,3 +117,55 @@ rule tables:
     shell:
         "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
         " --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"
+
+
+rule transfer_evaluate:
+    input:
+        unpack(sample_source),
+        code=code(
+            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+        ),
+        frozen="results/{run}/SHA256SUMS",
+        model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",
+    output:
+        table="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.csv",
+        about="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.json",
+    log:
+        "results/{run}/logs/transfer/{other}/{protocol}/{scheme}/{train_seed}.log",
+    benchmark:
+        "results/{run}/benchmarks/transfer/{other}/{protocol}/{scheme}/{train_seed}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        mem_mb=8000,
+    params:
+        settings=canonical(config["recognition"]["evaluation"]),
+        source=source_option,
+    shell:
+        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
+        " --frozen {input.frozen:q} --model {input.model:q} --trained-on {wildcards.other} --out {output.table:q} 2> {log:q}"
+
+
+rule transfer:
+    input:
+        code=code("lowalt.recognition", "lowalt.recognition.transfer"),
+        own=expand("results/{{run}}/predictions/{training}.csv", training=TRAININGS),
+        own_about=expand("results/{{run}}/predictions/{training}.json", training=TRAININGS),
+        other=expand("results/{{run}}/transfer/{other}/{training}.csv", other=OTHERS, training=TRAININGS),
+        other_about=expand("results/{{run}}/transfer/{other}/{training}.json", other=OTHERS, training=TRAININGS),
+        configs=expand("results/{name}/config.yaml", name=[RUN, *OTHERS]),
+        schemes=config["recognition"]["table"],
+    output:
+        "results/{run}/transfer.csv",
+    log:
+        "results/{run}/logs/transfer.log",
+    benchmark:
+        "results/{run}/benchmarks/transfer.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=canonical({"seed": config["seed"]}),
+    shell:
+        "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q} --other {input.other:q}"
+        " --configs {input.configs:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"

@@ -9,6 +9,7 @@ from lowalt.errors import InputError
 from lowalt.files import existing, replacing
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, Scheme, named, read
+from lowalt.yaml_files import load_yaml
 
 SCHEMES = "config/schemes.csv"
 
@@ -65,6 +66,7 @@ def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
+    from lowalt.recognition.samples import first_models
 
     line = parser("lowalt.recognition train", _train.__doc__)
     _sources(line)
@@ -76,11 +78,15 @@ def _train(arguments: list[str]) -> None:
     if given.frozen:
         verify(given.frozen)
     scheme = named(given.schemes, given.scheme)
-    size = given.settings.get("size")
+    pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation")
+    settings = scheme.settled(given.settings)
     samples = {
-        part: _open(given, folds(given.protocol, part), scheme, size, placed=False) for part in ("train", "validation")
+        part: _open(given, folds(given.protocol, part), scheme, settings["size"], placed=False)
+        for part in ("train", "validation")
     }
-    train(samples, scheme, given.protocol, given.settings, Path(given.out))
+    if scheme.share < 1:
+        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
+    train(samples, scheme, given.protocol, settings, Path(given.out))
 
 
 def _evaluate(arguments: list[str]) -> None:
@@ -91,6 +97,7 @@ def _evaluate(arguments: list[str]) -> None:
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     _sources(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), with the run's record beside (.json)")
     given = line.parse_args(arguments)
     if given.frozen:
@@ -98,7 +105,8 @@ def _evaluate(arguments: list[str]) -> None:
     trained = load(given.model)
     parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
     pairs = set().union(*(folds(trained.protocol, part) for part in parts))
-    evaluate(trained, _open(given, pairs, trained.scheme, trained.size, placed=True), given.settings, given.out)
+    found = _open(given, pairs, trained.scheme, trained.size, placed=True)
+    evaluate(trained, found, given.settings, given.out, given.trained_on)
 
 
 def _tables(arguments: list[str]) -> None:
@@ -112,6 +120,26 @@ def _tables(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
     tables.write([tables.Run(path) for path in given.predictions], list(read(given.schemes)), given.out, seed)
+
+
+def _transfer(arguments: list[str]) -> None:
+    """Compare models of other runs with this run's own on its test samples. Settings: seed."""
+    from lowalt.recognition import transfer
+    from lowalt.recognition.tables import Run
+
+    line = parser("lowalt.recognition transfer", _transfer.__doc__)
+    line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")
+    line.add_argument("--other", nargs="+", required=True, help="of other runs' models, evaluated with --trained-on")
+    line.add_argument("--configs", nargs="+", required=True, help="configuration of this run, then of the others")
+    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    given = line.parse_args(arguments)
+    (seed,) = pick(given.settings, "seed")
+    first, *others = map(load_yaml, given.configs)
+    for other in others:
+        transfer.check_folds(first, other)
+    own, other = ([Run(path) for path in paths] for paths in (given.own, given.other))
+    transfer.write(own, other, list(read(given.schemes)), given.out, seed)
 
 
 def _score(arguments: list[str]) -> None:
@@ -155,7 +183,8 @@ def _export(arguments: list[str]) -> None:
 
 
 COMMANDS = {
-    "views": _views, "freeze": _freeze, "train": _train, "evaluate": _evaluate, "tables": _tables, "score": _score,
+    "views": _views, "freeze": _freeze, "train": _train, "evaluate": _evaluate, "tables": _tables,
+    "transfer": _transfer, "score": _score,
     "predict": _predict, "export": _export,
 }  # fmt: skip
 

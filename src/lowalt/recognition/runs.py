@@ -54,9 +54,9 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
     resumed = trainer.resume()
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
-    start, steps = time.monotonic(), trainer.at.steps
+    start, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
     at = trainer.fit()
-    seconds = time.monotonic() - start
+    seconds, busy = time.monotonic() - start, time.process_time() - busy
     trainer.finish({
         "scheme": asdict(scheme), "protocol": protocol, "network": settings["network"], "size": settings["size"],
         "seed": settings["seed"], "colour_map": settings["colour_map"],
@@ -67,6 +67,7 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
             "backbone": scheme.backbone or settings["network"]["backbone"], "weights": settings["network"]["weights"],
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
+            "train_processor_s": busy, "size": settings["size"], "steps": at.steps, "batch": block["batch"],
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
             "precision": machine.precision,
             "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
@@ -108,10 +109,11 @@ def load(path: str | Path) -> Trained:
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path))
 
 
-def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path) -> None:
+def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "") -> None:
     """Write the predictions for all samples of a source, and beside them the run's record (.json).
 
-    settings: {batch, threads, precision}. Under torchrun the ranks share the work and rank 0 writes.
+    settings: {batch, threads, precision}; trained_on: the run that trained the model, where it is another.
+    Under torchrun the ranks share the work and rank 0 writes.
     """
     batch, threads, precision = pick(settings, "batch", "threads", "precision")
     recipe.seeded(trained.seed, ("evaluate",), threads)
@@ -128,6 +130,7 @@ def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
         "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
+        "trained_on": trained_on,
     })  # fmt: skip
 
 

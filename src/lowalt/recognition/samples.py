@@ -50,6 +50,21 @@ def joined(parts: list[Facts]) -> Facts:
     return Facts(*(np.concatenate([getattr(part, name) for part in parts]) for name in FACTS))
 
 
+def first_models(facts: Facts, share: float) -> np.ndarray:
+    """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one a subtype.
+
+    Models are drawn independently of each other, so the first of them are as good a sample as any; a smaller share lies
+    inside a larger one.
+    """
+    chosen = np.zeros(len(facts), dtype=bool)
+    for subtype in np.unique(facts.subtype):
+        mine = facts.subtype == subtype
+        models = np.unique(facts.model[mine])
+        kept = models[: max(1, round(share * len(models)))]
+        chosen |= mine & np.isin(facts.model, kept)
+    return np.flatnonzero(chosen)
+
+
 class ViewSamples:
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
@@ -78,6 +93,10 @@ class ViewSamples:
             images[number] = None
         self.facts = joined(facts)
         self.size = self.images.shape[-1]
+
+    def keep(self, numbers: np.ndarray) -> None:
+        """Drop all samples but those at `numbers`."""
+        self.images, self.facts = self.images[numbers], self.facts.take(numbers)
 
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""

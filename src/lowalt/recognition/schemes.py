@@ -8,6 +8,12 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
     fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
     protocols   protocols of the paper's tables that hold this row, joined by "+"
+
+A table may have more columns, which a row leaves empty to take the configuration's own:
+
+    size        pixels a side the network sees
+    steps       optimiser steps
+    share       share of the motion models of each subtype that train, 0..1 (empty: all)
 """
 
 import csv
@@ -22,11 +28,13 @@ SPECTRA = ("VRP", "TRP", "VT")
 FUSIONS = ("attention", "mean")
 PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
+OPTIONAL = ("size", "steps", "share")
 
 
 @dataclass(frozen=True)
 class Scheme:
-    """One row: `stations` and `spectra` are index tuples into STATIONS and SPECTRA."""
+    """One row: `stations` and `spectra` are index tuples into STATIONS and SPECTRA; size and steps are 0 where the
+    row leaves them to the configuration."""
 
     name: str
     stations: tuple[int, ...]
@@ -34,6 +42,14 @@ class Scheme:
     fusion: str = "attention"
     backbone: str = ""
     protocols: tuple[str, ...] = PROTOCOLS
+    size: int = 0
+    steps: int = 0
+    share: float = 1.0
+
+    def settled(self, settings: dict) -> dict:
+        """Return the settings of a training with this row's own size and steps in them."""
+        training = {**settings["training"], **({"steps": self.steps} if self.steps else {})}
+        return {**settings, "size": self.size or settings["size"], "training": training}
 
     @property
     def slug(self) -> str:
@@ -52,13 +68,27 @@ def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, whe
     return tuple(sorted(known.index(part) for part in parts))
 
 
+def _number(row: dict, column: str, kind: type, low: float, high: float, where: str) -> float:
+    text = row.get(column) or ""
+    if not text:
+        return 1.0 if column == "share" else 0
+    try:
+        value = kind(text)
+    except ValueError:
+        value = -1
+    if not low <= value <= high:
+        raise InputError(f"{where}: {column} {text!r}, expected nothing or a number in {low:g}..{high:g}")
+    return value
+
+
 def scheme(row: dict, where: str) -> Scheme:
     """Return the scheme of one table row (all values are strings).
 
     Raises: InputError naming `where`, the column and the value.
     """
-    if set(row) != set(COLUMNS):
-        raise InputError(f"{where}: columns {sorted(map(str, row))}, expected {list(COLUMNS)}")
+    if set(row) - set(OPTIONAL) != set(COLUMNS):
+        found = sorted(map(str, row))
+        raise InputError(f"{where}: columns {found}, expected {list(COLUMNS)}, perhaps {list(OPTIONAL)}")
     if row["fusion"] not in FUSIONS:
         raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
     protocols = tuple(row["protocols"].split("+"))
@@ -70,6 +100,9 @@ def scheme(row: dict, where: str) -> Scheme:
         fusion=row["fusion"],
         backbone=row["backbone"],
         protocols=protocols,
+        size=int(_number(row, "size", int, 8, 4096, where)),
+        steps=int(_number(row, "steps", int, 1, 1e9, where)),
+        share=float(_number(row, "share", float, 1e-6, 1.0, where)),
     )
 
 

@@ -59,7 +59,7 @@ class Run:
         try:
             about = json.loads(side.read_text())
             self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
-            self.hardware = about["hardware"]
+            self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"{side}: not a run record ({error!r})") from error
         self.all = predictions.read(path)

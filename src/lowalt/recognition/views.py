@@ -117,6 +117,10 @@ class ShardSamples:
             raise InputError(f"{index}: no samples of {sorted(folds)}")
         self.facts = facts_of(self.shards, self.numbers, placed)
 
+    def keep(self, numbers: np.ndarray) -> None:
+        """Drop all samples but those at `numbers`."""
+        self.numbers, self.facts = self.numbers[numbers], self.facts.take(numbers)
+
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         chosen = (self.size, self.stations, self.spectra)

@@ -1,0 +1,85 @@
+"""Models of other runs on this run's test samples, beside this run's own: what training on other data costs or gives.
+
+Samples are compared pairwise: the same test samples, once as this run's model sees them and once as the other's does.
+
+transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over the SNRs):
+    trained_on                   the other run
+    accuracy_percent             of the other run's model on this run's test samples, several seeds averaged
+    own_percent                  of this run's own model
+    difference_points, low, high other less own, with the 95 % interval that resamples whole motion models
+    samples, hardware            of this run's test part
+"""
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.recognition.statistics import bootstrap
+from lowalt.recognition.tables import Run, snr_text
+from lowalt.streams import stream
+
+COLUMNS = (
+    "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",
+    "samples", "hardware",
+)  # fmt: skip
+
+
+def check_folds(own: dict, other: dict) -> None:
+    """Refuse a pair of configurations in which a motion model may train in the other run and test in this one.
+
+    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds, only equal splits put
+    the same motion models apart; with other seeds the motion models themselves are others.
+    Raises: InputError naming both splits.
+    """
+    if own["seed"] == other["seed"] and own["split"] != other["split"]:
+        raise InputError(
+            f"transfer: run {other['run']!r} has the same seed {own['seed']} and split {other['split']}, this run has "
+            f"{own['split']}; motion models tested here may have trained there. Expected equal splits"
+        )
+
+
+def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterable[list]:
+    """Yield rows [snr_db, accuracy, own, difference, low, high, samples, hardware], percent and points, of one scheme.
+
+    own, other: runs (seeds) of the two models; name: the other run, which keys the bootstrap's stream with `seed`.
+    Raises: InputError where they were tested on different samples.
+    """
+    test = own[0].test
+    for run in (*own, *other):
+        if not np.array_equal(run.test.key, test.key):
+            raise InputError(f"transfer: {run.scheme} of {name} was tested on other samples than this run's own")
+    mine, theirs = (np.mean([run.test.correct for run in runs], axis=0) for runs in (own, other))
+    snrs = np.unique(test.snr_db).tolist()
+    # Averages are means over the SNRs, as everywhere; every SNR has the same samples here.
+    for snr in (*snrs, None):
+        rows = slice(None) if snr is None else test.snr_db == snr
+        word = "avg" if snr is None else snr_text(snr)
+        generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
+        interval = bootstrap(test.motion[rows], (theirs - mine)[rows], generator)
+        numbers = (theirs[rows].mean(), mine[rows].mean(), *interval)
+        yield [word, *(f"{100 * value:.4f}" for value in numbers), len(mine[rows]), own[0].hardware]
+
+
+def write(own: list[Run], other: list[Run], order: list[str], out: str | Path, seed: int) -> None:
+    """Write transfer.csv; schemes stand in `order`, protocols seen first. `other` runs say which run trained them.
+
+    Raises: InputError where a model has no counterpart in this run.
+    """
+    mine, theirs = {}, {}
+    for run in own:
+        mine.setdefault((run.protocol, run.scheme), []).append(run)
+    for run in other:
+        theirs.setdefault((run.protocol, run.scheme, run.trained_on), []).append(run)
+    lines = []
+    for key in sorted(theirs, key=lambda key: (key[0], order.index(key[1]))):
+        if key[:2] not in mine:
+            raise InputError(f"transfer: {key[2]} has {key[1]} in the {key[0]} protocol, this run has not")
+        lines += [[*key, *row] for row in comparison(mine[key[:2]], theirs[key], key[2], seed)]
+    with replacing(out) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(lines)
