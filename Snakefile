@@ -24,6 +24,7 @@ localrules:
     clouds,
     signals,
     data,
+    models,
     cost,
 
 
@@ -51,6 +52,12 @@ rule data:
     input:
         f"results/{RUN}/shards/index.json",
         f"results/{RUN}/shards/README.md",
+
+
+rule models:
+    input:
+        expand("results/{run}/models/{training}/model.pt", run=RUN, training=TRAININGS),
+        f"results/{RUN}/config.yaml",
 
 
 rule cost:
