@@ -69,7 +69,10 @@ def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Gene
     leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
     """
     if settings["kind"] == "mean":
-        return cells - cells.mean(axis=0)
+        # Differences to the first symbol first: what stands still is then zero to the last bit, not to N roundings.
+        moved = cells - cells[:1]
+        moved -= moved.mean(axis=0)
+        return moved
     if settings["kind"] == "pulse":
         for _ in range(settings["order"]):
             cells = _step(cells)

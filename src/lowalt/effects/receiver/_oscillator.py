@@ -1,8 +1,8 @@
 """Phase noise of a given spectrum at the scattered instants of a look: N symbols of M samples, long pauses between.
 
 The spectrum is split by smooth windows that add up to one. Below 16 / T_r it is a sum of lines 1 / (2 N T_r) apart,
-each with a Gaussian amplitude: exact from symbol to symbol, and inside a symbol interpolated to 1e-9. Above, two symbols
-are independent, and the M samples of each are Gaussian with exactly the covariance of that part of the spectrum.
+each with a Gaussian amplitude: exact from symbol to symbol, and inside a symbol interpolated to 1e-9. Above, two
+symbols are independent, and the M samples of each are Gaussian with just the covariance of that part of the spectrum.
 Source: D. B. Percival, A. T. Walden, Spectral Analysis for Univariate Time Series, 2020, ch. 11 (simulation by lines).
 """
 

@@ -65,8 +65,16 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     early = -rate / (1 + rate)
     tones = np.fft.fft(samples, axis=1) / samples.shape[1]
     baseband = np.fft.ifftshift(frame.baseband_hz)
-    tones *= turned(2 * np.pi * early * np.outer(frame.symbol_times_s, baseband))
-    return tones @ (_roots(len(baseband)) * turned(2 * np.pi * early * np.outer(baseband, frame.sample_times_s)))
+    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones))
+    return tones @ (_roots(len(baseband)) * _turns(early * frame.sample_s * baseband, len(baseband)).T)
+
+
+def _turns(turns: np.ndarray, count: int) -> np.ndarray:
+    """exp(j 2 pi n turns[m]) for n < count: (count, M), as products of a coarse and a fine step in n."""
+    step = math.isqrt(count) + 1
+    fine = turned(2 * np.pi * np.outer(np.arange(step), turns))
+    coarse = turned(2 * np.pi * np.outer(np.arange(0, count, step), turns))
+    return (coarse[:, None] * fine).reshape(-1, len(turns))[:count]
 
 
 @lru_cache(maxsize=4)
