@@ -120,7 +120,7 @@ def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturba
             return None
         return np.stack([np.interp(times_s, grid_s, values[:, axis]) for axis in range(3)], axis=1)
 
-    angles = {part: np.interp(times_s, grid_s, angle) for part, angle in item.angle_rad.items()}
+    angles = {part: np.interp(times_s, grid_s, angle) for part, angle in (item.angle_rad or {}).items()}
     return Perturbation(angles, table(item.offset_m), table(item.tilt_rad))
 
 
@@ -130,7 +130,7 @@ def summed(items: list[Perturbation]) -> Perturbation | None:
         return None
     angles: dict[int, np.ndarray] = {}
     for item in items:
-        for part, angle in item.angle_rad.items():
+        for part, angle in (item.angle_rad or {}).items():
             angles[part] = angles[part] + angle if part in angles else angle
     offsets = [item.offset_m for item in items if item.offset_m is not None]
     tilts = [item.tilt_rad for item in items if item.tilt_rad is not None]

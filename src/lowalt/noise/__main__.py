@@ -22,7 +22,8 @@ def noisy_signals(
 ) -> np.ndarray:
     """Return noisy signals (models, snrs, stations, N) complex64 of clean `echoes` (stations, models, N).
 
-    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default. Each (subtype, model, station, SNR) has a noise stream of its own.
+    rows: the motion table; powers: (stations, models) W that SNRs refer to, each echo's own by default.
+    Each (subtype, model, station, SNR) has a noise stream of its own.
     """
     result = np.empty((len(rows), len(snrs), len(stations), echoes.shape[-1]), np.complex64)
     for model, row in enumerate(rows):

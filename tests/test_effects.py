@@ -1,0 +1,280 @@
+"""Effects as a whole: the chain against a slow truth, nothing unasked, streams of their own, physics by need."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import reference_effects
+from lowalt.echo import echo_signal, subcarrier_matrix
+from lowalt.effects import need, waveform
+from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
+from lowalt.effects.chain import Scene, hear, observe
+from lowalt.effects.facts import check
+from lowalt.effects.response import Way, response
+from lowalt.errors import InputError
+from lowalt.motion.table import NUMBERS
+from lowalt.network import Network, Station
+from lowalt.streams import stream
+from lowalt.targets.cloud import Cloud
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)
+
+
+def network(**changes) -> Network:
+    """A small network of one station at 10 m height."""
+    values = {
+        "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 32, "guard_subcarriers": 10,
+        "symbol_interval_s": 2.5e-3, "symbols": 24, "transmit": (4, 2), "receive": (4, 2), "power": 1.0,
+    }  # fmt: skip
+    values |= changes
+    place = values.pop("place", (0.0, 0.0, 10.0))
+    return Network(**values, stations=(Station("A", place, 0.3, values["carrier_hz"]),))
+
+
+def target(rng, points=9, size_m=0.5, wheel_hz=0.0):
+    """A cloud of a body and a rotor with random points, and its row of the motion table."""
+    part = (np.arange(points) % 2).astype(np.int64)
+    cloud = Cloud(
+        points=rng.uniform(-size_m, size_m, (points, 3)), part=part, kinds=("body", "rotor"), names=("body", "rotor 0"),
+        parents=np.array([-1, -1]), hinges=np.array([[np.nan] * 3, [0.1, 0.0, 0.0]]),
+        axes=np.array([[np.nan] * 3, [0.0, 0.0, 1.0]]), normals=np.full((points, 3), np.nan),
+        rcs_m2=rng.uniform(0.1, 2.0, points),
+        record={"subtype": "Thing", "category": "UAV", "source": "test", "checksum": ""},
+    )  # fmt: skip
+    row = dict.fromkeys(NUMBERS, np.nan) | {
+        "subtype": "Thing", "category": "UAV", "group": "seen", "model": 3, "x_m": 60.0, "y_m": 25.0, "z_m": 30.0,
+        "vx_mps": 5.0, "vy_mps": -3.0, "vz_mps": 1.0, "yaw_rad": 0.7, "pitch_rad": 0.1, "roll_rad": -0.1,
+        "rate_hz": wheel_hz or 60.0, "phase_0_rad": 0.4,
+    }  # fmt: skip
+    return cloud, row
+
+
+def scene(effects, tolerance=None, radio=None):
+    return Scene(radio or network(), 5, tolerance, tuple(called(effects)))
+
+
+def relative(value, truth):
+    return abs(value - truth).max() / abs(truth).max()
+
+
+@pytest.mark.parametrize("shapes", [((4, 2), (4, 2)), ((3, 2), (5, 1))])
+@pytest.mark.parametrize("squint, wavefront", [(False, False), (True, False), (False, True), (True, True)])
+def test_response_is_the_sum_over_every_element_route_and_subcarrier(rng, shapes, squint, wavefront):
+    radio = network(subcarriers=17, symbols=3, transmit=shapes[0], receive=shapes[1])
+    station = radio.stations[0]
+    places = np.array([12.0, 3.0, 14.0]) + rng.normal(size=(3, 5, 3))
+    rcs, aim, factor = rng.uniform(0.1, 2, 5), np.array([12.0, 3.0, 14.0]), rng.uniform(0, 1, (3, 5))
+    image, coefficient = places * [1, 1, -1], rng.normal(size=(3, 5)) + 1j * rng.normal(size=(3, 5))
+    ours = response(
+        radio, station, places, rcs, aim, ways=[Way(image, coefficient)], factor=factor, squint=squint,
+        wavefront=wavefront,
+    )  # fmt: skip
+    truth = reference_effects.subcarriers(
+        radio, station, places, rcs, aim, [(image, coefficient)], factor, squint, wavefront
+    )
+    assert relative(ours, truth) < 2e-12
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(1, 300), st.floats(5.0, 5e4), st.floats(0.01, 40.0), st.integers(0, 2**32 - 1))
+def test_response_agrees_with_the_echo_kernel_at_any_range_and_size(count, range_m, size_m, seed):
+    rng = np.random.default_rng(seed)
+    radio = network(subcarriers=count, symbols=3)
+    station, aim = radio.stations[0], np.array([range_m, 0.3 * range_m, 20.0])
+    places = aim + rng.uniform(-min(size_m, range_m / 3), min(size_m, range_m / 3), (3, 6, 3))
+    ours = response(radio, station, places, np.ones(6), aim)
+    assert relative(ours, subcarrier_matrix(radio, station, places, 1.0, aim)) < 1e-10
+
+
+def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):
+    radio = network(subcarriers=16, symbols=2, transmit=(2, 2), receive=(2, 2))
+    station = radio.stations[0]
+    cloud, row = target(rng, points=5, wheel_hz=500.0)
+    called_for = scene({"symbol_motion": {}}, None, radio)
+    ours = hear(called_for, station, cloud, row)
+    view = observe(called_for, station, cloud, row)
+    sent = waveform.sent(stream(5, "effect", "waveform", "Thing", 3, "A"), 2, 16)
+    truth = reference_effects.moving(
+        radio, station, lambda t: view.at(np.array([t])).places, cloud.rcs_m2, view.aim_m, radio.times_s, sent
+    )
+    cells = np.fft.ifft(truth, axis=1)
+    assert relative(ours.signal, cells[[0, 1], abs(cells).argmax(axis=1)]) < 1e-10
+    still = hear(scene({}, None, radio), station, cloud, row)
+    assert relative(ours.signal, still.signal) > 1e-3
+
+
+def test_the_catalogue_names_every_effect_module_and_only_those():
+    for entry in ORDER:
+        module = __import__(dotted(entry.partition("/")[2]), fromlist=["idle"])
+        assert module.SOURCE and isinstance(module.DEFAULTS, dict) and callable(module.idle)
+        work = {"motion": ("perturb",), "channel": ("visible", "ways", "scatter", "bound"), "receiver": ("receive",),
+                "detection": ("process", "choose")}[PLACES[entry.partition("/")[2]]]  # fmt: skip
+        assert sum(hasattr(module, name) for name in work) == 1
+    assert len(set(ORDER)) == len(ORDER)
+
+
+@pytest.mark.parametrize("name", [None, *sorted(PLACES)])
+def test_what_no_scene_names_is_not_imported(name):
+    block = {} if name is None else {name: {}}
+    program = (
+        "import sys, lowalt.echo.__main__, lowalt.effects.__main__, lowalt.noise.__main__\n"
+        f"from lowalt.effects.catalogue import called; called({block!r})\n"
+        "names = [n for n in sys.modules if n.startswith('lowalt.effects.') and n.count('.') == 3]\n"
+        "print(*(n.rpartition('.')[2] for n in names))"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert {other for other in run.stdout.split() if other in PLACES} == ({name} if name else set())
+
+
+def test_a_run_without_effects_imports_nothing_of_them():
+    program = "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "False"
+
+
+def test_idle_effects_leave_every_bit(rng):
+    cloud, row = target(rng)
+    station = network().stations[0]
+    idle = {"adc": {"bits": 0}, "receiver_noise": {"temperature_k": 0.0}}
+    assert called(idle) == []
+    plain = echo_signal(network(), station, observe(scene({}), station, cloud, row).motion, cloud.rcs_m2, [60, 25, 30])
+    heard = hear(scene(idle), station, cloud, row)
+    assert (heard.signal == plain.signal).all() and (heard.cell == plain.cell).all()
+
+
+def test_adding_an_effect_moves_no_other_draw(rng):
+    cloud, row = target(rng)
+    station = network().stations[0]
+    drawn = {}
+    for effects in (
+        {"receiver_noise": {}},
+        {"receiver_noise": {}, "iq_imbalance": {"gain_db": 1e-9, "phase_deg": 0.0}},
+    ):
+        drawn[len(effects)] = hear(scene(effects), station, cloud, row).signal
+    silent = hear(scene({}), station, cloud, row).signal
+    assert relative(drawn[2], drawn[1]) < 1e-9 < relative(drawn[1], silent)
+
+
+def test_unknown_effects_and_parameters_are_named():
+    with pytest.raises(InputError, match="unknown effect 'rain'"):
+        called({"rain": {}})
+    with pytest.raises(InputError, match=r"effects.adc: unknown parameter\(s\) \['bytes'\]"):
+        called({"adc": {"bytes": 3}})
+
+
+def test_a_link_budget_and_set_snrs_are_refused_together():
+    block = {"carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 32, "guard_subcarriers": 10,
+             "symbol_interval_s": 2.5e-3, "symbols": 24, "transmit_array": [4, 2], "receive_array": [4, 2],
+             "power_w": 1.0, "stations": {"A": {"position_m": [0, 0, 10], "normal_deg": 0}}}  # fmt: skip
+    config = {
+        "network": block,
+        "effects": {"receiver_noise": {}},
+        "noise": {"snr_db": [3]},
+        "echo": {"tolerance": None},
+    }
+    with pytest.raises(InputError, match="link budget or set SNRs, not both"):
+        check(config)
+    check(config | {"noise": {"snr_db": [float("inf")]}})
+    with pytest.raises(InputError, match="no clutter to cancel"):
+        check(config | {"effects": {"canceller": {}}})
+
+
+def whole(effects, radio, station, cloud, row):
+    """Signals with everything the scene asks for computed."""
+    return hear(scene(effects, None, radio), station, cloud, row)
+
+
+def random_case(rng):
+    """A scene over the configuration space: range, size, points, arrays, carrier, speed, tolerance, effects asked."""
+    carrier = 10 ** rng.uniform(9, 10.5)
+    shape = tuple(int(v) for v in rng.integers(1, 9, 2))
+    radio = network(
+        carrier_hz=carrier, subcarriers=int(rng.integers(1, 65)), symbols=12, transmit=shape,
+        receive=shape if rng.random() < 0.5 else tuple(int(v) for v in rng.integers(1, 9, 2)),
+    )  # fmt: skip
+    points = int(rng.choice([2, 3, 6, 20]))
+    cloud, row = target(rng, points, 10 ** rng.uniform(-3, 0.3), wheel_hz=10 ** rng.uniform(-1, 2.3))
+    range_m, angle = 10 ** rng.uniform(0.9, 4), rng.uniform(-1.4, 1.4)
+    row |= {
+        "x_m": range_m * np.cos(angle),
+        "y_m": range_m * np.sin(angle),
+        "z_m": 10.0 + range_m * rng.uniform(-0.3, 1),
+    }
+    speed = 10 ** rng.uniform(-2, 1.5)
+    row |= {"vx_mps": speed * rng.normal(), "vy_mps": speed * rng.normal(), "vz_mps": 0.0}
+    asked = [name for name in BY_NEED if rng.random() < 0.6] or [str(rng.choice(BY_NEED))]
+    return radio, cloud, row, {name: {} for name in asked}, 10 ** rng.uniform(-4, -0.5)
+
+
+def scenes_within_tolerance(count, seed):
+    """(decisions to leave out, decisions to compute) over random scenes, each held to its tolerance."""
+    out = computed = 0
+    for index in range(count):
+        rng = np.random.default_rng([seed, index])
+        radio, cloud, row, effects, tolerance = random_case(rng)
+        station = radio.stations[0]
+        heard = hear(scene(effects, tolerance, radio), station, cloud, row)
+        truth = whole(effects, radio, station, cloud, row)
+        error = abs(heard.signal - truth.signal).max() / abs(truth.signal).max()
+        assert error <= tolerance, (index, effects, tolerance, error, heard.decisions)
+        out += sum(not decision.computed for decision in heard.decisions)
+        computed += sum(decision.computed for decision in heard.decisions)
+    return out, computed
+
+
+def test_whatever_is_left_out_changes_less_than_the_tolerance():
+    out, computed = scenes_within_tolerance(60, 1)
+    assert out > 10 and computed > 10
+
+
+@pytest.mark.slow
+def test_whatever_is_left_out_changes_less_than_the_tolerance_in_1000_scenes():
+    out, computed = scenes_within_tolerance(1000, 2)
+    print(f"1000 scenes: {out} decisions to leave out, {computed} to compute")
+    assert out > 200 and computed > 200
+
+
+AHEAD = {"x_m": 300.0 * np.cos(0.3), "y_m": 300.0 * np.sin(0.3), "z_m": 10.0}
+SWITCHES = {
+    "squint": (1e-3, {"x_m": 10.0, "y_m": 300.0, "z_m": 10.0}, AHEAD),
+    "wavefront": (2e-2, {"x_m": 12.0, "y_m": 4.0, "z_m": 12.0}, {"x_m": 9000.0, "y_m": 3000.0, "z_m": 400.0}),
+    "symbol_motion": (2e-2, {"vx_mps": 60.0}, {"vx_mps": 1e-3, "vy_mps": 0.0, "vz_mps": 0.0, "rate_hz": 0.01}),
+}
+
+
+@pytest.mark.parametrize("name", BY_NEED)
+def test_every_bound_switches_its_effect_on_and_off(rng, name):
+    cloud, row = target(rng, points=2, size_m=0.01)
+    row |= {"vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0}
+    tolerance, near, far = SWITCHES[name]
+    station = network().stations[0]
+    on, off = (hear(scene({name: {}}, tolerance), station, cloud, row | change).decisions[0] for change in (near, far))
+    assert on.computed and not off.computed
+    assert on.bound > tolerance > off.bound > 0
+
+
+def test_with_no_tolerance_everything_asked_for_is_computed(rng):
+    cloud, row = target(rng)
+    heard = hear(scene({name: {} for name in BY_NEED}), network().stations[0], cloud, row)
+    assert [decision.computed for decision in heard.decisions] == [True] * len(BY_NEED)
+
+
+def test_a_discontinuous_receiver_lets_nothing_be_left_out(rng):
+    cloud, row = target(rng)
+    row |= {"x_m": 9000.0}
+    station = network().stations[0]
+    assert not hear(scene({"wavefront": {}}, 0.1), station, cloud, row).decisions[0].computed
+    assert hear(scene({"wavefront": {}, "adc": {}}, 0.1), station, cloud, row).decisions[0].computed
+
+
+def test_smallest_bounds_are_left_out_first_and_together_keep_the_tolerance():
+    assert need.leave_out({"a": 0.5, "b": 0.01, "c": 0.02}, 0.1, 1.0) == (["b", "c"], 0.03)
+    assert need.leave_out({"a": 0.5, "b": 0.03, "c": 0.04}, 0.1, 1.0) == (["b"], 0.03)
+    assert need.leave_out({"a": 0.5}, None, 1.0) == ([], 0.0)
