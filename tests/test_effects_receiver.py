@@ -1,17 +1,20 @@
 """Receiver effects: what is set is read back from the signal, against closed forms and slow sums."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 
+import jsonschema
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import j0
 
 from effects_frames import frame, heard, network, point
 from lowalt.effects import waveform
-from lowalt.effects.catalogue import called
+from lowalt.effects.catalogue import ORDER, called
 from lowalt.effects.receiver import (
     _offsets,
     _oscillator,
@@ -93,6 +96,16 @@ def test_data_is_qpsk_of_unit_modulus():
 
 
 # All effects
+
+
+@pytest.mark.parametrize("name", [entry.partition("/")[2] for entry in ORDER if entry[:3] in ("rec", "det")])
+def test_defaults_are_what_the_schema_describes_and_allows(name):
+    text = (Path(__file__).parent.parent / "workflow/schemas/config.schema.yaml").read_text()
+    block = yaml.safe_load(text)["properties"]["effects"]["properties"][name]
+    (effect,) = called({name: {}})
+    assert set(block["properties"]) == set(effect.module.DEFAULTS)
+    assert all(item["description"] for item in (block, *block["properties"].values()))
+    jsonschema.validate(effect.module.DEFAULTS, block)
 
 
 @pytest.mark.parametrize(("module", "given"), IDLE)
@@ -474,6 +487,19 @@ def test_coherence_falls_as_a_gaussian_phase_says():
     points = ((1.0, 10 * math.log10(1.0 / (256 * 120e3))),)
     turn = np.exp(1j * drawn(points, seeds=3))
     assert abs(turn.mean()) == pytest.approx(math.exp(-0.5), rel=0.01)
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(-1, 9), st.floats(-300, 60)), min_size=1, max_size=6, unique_by=lambda p: round(p[0], 2)
+    ),
+    st.sampled_from([None, 0.0, 1e-10, 3e-6, 1e-3]),
+)
+def test_no_spectrum_breaks_the_synthesis(pairs, delay_s):
+    points = tuple((10**offset, level) for offset, level in sorted(pairs))
+    look = (5, 32, 2.5e-3, 1 / (32 * 120e3))
+    assert np.isfinite(_oscillator.phase(points, look, delay_s, np.random.default_rng(1))).all()
 
 
 @pytest.mark.parametrize(

@@ -127,9 +127,11 @@ def _twist(at_key: tuple) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
-    """Lower Cholesky root (M, M) of the fast part's covariance."""
+def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | None:
+    """Lower Cholesky root (M, M) of the fast part's covariance, None where there is no fast part."""
     lags = covariance(points, grid(*at_key), delay_s)
+    if lags[0] <= 0:
+        return None
     index = np.arange(len(lags))
     matrix = lags[np.abs(index[:, None] - index)]
     # A floor far below any oscillator's keeps a spectrum without one positive definite in double precision.
@@ -160,6 +162,5 @@ def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Ge
     """
     slow = slow_phase(points, at_key, delay_s, rng)
     fast = rng.standard_normal(slow.shape)
-    if covariance(points, grid(*at_key), delay_s)[0] == 0:
-        return slow
-    return slow + fast @ _root(points, at_key, delay_s).T
+    root = _root(points, at_key, delay_s)
+    return slow if root is None else slow + fast @ root.T
