@@ -121,7 +121,7 @@ def test_unsteady_rotors_have_the_moments_of_the_integrated_process():
 
 
 def test_the_wander_is_exact_at_any_step():
-    # Gillespie 1996, Eqs. 2.10: the closed forms of one step, held against the general discretisation.
+    # Gillespie 1996: the closed forms of one step, held against the general discretisation.
     for decay in (1e-4, 0.3, 40.0):
         mean = math.exp(-decay)
         found = steps(np.array([[-decay, 0.0], [1.0, 0.0]]), np.array([math.sqrt(2 * decay), 0.0]))
@@ -172,7 +172,7 @@ def test_steady_rotors_are_idle_and_the_limit_is_continuous():
 
 
 def _spectrum(longitudinal: bool, scale: float, frequency: np.ndarray) -> np.ndarray:
-    """Unit Dryden spectrum, two-sided over angular frequency, its integral 2 pi (MIL-F-8785C, 3.7.2.2)."""
+    """Unit Dryden spectrum, two-sided over angular frequency, its integral 2 pi (MIL-F-8785C)."""
     square = (scale * frequency) ** 2
     return 2 * scale / (1 + square) if longitudinal else scale * (1 + 3 * square) / (1 + square) ** 2
 

@@ -12,8 +12,8 @@ from lowalt.motion.poses import Perturbation, attitude
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, sections 3.7.2 to "
-    "3.7.4 (the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight"
+    "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, section 3.7 "
+    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight"
 )
 DEFAULTS = {"wind_mps": 7.7, "response_s": 1.0, "attitude_s": 0.1}
 
@@ -35,7 +35,7 @@ def idle(settings: dict) -> bool:
 def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray]:
     """Return scale lengths (3,) m and intensities (3,) m/s along the wind, across it and upwards.
 
-    wind_mps: speed 20 ft (6 m) above ground. Source: MIL-F-8785C, 3.7.3.4 and Figures 10 and 11 (low altitude).
+    wind_mps: speed 20 ft (6 m) above ground. Source: MIL-F-8785C, section 3.7, low altitude.
     """
     feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
     ratio = 0.177 + 0.000823 * feet
@@ -45,7 +45,7 @@ def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray
 
 
 def mean_wind_mps(height_m: float, wind_mps: float) -> float:
-    """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C, 3.7.3.2."""
+    """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C, section 3.7."""
     feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
     return wind_mps * np.log(feet / ROUGHNESS_FT) / np.log(20.0 / ROUGHNESS_FT)
 

@@ -12,8 +12,8 @@ from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "Uhlenbeck & Ornstein, On the theory of the Brownian motion, 1930; exact joint steps of the process and its "
-    "integral: Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its integral, 1996, "
-    "Eqs. 1.9 and 2.10; magnitudes: flight logs of multirotors, second-hand"
+    "integral: Gillespie, Exact numerical simulation of the Ornstein-Uhlenbeck process and its integral, 1996; "
+    "magnitudes: flight logs of multirotors, second-hand"
 )
 DEFAULTS = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
 

@@ -1,0 +1,183 @@
+"""Echoes of the ground: a patch of land in every range cell, still as a whole and stirred by the wind.
+
+A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle). Its amplitude
+is compound Gaussian: a texture drawn once, times speckle whose still part stays and whose moving part has
+Billingsley's exponential Doppler spectrum. Each cell's patch stands at the cell's centre, which holds it whole.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.fft import next_fast_len
+from scipy.special import gamma, gammaincinv
+
+from lowalt.echo.radar import radar
+from lowalt.echo.terms import aim_cosines
+from lowalt.effects.channel.ground_reflection import centre_hz
+from lowalt.effects.facts import Facts
+from lowalt.effects.view import View
+from lowalt.errors import InputError
+from lowalt.network import SPEED_OF_LIGHT, Network, Station
+
+SOURCE = (
+    "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
+    "laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable densities under change of scale, Ann. Prob. 3, "
+    "1975; windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6"
+)
+DEFAULTS = {
+    "gamma": 0.03, "clutter_to_signal_db": None, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5,
+}  # fmt: skip
+
+MPH = 0.44704
+"""Metres per second in a statute mile per hour, the unit of Billingsley's formulas."""
+TAIL = 1e-4
+"""Largest correlation left where the synthesised moving part wraps round."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the land reflects nothing."""
+    return settings["gamma"] == 0
+
+
+def check(settings: dict, facts: Facts) -> None:
+    """Raise InputError for a station in or below the ground, or an amplitude law without that shape."""
+    for station in facts.network.stations:
+        if station.position_m[2] <= 0:
+            raise InputError(
+                f"effects.clutter: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
+                "ground z = 0"
+            )
+    if settings["law"] == "weibull" and not settings["shape"] <= 2:
+        raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
+
+
+def cell_power(settings: dict, network: Network, station: Station, aim_m: np.ndarray) -> np.ndarray:
+    """Return the mean power (cells,) (W) of the land in every slant-range cell out to `reach_m`, beyond M too.
+
+    The integral of G_T^2 G_R^2 sigma0 / r^4 over the cell's ring: Gauss-Legendre over its range, and over azimuth the
+    trapezoidal rule, exact for the arrays' trigonometric patterns. Source: radar equation, sigma0 = gamma h / r.
+    """
+    radio = radar(network, station)
+    height = float(station.position_m[2])
+    cells = int(settings["reach_m"] * radio.cells + 0.5)
+    node, weight = np.polynomial.legendre.leggauss(6)
+    edge = (np.arange(cells)[:, None] + [-0.5, 0.5]) / radio.cells
+    low, high = np.clip(edge, height, settings["reach_m"]).T
+    r = 0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node
+    psi0, omega0 = aim_cosines(np.asarray(aim_m, float), radio.station, radio.sine, radio.cosine)
+    reach = np.pi * radio.kappa * (network.transmit[0] + network.receive[0])
+    # The pattern is even in azimuth about the array's line, so half a circle holds all of it.
+    turns = int(reach) + 24
+    azimuth = np.pi * (np.arange(turns) + 0.5) / turns
+    level = np.sqrt(np.maximum(1.0 - (height / r) ** 2, 0.0))
+    around = np.empty(r.shape)
+    for cell in range(cells):
+        psi = level[cell][:, None] * np.cos(azimuth)
+        gain = _pattern(radio.kappa * (psi - psi0), network.transmit[0], network.receive[0])
+        around[cell] = 2 * np.pi * gain.mean(axis=1)
+    around *= _pattern(radio.kappa * (-height / r - omega0), network.transmit[1], network.receive[1])
+    ring = around * settings["gamma"] * height / r * r / r**4 * 0.5 * (high - low)[:, None]
+    return radio.scale**2 * ring @ weight
+
+
+def _pattern(x: np.ndarray, transmit: int, receive: int) -> np.ndarray:
+    """Squared product of both arrays' sums at direction cosines x (times kappa) off the beam."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+
+        def one(count: int) -> np.ndarray:
+            below = np.sin(0.5 * np.pi * x)
+            return np.where(abs(below) < 1e-12, float(count), np.sin(0.5 * np.pi * count * x) / below)
+
+        out = one(transmit)
+        return (out * (out if receive == transmit else one(receive))) ** 2
+
+
+def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
+    """Return positive textures (cells,) of mean 1 from uniforms (2, cells): their root times speckle has the law.
+
+    rayleigh: 1; k: gamma variates of order `shape`; weibull: a Weibull power of shape c/2 is an exponential over a
+    positive stable variate of index c/2 (Kanter 1975). Amplitudes, not powers, have the Weibull shape c.
+    """
+    if law == "rayleigh" or (law == "weibull" and shape == 2):
+        return np.ones(uniform.shape[1])
+    if law == "k":
+        return gammaincinv(shape, uniform[0]) / shape
+    index = 0.5 * shape
+    angle, wait = np.pi * uniform[0], -np.log(uniform[1])
+    kanter = np.sin(index * angle) ** index * np.sin((1 - index) * angle) ** (1 - index) / np.sin(angle)
+    stable = (kanter ** (1 / (1 - index)) / wait) ** ((1 - index) / index)
+    return 1.0 / (stable * gamma(1.0 + 1.0 / index))
+
+
+def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
+    """Return the ratio of still to moving power and the exponential spectrum's slope beta (s/m).
+
+    Below a wind of one mile an hour, where the formula for the slope ends, its value there.
+    Source: Billingsley 2002, chapter 6 (wind in miles per hour, frequency in GHz).
+    """
+    miles = wind_mps / MPH
+    if miles == 0:
+        return np.inf, np.inf
+    still = 489.8 * miles**-1.55 * (frequency_hz / 1e9) ** -1.21
+    return still, 1.0 / (0.1048 * (np.log10(max(miles, 1.0)) + 0.4147))
+
+
+@lru_cache(maxsize=32)
+def _shape(count: int, step_s: float, beta: float, wavelength_m: float) -> np.ndarray:
+    """Root of the power (K,) in each of K >= count frequencies of the moving part, folded as sampling folds it."""
+    decay = beta * wavelength_m / (4 * np.pi)
+    long = next_fast_len(count + int(decay / np.sqrt(TAIL) / step_s))
+    frequency = np.fft.fftfreq(long, step_s)
+    # The spectrum exp(-beta lambda |f| / 2) summed over all its images 1 / step_s apart, a geometric series.
+    slope, period = 0.5 * beta * wavelength_m, 1.0 / step_s
+    power = np.exp(-slope * abs(frequency)) + np.exp(-slope * (period - abs(frequency)))
+    power /= -np.expm1(-slope * period)
+    return np.sqrt(power / power.sum())
+
+
+def _normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
+    """Circular complex normals of unit power."""
+    return rng.standard_normal((*shape, 2)).view(np.complex128)[..., 0] * np.sqrt(0.5)
+
+
+def speckle(
+    rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float
+) -> np.ndarray:
+    """Return unit-power speckle (cells, count): a part that stays, and one with a two-sided exponential spectrum.
+
+    still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m).
+    """
+    kept = _normal(rng, cells)[:, None]
+    if not np.isfinite(still):
+        return np.repeat(kept, count, axis=1)
+    shape = _shape(count, step_s, beta, wavelength_m)
+    moving = np.fft.ifft(_normal(rng, cells, len(shape)) * shape, axis=1, norm="forward")[:, :count]
+    return np.sqrt(still / (1 + still)) * kept + np.sqrt(1 / (1 + still)) * moving
+
+
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
+    network, station = view.network, view.station
+    power = cell_power(settings, network, station, view.aim_m)
+    if settings["clutter_to_signal_db"] is not None:
+        wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
+        power = power * (wanted / power.sum())
+    frequency = centre_hz(network, station)
+    uniform = 1.0 - rng.random((2, len(power)))
+    lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
+    still, beta = windblown(settings["wind_mps"], frequency)
+    waves = speckle(
+        rng, len(power), len(view.times_s), network.symbol_interval_s, still, beta, SPEED_OF_LIGHT / frequency
+    )
+    # Land beyond the unambiguous range folds into the cells it shares with nearer land.
+    cells = np.zeros((-(-len(power) // network.subcarriers) * network.subcarriers, len(view.times_s)), complex)
+    cells[: len(power)] = lit[:, None] * waves
+    return np.fft.fft(cells.reshape(-1, network.subcarriers, len(view.times_s)).sum(axis=0), axis=0).T
+
+
+def target_power(view: View) -> float:
+    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
+    radio = radar(view.network, view.station)
+    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
+    range_m = float(np.linalg.norm(view.aim_m - radio.station))
+    return (radio.scale * elements) ** 2 * float(view.cloud.rcs_m2.sum()) / range_m**4

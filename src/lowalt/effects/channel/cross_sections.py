@@ -1,0 +1,93 @@
+"""Cross sections that follow the aspect: a point shines along its normal, and a turning blade flashes.
+
+Bodies are diffuse: a point's cross section goes with a power of the cosine between its normal and the line of sight.
+Blades are flat facets in physical optics, as large as a point's share of its part. Each lobe's mean over all directions
+is one, so that a target keeps its mean cross section; points without a normal stay isotropic.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.special import j1
+
+from lowalt.effects.channel.ground_reflection import centre_hz
+from lowalt.effects.view import View
+from lowalt.network import SPEED_OF_LIGHT
+from lowalt.targets.cloud import Cloud
+
+SOURCE = (
+    "diffuse: Phong-type cosine lobes, Lafortune & Willems 1994; flat circular plate in physical optics, "
+    "sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd "
+    "ed. 1993, chapter 6; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
+)
+DEFAULTS = {"strength": 1.0, "power": 1.0, "blades": "facet"}
+
+
+def idle(settings: dict) -> bool:
+    """Return whether every point shines alike in all directions."""
+    return settings["strength"] == 0
+
+
+def diffuse(cosine: np.ndarray, power: float) -> np.ndarray:
+    """Return the one-sided lobe 2 (p + 1) max(cosine, 0)^p of mean 1 over the sphere; any shape."""
+    return np.where(cosine > 0, 2.0 * (power + 1.0) * np.maximum(cosine, 0.0) ** power, 0.0)
+
+
+def _plate(cosine: np.ndarray, size: float) -> np.ndarray:
+    """Lobe of a circular plate of k a = `size`, one at its normal."""
+    x = 2.0 * size * np.sqrt(np.maximum(1.0 - cosine * cosine, 0.0))
+    small = x < 1e-6
+    with np.errstate(divide="ignore", invalid="ignore"):
+        disc = np.where(small, 1.0, 2.0 * j1(x) / x)
+    return np.where(cosine > 0, (cosine * disc) ** 2, 0.0)
+
+
+@lru_cache(maxsize=256)
+def _plate_mean(size: float) -> float:
+    """Mean of a plate's lobe over the sphere, by Gauss-Legendre quadrature fine enough for its side lobes."""
+    node, weight = np.polynomial.legendre.leggauss(32 + int(2 * size))
+    angle = 0.25 * np.pi * (node + 1.0)
+    return float(0.25 * np.pi * weight @ (_plate(np.cos(angle), size) * np.sin(angle)) / 2.0)
+
+
+def facet(cosine: np.ndarray, size: float) -> np.ndarray:
+    """Return the one-sided lobe of a flat circular facet, of mean 1 over the sphere; size: k a, its radius in rad."""
+    return _plate(cosine, size) / _plate_mean(size)
+
+
+def facet_radius_m(points: np.ndarray) -> float:
+    """Return the radius (m) of one point's share of a surface sampled by `points` (L, 3), L > 1.
+
+    Evenly spread points stand in a hexagonal lattice, each with sqrt(3)/2 of its spacing squared.
+    """
+    spacing = cKDTree(points).query(points, k=2)[0][:, 1].mean()
+    return float(np.sqrt(np.sqrt(3.0) / 2.0 / np.pi) * spacing)
+
+
+def aspect_cosine(view: View) -> np.ndarray:
+    """Return the cosine (N, L) between every point's normal and its line of sight, NaN without a normal."""
+    away = np.asarray(view.station.position_m) - view.places
+    length = np.sqrt(np.einsum("nli,nli->nl", away, away))
+    return np.einsum("nli,nli->nl", view.normals, away) / length
+
+
+def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:
+    """Points (indices) of each rotor with more than one point, and their facets' radius (m)."""
+    found = [np.flatnonzero(cloud.part == part) for part in cloud.parts_of("rotor")]
+    return [(mine, facet_radius_m(cloud.points[mine])) for mine in found if len(mine) > 1]
+
+
+def visible(settings: dict, view: View) -> np.ndarray:
+    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect."""
+    known = np.isfinite(view.cloud.normals).all(axis=1)
+    if not known.any():
+        return np.ones(view.places.shape[:2])
+    cosine = aspect_cosine(view)
+    lobe = diffuse(cosine, settings["power"])
+    if settings["blades"] == "facet":
+        wave = 2 * np.pi * centre_hz(view.network, view.station) / SPEED_OF_LIGHT
+        for mine, radius in _blades(view.cloud):
+            lobe[:, mine] = facet(cosine[:, mine], wave * radius)
+    strength = settings["strength"]
+    return np.where(known, np.sqrt(1.0 - strength + strength * lobe), 1.0)

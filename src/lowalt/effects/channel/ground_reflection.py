@@ -1,0 +1,86 @@
+"""A second route by the ground: the wave reflected by a flat, possibly rough plane z = 0 (two-ray model).
+
+The station sees every point's image below the ground, by the Fresnel coefficient weaker and turned in phase. There and
+back by either route gives four echoes; the response forms them. Points are taken to be above the ground.
+"""
+
+import numpy as np
+from scipy.special import i0e
+
+from lowalt.effects.facts import Facts
+from lowalt.effects.response import Way
+from lowalt.effects.view import View
+from lowalt.errors import InputError
+from lowalt.network import SPEED_OF_LIGHT, Network, Station
+
+SOURCE = (
+    "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "
+    "section 5.3; rough surface: Miller, Brown & Vegh, New derivation for the rough-surface reflection coefficient "
+    "and for the distribution of sea-wave elevations, IEE Proc. F 131, 1984"
+)
+DEFAULTS = {"permittivity": 15.0, "conductivity_s_m": 0.01, "roughness_m": 0.0, "polarisation": "vertical"}
+
+VACUUM_F_M = 8.8541878128e-12
+"""Permittivity of the vacuum (F/m), CODATA 2018."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the ground is as the air and reflects nothing."""
+    return settings["permittivity"] == 1 and settings["conductivity_s_m"] == 0
+
+
+def check(settings: dict, facts: Facts) -> None:
+    """Raise InputError for a station in or below the ground, or a ground that no matter is made of."""
+    for station in facts.network.stations:
+        if station.position_m[2] <= 0:
+            raise InputError(
+                f"effects.ground_reflection: station {station.name} stands at z = {station.position_m[2]} m, expected "
+                "above the ground z = 0"
+            )
+    for key, low in (("permittivity", 1), ("conductivity_s_m", 0), ("roughness_m", 0)):
+        if not low <= settings[key] < np.inf:
+            raise InputError(f"effects.ground_reflection: {key} is {settings[key]}, expected at least {low}")
+    if settings["polarisation"] not in ("vertical", "horizontal"):
+        raise InputError(
+            f"effects.ground_reflection: polarisation is {settings['polarisation']!r}, expected vertical or horizontal"
+        )
+
+
+def fresnel(
+    sine: np.ndarray, permittivity: float, conductivity_s_m: float, frequency_hz: float, polarisation: str
+) -> np.ndarray:
+    """Return the complex reflection coefficient at grazing angles of `sine` (any shape, 0 to 1).
+
+    Fields go as exp(+j 2 pi f t), so a wave's phase is exp(-j 2 pi f r / c) and the complex permittivity
+    eps - j sigma / (2 pi f eps0). Vertical polarisation counts the field's vertical component, and is -1 at grazing.
+    """
+    epsilon = permittivity - 1j * conductivity_s_m / (2 * np.pi * frequency_hz * VACUUM_F_M)
+    inside = np.sqrt(epsilon - 1.0 + sine * sine)
+    outside = sine * (epsilon if polarisation == "vertical" else 1.0)
+    return (outside - inside) / (outside + inside)
+
+
+def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
+    """Return the factor on the coherent reflection of a surface with heights of standard deviation `height_m`.
+
+    exp(-x) I_0(x) with x = 2 (k sigma sin psi)^2: what is lost is scattered elsewhere. Source: Miller et al. 1984.
+    """
+    return i0e(2.0 * (2 * np.pi * frequency_hz / SPEED_OF_LIGHT * height_m * sine) ** 2)
+
+
+def centre_hz(network: Network, station: Station) -> float:
+    """Return the middle of a station's band (Hz), at which the ground's coefficient is taken."""
+    return station.frequency_hz + 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz
+
+
+def ways(settings: dict, view: View) -> list[Way]:
+    """Return the one further route: images (N, L, 3) m and coefficients (N, L)."""
+    images = view.places * [1.0, 1.0, -1.0]
+    away = images - np.asarray(view.station.position_m)
+    sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
+    frequency = centre_hz(view.network, view.station)
+    ground = settings["permittivity"], settings["conductivity_s_m"], frequency, settings["polarisation"]
+    coefficient = fresnel(np.clip(sine, 0.0, 1.0), *ground)
+    if settings["roughness_m"] > 0:
+        coefficient *= roughness(sine, settings["roughness_m"], frequency)
+    return [Way(images, coefficient)]
