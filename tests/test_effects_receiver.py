@@ -406,13 +406,15 @@ def test_covariance_inside_a_symbol_is_the_integral_of_the_spectrum(points, dela
         assert got == pytest.approx(integral(points, weight, low=0.25), rel=4e-3)
 
 
-def test_slow_part_is_interpolated_to_the_line_sum():
-    """Inside symbols too, against the sum of its lines with the same draws."""
+@pytest.mark.parametrize("delay_s", [None, 4e-5])
+def test_slow_part_is_interpolated_to_the_line_sum(delay_s):
+    """Inside symbols too, against the sum of its lines with the same draws; a delay d keeps |1 - exp(-j 2 pi f d)|."""
     look = (12, 9, 2.5e-3, 1 / (9 * 120e3))
     at = _oscillator.grid(*look)
-    got = _oscillator.slow_phase(STEEP, look, None, np.random.default_rng(3))
+    got = _oscillator.slow_phase(STEEP, look, delay_s, np.random.default_rng(3))
     pair = np.random.default_rng(3).standard_normal((len(at.slow_hz), 2))
     size = np.sqrt(2 * _oscillator.density(STEEP, at.slow_hz) * at.slow_weight)
+    size = size if delay_s is None else size * abs(1 - np.exp(-2j * np.pi * at.slow_hz * delay_s))
     times = np.arange(12)[:, None] * 2.5e-3 + np.arange(9) * look[3]
     turns = 2 * np.pi * times[..., None] * at.slow_hz
     slow = np.sum(size * (pair[:, 0] * np.cos(turns) - pair[:, 1] * np.sin(turns)), axis=-1)
