@@ -385,6 +385,18 @@ def test_density_goes_through_its_points():
     np.testing.assert_allclose(level, [-30, -30, -55, -90, -130, -130], atol=1e-9)
 
 
+def test_the_default_spectrum_is_that_of_the_3gpp_model():
+    """TR 38.803, Table 6.1.10-1 (29.55 GHz): level, zeros and poles (Hz) with their powers; 20 log10 to 4.9 GHz."""
+    f = np.geomspace(1, 15e6, 2000)
+    level = 32 + 20 * math.log10(4.9 / 29.55)
+    for hertz, power in ((3e3, 2.37), (550e3, 2.7), (280e6, 2.53)):
+        level = level + 10 * np.log10(1 + (f / hertz) ** power)
+    for hertz, power in ((1.0, 3.3), (1.6e6, 3.3), (30e6, 1.0)):
+        level = level - 10 * np.log10(1 + (f / hertz) ** power)
+    points = tuple(map(tuple, phase_noise.DEFAULTS["points"]))
+    np.testing.assert_allclose(10 * np.log10(_oscillator.density(points, f)), level, atol=0.8)
+
+
 @pytest.mark.parametrize("points", [FLAT, STEEP])
 @pytest.mark.parametrize("delay_s", [None, 2e-6, 8e-6, 40e-6])
 def test_covariance_inside_a_symbol_is_the_integral_of_the_spectrum(points, delay_s):

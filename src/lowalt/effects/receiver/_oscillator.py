@@ -113,7 +113,7 @@ def covariance(points: tuple, at: Grid, delay_s: float | None) -> np.ndarray:
     return low @ at.low_cosine + period * np.fft.irfft(np.append(0.0, high), period)[:subcarriers]
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=2)
 def _lines(points: tuple, at_key: tuple) -> np.ndarray:
     at = grid(*at_key)
     return np.sqrt(2 * density(points, at.slow_hz) * at.slow_weight)
