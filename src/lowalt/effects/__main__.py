@@ -49,7 +49,7 @@ def main(arguments: list[str]) -> None:
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
     occluders = None
     if given.occluders:
-        from lowalt.effects.channel.occlusion import read as read_occluders
+        from lowalt.targets.occluders import read as read_occluders
 
         occluders = {
             cloud.subtype: read_occluders(path) for cloud, path in zip(clouds.values(), given.occluders, strict=True)

@@ -1,0 +1,50 @@
+"""The command `lowalt`: what a person asks of a scene; stages have commands of their own (python -m lowalt.STAGE)."""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from lowalt.errors import InputError
+
+CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
+
+
+def _sample(text: str) -> tuple[str, int]:
+    name, _, model = text.rpartition(":")
+    if not name or not model.isdigit():
+        raise argparse.ArgumentTypeError(f"{text!r}, expected SUBTYPE:MODEL such as 'Crow:3'")
+    return name, int(model)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run `lowalt explain SCENE`; returns the exit status."""
+    line = argparse.ArgumentParser(prog="lowalt", description=__doc__)
+    commands = line.add_subparsers(dest="command", required=True)
+    explain = commands.add_parser(
+        "explain", help="what a scene simulates, what it leaves out and why, and what it costs"
+    )
+    explain.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the base; more may follow it")
+    explain.add_argument("--base", type=Path, default=CONFIG, help=f"base configuration (default: {CONFIG})")
+    explain.add_argument("--schema", type=Path, default=SCHEMA, help=f"its schema (default: {SCHEMA})")
+    explain.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
+    explain.add_argument("--station", help="the station that listens (default: the first)")
+    explain.add_argument("--no-cost", action="store_true", help="do not measure times")
+    given = line.parse_args(arguments)
+    from lowalt.effects.explain import explain as explained
+
+    inputs = os.environ.get("LOWALT_INPUTS")
+    try:
+        text = explained(
+            [given.base, *given.scene], given.schema, inputs and Path(inputs), given.sample, given.station,
+            not given.no_cost,
+        )  # fmt: skip
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(text)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

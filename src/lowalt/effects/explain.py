@@ -1,0 +1,167 @@
+"""What a scene simulates, what it leaves out, by which bounds, and what each item costs: `lowalt explain SCENE`.
+
+The costs are measured on the spot, on one motion model of each category the scene has, at its first station.
+"""
+
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.config import load
+from lowalt.echo import echo_signal
+from lowalt.echo import explain as explain_echo
+from lowalt.effects.catalogue import BY_NEED, PLACES, Effect, called
+from lowalt.effects.chain import Scene, hear, observe
+from lowalt.effects.facts import check
+from lowalt.errors import InputError
+from lowalt.hardware import describe
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.network import Network
+from lowalt.streams import stream
+from lowalt.targets.__main__ import make
+from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.records import load_records
+
+REPEATS = 3
+
+
+class Sample(NamedTuple):
+    """One motion model to explain the scene by."""
+
+    cloud: Cloud
+    row: dict
+    occluders: dict | None
+
+
+def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> list[Sample]:
+    """Return the motion models `named` (subtype, number), or the first model of each category's first subtype.
+
+    Clouds and motion are made as the workflow makes them, so a sample is the one the data set holds.
+    Raises: InputError for a subtype the scene does not have.
+    """
+    records = load_records(config["targets"]["table"], config["targets"]["records"])
+    select = config["targets"]["select"]
+    records = {name: record for name, record in records.items() if not select or name in select}
+    unknown = [name for name, _ in named if name not in records]
+    if unknown:
+        raise InputError(f"--sample: {unknown}, expected subtypes of the scene such as {next(iter(records))!r}")
+    if not named:
+        firsts = {}
+        for name, record in records.items():
+            firsts.setdefault(record["published"]["category"], (name, 0))
+        named = [firsts[category] for category in CATEGORIES if category in firsts]
+    masts = np.array([place["position_m"][:2] for place in config["network"]["stations"].values()], dtype=float)
+    corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
+    result = []
+    for name, model in named:
+        record = records[name]
+        cloud = make(record, inputs, config["seed"])
+        rng = stream(config["seed"], "motion", name, model)
+        row = draw(rng, cloud, record["published"], masts, corners, config["motion"])
+        occluders = None
+        if "occlusion" in config["effects"]:
+            from lowalt.targets import occluders as surfaces
+
+            occluders = surfaces.make(record, inputs, config["seed"]) | {"subtype": name}
+        result.append(
+            Sample(cloud, {**row, "group": record["published"]["unseen_protocol"], "model": model}, occluders)
+        )
+    return result
+
+
+def milliseconds(work: Callable[[], object]) -> float:
+    """Return the median time of a call after one that warms up (ms)."""
+    work()
+    taken = []
+    for _ in range(REPEATS):
+        start = time.perf_counter()
+        work()
+        taken.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(taken)
+
+
+def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, float]:
+    """Return milliseconds a sample and station: "base", each effect added alone to the base, and "together"."""
+    station = scene.network.station(station_name)
+
+    def mean(effects: tuple[Effect, ...]) -> float:
+        part = Scene(scene.network, scene.seed, scene.tolerance, effects)
+        times = [milliseconds(lambda s=s: hear(part, station, s.cloud, s.row, s.occluders)) for s in chosen]
+        return sum(times) / len(times)
+
+    result = {"base": mean(())}
+    result |= {effect.name: mean((effect,)) - result["base"] for effect in scene.effects}
+    return result | {"together": mean(scene.effects)}
+
+
+def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
+    """Return what is computed of one sample at one station, and the bounds behind it."""
+    station = scene.network.station(station_name)
+    view = observe(scene, station, sample.cloud, sample.row, sample.occluders)
+    own = echo_signal(scene.network, station, view.motion, sample.cloud.rcs_m2, view.aim_m, scene.tolerance)
+    heard = hear(scene, station, sample.cloud, sample.row, sample.occluders)
+    range_m = np.linalg.norm(view.aim_m - np.asarray(station.position_m))
+    lines = [f"{sample.row['subtype']}, model {sample.row['model']}, station {station_name}, range {range_m:.0f} m"]
+    lines += [f"  {line}" for line in explain_echo(own).splitlines()]
+    for decision in heard.decisions:
+        verb = "computed" if decision.computed else "left out"
+        bound = "" if np.isinf(decision.bound) else f", bound {decision.bound:.2g} of the largest value"
+        lines.append(f"  {decision.name}: {verb}{bound} ({decision.reason})")
+    moved = np.sqrt(np.mean(abs(heard.signal - own.signal) ** 2) / heard.power) if heard.power > 0 else np.nan
+    other = np.mean(heard.cell != own.cell)
+    lines.append(
+        f"  against the target's echo alone: rms change {moved:.2g}, other range cell in {other:.1%} of symbols"
+    )
+    return lines
+
+
+def explain(
+    paths: list[Path],
+    schema: Path,
+    inputs: Path | None,
+    named: list[tuple[str, int]],
+    station: str | None,
+    measure: bool,
+) -> str:
+    """Return the explanation of the scene of a base configuration and its overlays `paths`.
+
+    named: samples (subtype, model number), by default one a category; station: by default the first; measure: whether
+    costs are measured. Raises: InputError where the configuration, a sample or a station is wrong.
+    """
+    config = load(paths, schema)
+    facts = check(config)
+    effects = tuple(called(config["effects"]))
+    scene = Scene(Network.from_settings(config["network"]), config["seed"], config["echo"]["tolerance"], effects)
+    station = station or scene.network.stations[0].name
+    scene.network.station(station)
+    tolerance = "exact" if scene.tolerance is None else f"{scene.tolerance:g} of a sample's largest value"
+    lines = [
+        f"scene {config['run']}: stations {', '.join(s.name for s in scene.network.stations)}, tolerance {tolerance}, "
+        f"SNRs {', '.join(f'{float(snr):g}' for snr in config['noise']['snr_db'])} dB",
+        "always (Eq. 7): beam pattern over the target, spread over range cells, 1/r^2 over the target, exact range; "
+        "how, by sample, below",
+    ]
+    chosen = samples(config, inputs, named)
+    price = costs(scene, chosen, station) if measure else {}
+    for effect in effects:
+        cost = f" | +{price[effect.name]:.2f} ms" if measure else ""
+        kind = "by need" if effect.name in BY_NEED else effect.place
+        values = ", ".join(f"{key} {value}" for key, value in effect.settings.items())
+        lines += [f"{effect.name} ({kind}): {values or 'no parameters'}{cost}", f"  {effect.module.SOURCE}"]
+    idle = [name for name in config["effects"] if name not in facts.effects]
+    if idle:
+        lines.append(f"named, but the identity with these parameters, so left out: {', '.join(idle)}")
+    absent = [name for name in PLACES if name not in config["effects"]]
+    lines.append(f"not named, so not imported and nothing drawn: {', '.join(absent) or 'none'}")
+    if measure:
+        lines.append(
+            f"time a sample and station: base {price['base']:.2f} ms, with all effects {price['together']:.2f} ms "
+            f"(medians of {REPEATS}, mean over {len(chosen)} samples; {describe()})"
+        )
+    for sample in chosen:
+        lines += ["", *sample_lines(scene, sample, station)]
+    return "\n".join(lines)
