@@ -1,0 +1,161 @@
+"""Which points of a target a station cannot see: exact ray casting, as images on a screen before the station.
+
+A straight line from the station through a point is a place on a screen. A triangle hides the point if its image holds
+that place and it is nearer there, where one over the depth is linear on the screen. Points are sorted into a grid on
+the screen, so each triangle meets only the points about it.
+"""
+
+import math
+
+import numpy as np
+
+from lowalt.echo.compile import kernel
+
+RAYS = kernel(error_model="numpy")
+
+GRID = 48
+"""Cells of the screen along each side."""
+
+
+@RAYS
+def _screen(place, rotation, translation, part, points, right, up, ahead, out):
+    """Fill out (K, 3) with screen places and inverse depths of body-frame points (K, 3); depth <= 0 gives inverse 0."""
+    for k in range(len(points)):
+        p = part[k]
+        d0, d1, d2 = 0.0, 0.0, 0.0
+        for i in range(3):
+            turned = (
+                rotation[p, i, 0] * points[k, 0] + rotation[p, i, 1] * points[k, 1] + rotation[p, i, 2] * points[k, 2]
+            )
+            x = turned + (translation[p, i] - place[i])
+            d0 += x * right[i]
+            d1 += x * up[i]
+            d2 += x * ahead[i]
+        if d2 > 0.0:
+            out[k, 0], out[k, 1], out[k, 2] = d0 / d2, d1 / d2, 1.0 / d2
+        else:
+            out[k, 0], out[k, 1], out[k, 2] = 0.0, 0.0, 0.0
+
+
+@RAYS
+def triangles(place, rotation, translation, part, points, toward, vertices, vertex_part, faces, closed, grid, hidden):
+    """Set hidden (N, L) where a triangle stands between the point and the station at `place` (3,).
+
+    rotation (N, P, 3, 3), translation (N, P, 3): poses; points (L, 3): off their own surface, body frame; toward (L,):
+    relative depth by which a point is moved to the station instead, where it has no normal; closed (F,): whether the
+    triangle is of a closed surface with outward normals, whose side turned to the station alone then hides all.
+    """
+    count = len(points)
+    corner, dot, at = np.empty((len(vertices), 3)), np.empty((count, 3)), np.empty((count, 3))
+    start, order, cell = np.empty(grid * grid + 1, np.int64), np.empty(count, np.int64), np.empty(count, np.int64)
+    ahead, right, up = np.empty(3), np.empty(3), np.empty(3)
+    for n in range(rotation.shape[0]):
+        for i in range(3):
+            ahead[i] = translation[n, 0, i] - place[i]
+        ahead /= math.sqrt(ahead[0] ** 2 + ahead[1] ** 2 + ahead[2] ** 2)
+        least = np.argmin(np.abs(ahead))
+        right[:] = 0.0
+        right[least] = 1.0
+        right -= ahead[least] * ahead
+        right /= math.sqrt(right[0] ** 2 + right[1] ** 2 + right[2] ** 2)
+        up[0] = right[1] * ahead[2] - right[2] * ahead[1]
+        up[1] = right[2] * ahead[0] - right[0] * ahead[2]
+        up[2] = right[0] * ahead[1] - right[1] * ahead[0]
+        _screen(place, rotation[n], translation[n], vertex_part, vertices, right, up, ahead, corner)
+        _screen(place, rotation[n], translation[n], part, points, right, up, ahead, dot)
+        low0, low1 = dot[:, 0].min(), dot[:, 1].min()
+        wide0 = grid / max((dot[:, 0].max() - low0) * (1 + 1e-9), 1e-300)
+        wide1 = grid / max((dot[:, 1].max() - low1) * (1 + 1e-9), 1e-300)
+        start[:] = 0
+        for l in range(count):  # noqa: E741
+            dot[l, 2] *= 1.0 + toward[l]
+            column = min(int((dot[l, 0] - low0) * wide0), grid - 1)
+            cell[l] = column * grid + min(int((dot[l, 1] - low1) * wide1), grid - 1)
+            start[cell[l] + 1] += 1
+        for k in range(grid * grid):
+            start[k + 1] += start[k]
+        for l in range(count):  # noqa: E741
+            k = start[cell[l]]
+            order[k] = l
+            at[k, 0], at[k, 1], at[k, 2] = dot[l, 0], dot[l, 1], dot[l, 2]
+            start[cell[l]] += 1
+        for k in range(grid * grid, 0, -1):
+            start[k] = start[k - 1]
+        start[0] = 0
+        for f in range(len(faces)):
+            p, q, r = faces[f, 0], faces[f, 1], faces[f, 2]
+            a0, a1, b0, b1, c0, c1 = corner[p, 0], corner[p, 1], corner[q, 0], corner[q, 1], corner[r, 0], corner[r, 1]
+            area = (b0 - a0) * (c1 - a1) - (b1 - a1) * (c0 - a0)
+            if closed[f] and area <= 0.0:
+                continue
+            sign = 1.0 if area > 0.0 else -1.0
+            last0, last1 = (max(a0, b0, c0) - low0) * wide0, (max(a1, b1, c1) - low1) * wide1
+            first0, first1 = (min(a0, b0, c0) - low0) * wide0, (min(a1, b1, c1) - low1) * wide1
+            if last0 < 0.0 or last1 < 0.0 or first0 >= grid or first1 >= grid:
+                continue
+            a2, b2, c2 = corner[p, 2], corner[q, 2], corner[r, 2]
+            if a2 == 0.0 or b2 == 0.0 or c2 == 0.0:
+                continue
+            nearest = max(a2, b2, c2)
+            j0, j1 = int(max(first1, 0.0)), int(min(last1, grid - 1.0))
+            for i in range(int(max(first0, 0.0)), int(min(last0, grid - 1.0)) + 1):
+                for k in range(start[i * grid + j0], start[i * grid + j1 + 1]):
+                    if nearest <= at[k, 2]:
+                        continue
+                    x, y = at[k, 0], at[k, 1]
+                    u = sign * ((b0 - x) * (c1 - y) - (b1 - y) * (c0 - x))
+                    if u < 0.0:
+                        continue
+                    v = sign * ((c0 - x) * (a1 - y) - (c1 - y) * (a0 - x))
+                    if v < 0.0:
+                        continue
+                    w = sign * ((a0 - x) * (b1 - y) - (a1 - y) * (b0 - x))
+                    if w >= 0.0 and u * a2 + v * b2 + w * c2 > at[k, 2] * (u + v + w):
+                        hidden[n, order[k]] = True
+                        # Nearer than every triangle: not asked again.
+                        at[k, 2] = np.inf
+
+
+@RAYS
+def _square_between(p, d, a, e, flat):
+    """Squared distances of the segment a + t e from the point p, and from the ray p + s d, |d| = 1 and s >= 0."""
+    w0, w1, w2 = a[0] - p[0], a[1] - p[1], a[2] - p[2]
+    ee = e[0] * e[0] + e[1] * e[1] + e[2] * e[2]
+    de = d[0] * e[0] + d[1] * e[1] + d[2] * e[2]
+    dw = d[0] * w0 + d[1] * w1 + d[2] * w2
+    ew = e[0] * w0 + e[1] * w1 + e[2] * w2
+    ww = w0 * w0 + w1 * w1 + w2 * w2
+    t = min(max(-ew / ee, 0.0), 1.0) if ee > 0.0 else 0.0
+    own = ww + t * (2.0 * ew + t * ee)
+    # On the ray's line the best t is unclamped or an end; a convex function of t alone once s is at its best.
+    cross = ee - de * de
+    t = min(max((de * dw - ew) / cross, 0.0), 1.0) if cross > flat * ee else t
+    s = dw + t * de
+    if s <= 0.0:
+        return own, own
+    return own, ww + t * (2.0 * ew + t * ee) - s * s
+
+
+@RAYS
+def capsules(place, nodes, bones, radius, hidden):
+    """Set hidden (N, L) where a capsule round a bone stands between a node (N, L, 3) and the station.
+
+    A node stands for the skin round it: capsules it lies in, or ends, do not hide it.
+    """
+    d, e = np.empty(3), np.empty(3)
+    for n in range(nodes.shape[0]):
+        for l in range(nodes.shape[1]):  # noqa: E741
+            p = nodes[n, l]
+            length = math.sqrt((place[0] - p[0]) ** 2 + (place[1] - p[1]) ** 2 + (place[2] - p[2]) ** 2)
+            for i in range(3):
+                d[i] = (place[i] - p[i]) / length
+            for b in range(len(bones)):
+                if bones[b, 0] == l or bones[b, 1] == l:
+                    continue
+                a = nodes[n, bones[b, 0]]
+                for i in range(3):
+                    e[i] = nodes[n, bones[b, 1], i] - a[i]
+                own, ray = _square_between(p, d, a, e, 1e-12)
+                if own > radius[b] * radius[b] and ray <= radius[b] * radius[b]:
+                    hidden[n, l] = True
+                    break

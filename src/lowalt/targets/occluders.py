@@ -1,0 +1,153 @@
+"""Command line of an extra product of the stage: a target's opaque surfaces, for scenes with self-occlusion.
+
+Triangles for targets with a surface, each vertex riding on the part it belongs to; capsules along the bones for
+recordings, whose nodes have none. Built-in shapes keep all their triangles, so that points lie exactly on them; user's
+meshes are simplified, and the file says how far each part's points then lie off.
+"""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.command import parser, pick, run
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.targets.assemble import Part, turn
+from lowalt.targets.skeleton import NODES, PARENTS
+from lowalt.targets.surfaces import Surface, inside, merged
+
+ARRAYS = ("vertices", "vertex_part", "faces", "offset_m", "closed", "bones", "radius_m")
+"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) vertices; offset_m (P,) m, how far off the
+surface a part's points are to start; closed (P,) bool, whether a part's surface is closed; bones (B, 2) nodes at the
+ends of capsules; radius_m (B,) m."""
+
+STATURE_M = 1.756
+RADII_M = {
+    "lowerback": 0.13, "upperback": 0.14, "thorax": 0.14, "lowerneck": 0.07, "upperneck": 0.06, "head": 0.09,
+    "hipjoint": 0.10, "femur": 0.09, "tibia": 0.06, "foot": 0.04, "toes": 0.04, "clavicle": 0.08, "humerus": 0.05,
+    "radius": 0.045, "wrist": 0.035, "hand": 0.035, "fingers": 0.02, "thumb": 0.015,
+}  # fmt: skip
+"""Radius of the limb round each bone of a person of STATURE_M, from girths and breadths of Gordon et al. 2014, 2012
+Anthropometric Survey of U.S. Army Personnel, men's means, rounded; torso: mean of half breadth and half depth."""
+
+GRAIN = 30
+"""Triangles that a cut goes through are divided down to this fraction of the part's extent."""
+
+
+def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
+    """Return a surface without its triangles inside the convex `cuts`, divided finely along their borders."""
+    corners = surface.vertices[surface.faces]
+    grain = np.ptp(surface.vertices, axis=0).max() / GRAIN
+    for volume in cuts:
+        low, high = volume.vertices.min(axis=0), volume.vertices.max(axis=0)
+        kept = []
+        while len(corners):
+            apart = ((corners.max(axis=1) <= low) | (corners.min(axis=1) >= high)).any(axis=1)
+            within = inside(volume, corners.reshape(-1, 3)).reshape(-1, 3)
+            size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+            # Three corners outside do not say that a large triangle is.
+            outside = apart | (~within.any(axis=1) & (size < 0.3 * (high - low).min()))
+            small = ~within.all(axis=1) & ~outside & (size <= grain)
+            small[small] = ~inside(volume, corners[small].mean(axis=1))
+            kept += [corners[outside | small]]
+            a, b, c = np.moveaxis(corners[~within.all(axis=1) & ~outside & (size > grain)], 1, 0)
+            ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+            four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+            corners = np.concatenate([np.stack(three, axis=1) for three in four])
+        corners = np.concatenate(kept)
+    vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    return Surface(vertices, faces.reshape(-1, 3))
+
+
+def part_surface(part: Part) -> Surface:
+    """Return a built-in part's whole surface: all its shells, cut away, and their copies round the hinge."""
+    shells = merged(part.shells)
+    if part.cuts:
+        shells = cut_away(shells, part.cuts)
+    copies = [shells]
+    for copy in range(1, part.copies):
+        matrix, centre = turn(np.array(part.axis), 2 * np.pi * copy / part.copies), np.array(part.hinge)
+        copies.append(Surface((shells.vertices - centre) @ matrix.T + centre, shells.faces))
+    return merged(copies)
+
+
+def from_surfaces(surfaces: list[Surface], offset_m: np.ndarray, closed: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the arrays of one surface a part, in the cloud's order of parts; offset_m: (P,) m; closed: (P,)."""
+    whole = merged(surfaces)
+    owner = np.repeat(np.arange(len(surfaces)), [len(surface.vertices) for surface in surfaces])
+    return {
+        "vertices": whole.vertices, "vertex_part": owner, "faces": whole.faces.astype(np.int64), "offset_m": offset_m,
+        "closed": closed,
+        "bones": np.zeros((0, 2), np.int64), "radius_m": np.zeros(0),
+    }  # fmt: skip
+
+
+def from_bones(stature_m: float) -> dict[str, np.ndarray]:
+    """Return the arrays of a pedestrian's capsules: one along each bone, its radius scaled with the stature."""
+    radii = [RADII_M[name] if name in RADII_M else RADII_M[name[1:]] for name in NODES[1:]]
+    return {
+        "vertices": np.zeros((0, 3)), "vertex_part": np.zeros(0, np.int64), "faces": np.zeros((0, 3), np.int64),
+        "offset_m": np.zeros(len(NODES)), "closed": np.zeros(len(NODES), bool),
+        "bones": np.array([[PARENTS[i], i] for i in range(1, len(NODES))]),
+        "radius_m": np.array(radii) * (stature_m / STATURE_M),
+    }  # fmt: skip
+
+
+def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
+    """Return the arrays of a merged record's target; equal record, files and seed give equal arrays.
+
+    Raises: InputError where the record or an input is wrong, or a folder is needed and none is given.
+    """
+    source = record.get("source")
+    if source == "builtin":
+        from lowalt.targets.builtin import MODULES
+
+        parts = MODULES[record["category"]].parts(record)[0]
+        surfaces = [part_surface(part) for part in parts]
+        # Clears a point's own triangle by more than rounding, and stays on it where a point stands by its corner.
+        offset = 1e-9 * np.ptp(merged(surfaces).vertices, axis=0).max()
+        return from_surfaces(surfaces, np.full(len(parts), offset), np.array([not part.cuts for part in parts]))
+    if source in ("gait", "mocap"):
+        return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
+    if source != "mesh":
+        raise InputError(f"settings: record.source is {source!r}, expected builtin, mesh, mocap or gait")
+    if inputs is None:
+        raise InputError(f"{record['subtype']}: source mesh needs the folder of real inputs, expected --inputs DIR")
+    from lowalt.targets.occluders_mesh import mesh_surfaces
+
+    return from_surfaces(*mesh_surfaces(record, Path(inputs), seed))
+
+
+def write(path: str | Path, arrays: dict[str, np.ndarray], subtype: str) -> None:
+    """Write the arrays and the subtype they belong to; equal arrays give equal bytes."""
+    with replacing(path) as temporary:
+        np.savez(temporary, **{name: arrays[name] for name in ARRAYS}, subtype=np.array(json.dumps(subtype)))
+
+
+def read(path: str | Path) -> dict:
+    """Return a file's arrays (ARRAYS) and its `subtype`.
+
+    Raises: InputError where the file is missing or no file of occluders.
+    """
+    existing(path, "occluders")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return {name: data[name] for name in ARRAYS} | {"subtype": json.loads(str(data["subtype"]))}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a file of occluders ({error})") from error
+
+
+def main(arguments: list[str]) -> None:
+    """Write one target's occluders."""
+    line = parser("lowalt.targets.occluders", "One subtype's record to its opaque surfaces, for self-occlusion.")
+    line.add_argument("--inputs", type=Path, help="folder of the meshes the record names")
+    line.add_argument("--out", required=True, type=Path, help="file to write (.npz)")
+    given = line.parse_args(arguments)
+    seed, record = pick(given.settings, "seed", "record")
+    write(given.out, make(record, given.inputs, seed), record["subtype"])
+
+
+if __name__ == "__main__":
+    run(main)
