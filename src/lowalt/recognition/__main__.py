@@ -142,6 +142,43 @@ def _transfer(arguments: list[str]) -> None:
     transfer.write(own, other, list(read(given.schemes)), given.out, seed)
 
 
+def _speed(arguments: list[str]) -> None:
+    """Time a scheme's network on this machine. Settings: seed, size, colour_map, network, training, augmentation."""
+    from lowalt.recognition.speed import measure
+
+    line = parser("lowalt.recognition speed", _speed.__doc__)
+    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
+    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
+    line.add_argument("--out", required=True, help="record to write (.json)")
+    given = line.parse_args(arguments)
+    scheme = named(given.schemes, given.scheme)
+    found = measure(scheme, scheme.settled(given.settings), given.limit_s)
+    with replacing(given.out) as temporary:
+        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+
+
+def _price(arguments: list[str]) -> None:
+    """Write what accuracy costs in time, from predictions and measured speeds. Settings: seed."""
+    from lowalt.recognition import price
+    from lowalt.recognition.tables import Run
+
+    line = parser("lowalt.recognition price", _price.__doc__)
+    line.add_argument("--predictions", nargs="+", required=True, help="prediction files of the unseen protocol (.csv)")
+    line.add_argument("--speeds", nargs="+", required=True, help="records of `speed`, of these and of other schemes")
+    line.add_argument("--index", required=True, help="index of the shards: bytes a sample")
+    line.add_argument("--fidelity", help="transfer.csv of models trained on echoes at a tolerance")
+    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    given = line.parse_args(arguments)
+    (seed,) = pick(given.settings, "seed")
+    shards = json.loads(existing(given.index, "index").read_text())["shards"]
+    size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
+    runs, speeds = [Run(path) for path in given.predictions], price.read_speeds(given.speeds)
+    fidelity = price.fidelity_rows(given.fidelity) if given.fidelity else []
+    price.write(runs, read(given.schemes), speeds, size, fidelity, given.out, seed)
+
+
 def _score(arguments: list[str]) -> None:
     """Score anyone's predictions on a protocol's test part, against the shards' own labels. Settings: none ({})."""
     from lowalt.recognition.score import score
@@ -184,7 +221,7 @@ def _export(arguments: list[str]) -> None:
 
 COMMANDS = {
     "views": _views, "freeze": _freeze, "train": _train, "evaluate": _evaluate, "tables": _tables,
-    "transfer": _transfer, "score": _score,
+    "transfer": _transfer, "speed": _speed, "price": _price, "score": _score,
     "predict": _predict, "export": _export,
 }  # fmt: skip
 

@@ -104,3 +104,13 @@ def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float) -> tuple[f
     return float(called[labels == UAV].mean()), np.array(
         [called[labels == other].mean() if (labels == other).any() else np.nan for other in range(1, CLASSES)]
     )
+
+
+def pareto(cost: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """Which points (n,) no other beats: none costs at most as much and is worth at least as much, one of them strictly.
+
+    Points whose cost or value is NaN are never on the front.
+    """
+    cheaper, better = cost[:, None] <= cost, value[:, None] >= value
+    strictly = (cost[:, None] < cost) | (value[:, None] > value)
+    return ~(cheaper & better & strictly).any(0) & ~np.isnan(cost) & ~np.isnan(value)

@@ -57,7 +57,7 @@ class Run:
         """
         side = existing(Path(path).with_suffix(".json"), "run record")
         try:
-            about = json.loads(side.read_text())
+            self.about = about = json.loads(side.read_text())
             self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
             self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
         except (ValueError, KeyError, TypeError) as error:

@@ -64,6 +64,32 @@ class Reader(Dataset):
         return torch.from_numpy(images), torch.from_numpy(self.source.facts.label[mine]).long()
 
 
+def objective(
+    model: nn.Module, images: torch.Tensor, labels: torch.Tensor, block: dict, machine: Machine
+) -> torch.Tensor:
+    """Return the loss of a batch: cross entropy of all views together and, by `alone`, of each station alone.
+
+    images (B, K * V, S, S) uint8, labels (B,); block: the training settings. The two parts are averaged by weight.
+    """
+    criterion = nn.CrossEntropyLoss(label_smoothing=block["label_smoothing"])
+    stations = images.shape[1] // unwrapped(model).shape[1]
+    weight = block["alone"] if stations > 1 else 0
+    with machine.autocast():
+        found = model(images, alone=bool(weight))
+    if not weight:
+        return criterion(found.float(), labels)
+    together, alone = found
+    each = criterion(alone.float(), labels.repeat_interleave(stations))
+    return (criterion(together.float(), labels) + weight * each) / (1 + weight)
+
+
+def unwrapped(model: nn.Module) -> nn.Module:
+    """Return the network inside wrappers of gradient exchange and compilation."""
+    for name in ("module", "_orig_mod"):
+        model = getattr(model, name, model)
+    return model
+
+
 class Trainer:
     """One training run: `fit` ends with the best averaged weights in `model.pt` and the history in `history.csv`."""
 
@@ -84,7 +110,6 @@ class Trainer:
         self.model = model.to(machine.device, memory_format=layout)
         self.ema = ModelEmaV3(self.model, decay=self.block["ema"], use_warmup=True)
         self.optimiser = optimiser(self.model, self.block)
-        self.criterion = nn.CrossEntropyLoss(label_smoothing=self.block["label_smoothing"])
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
         self.best_weights: dict = {}
         self.waited_s = 0.0
@@ -137,17 +162,6 @@ class Trainer:
             generator=torch.Generator(),
         )  # fmt: skip
 
-    def _loss(self, images: torch.Tensor, labels: torch.Tensor) -> torch.Tensor:
-        stations = self.model.shape[0]
-        weight = self.block["alone"] if stations > 1 else 0
-        with self.machine.autocast():
-            found = self.step_model(images, alone=bool(weight))
-        if not weight:
-            return self.criterion(found.float(), labels)
-        together, alone = found
-        each = self.criterion(alone.float(), labels.repeat_interleave(stations))
-        return (self.criterion(together.float(), labels) + weight * each) / (1 + weight)
-
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         self.step_model.train()
         images = images.to(self.machine.device, non_blocking=True)
@@ -155,7 +169,7 @@ class Trainer:
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["factor"]
-        loss = self._loss(images, labels)
+        loss = objective(self.step_model, images, labels, self.block, self.machine)
         loss.backward()
         norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
         self.at.loss_sum += float(loss.detach())

@@ -1,0 +1,154 @@
+"""What accuracy costs in time: trained schemes with their measured times, and networks that were only timed.
+
+accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
+    kind                 trained: accuracy and times measured; timed: times of a network that was not trained, without
+                         accuracy, its core_s_training extrapolated from the time of one step; fidelity: the first
+                         scheme trained on echoes at a tolerance and tested on exact ones
+    backbone, pixels, stations, spectra, steps, train_samples, parameters    what the scheme is
+    seen_percent         held-out motion models of the trained subtypes, unseen_percent: subtypes never trained on
+    difference_points    unseen less that of the first scheme (fidelity: of training on exact echoes), paired
+    low, high            its 95 % interval, which resamples whole motion models
+    inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in memory
+    core_s_training      processor time of the whole training, validation included
+    network_bytes        index images a sample that the network takes in; shard_bytes: bytes a sample in the shards
+    front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
+"""
+
+import csv
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
+from lowalt.recognition.statistics import accuracy_by, bootstrap, pareto
+from lowalt.recognition.tables import Run, snr_text
+from lowalt.streams import stream
+
+COLUMNS = (
+    "scheme", "kind", "backbone", "pixels", "stations", "spectra", "steps", "train_samples", "parameters", "snr_db",
+    "seen_percent", "unseen_percent", "difference_points", "low", "high", "inference_ms_1", "inference_ms_64",
+    "core_s_training", "network_bytes", "shard_bytes", "front", "hardware",
+)  # fmt: skip
+
+
+def read_speeds(paths: list[str | Path]) -> dict[str, dict]:
+    """Return what `speed.measure` found, by scheme.
+
+    Raises: InputError for a file that is no such record.
+    """
+    found = {}
+    for path in paths:
+        try:
+            entry = json.loads(existing(path, "speed").read_text())
+            found[entry["scheme"]] = {
+                key: entry[key] for key in ("size", "parameters", "inference_ms_1", "inference_ms_64", "train_ms",
+                                            "batch", "steps", "backbone", "hardware")}  # fmt: skip
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{path}: not a record of speed ({error!r})") from error
+    return found
+
+
+def _what(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
+    spectra = "+".join(SPECTRA[number] for number in scheme.spectra)
+    return {
+        "scheme": scheme.name, "backbone": speed["backbone"], "pixels": speed["size"], "spectra": spectra,
+        "stations": "".join(STATIONS[number] for number in scheme.stations), "steps": speed["steps"],
+        "parameters": speed["parameters"], "inference_ms_1": speed["inference_ms_1"],
+        "inference_ms_64": speed["inference_ms_64"], "network_bytes": len(scheme.columns) * speed["size"] ** 2,
+        "shard_bytes": shard_bytes, "hardware": speed["hardware"],
+    }  # fmt: skip
+
+
+def _shares(run: Run, part: str) -> dict[str, float]:
+    found = run.part(part)
+    table = {snr_text(snr): 100 * share for snr, (share, _) in accuracy_by(found.snr_db, found.correct).items()}
+    return {**table, "avg": float(np.mean(list(table.values())))} if table else {}
+
+
+def trained_rows(run: Run, base: Run, scheme: Scheme, speed: dict, shard_bytes: float, seed: int) -> list[dict]:
+    """Return one row an SNR and one for their average of a trained scheme, compared with `base` on the same samples."""
+    if not np.array_equal(run.test.key, base.test.key):
+        raise InputError(f"{run.scheme} and {base.scheme} were tested on different samples")
+    same = {
+        **_what(scheme, speed, shard_bytes), "kind": "trained", "steps": run.about["steps"],
+        "train_samples": run.about["train_samples"], "core_s_training": run.about["train_processor_s"],
+    }  # fmt: skip
+    seen, unseen = _shares(run, "seen_test"), _shares(run, "test")
+    gain = 1.0 * run.test.correct - base.test.correct
+    rows = []
+    for snr in unseen:
+        chosen = slice(None) if snr == "avg" else run.test.snr_db == float(snr)
+        interval = bootstrap(run.test.motion[chosen], gain[chosen], stream(seed, "price", run.scheme, snr))
+        difference, low, high = (100 * value for value in interval)
+        found = {"snr_db": snr, "seen_percent": seen.get(snr), "unseen_percent": unseen[snr]}
+        rows.append({**same, **found, "difference_points": difference, "low": low, "high": high})
+    return rows
+
+
+def timed_row(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
+    """Return the row of a network that was timed and not trained; a whole training is that of its settings."""
+    return {
+        **_what(scheme, speed, shard_bytes), "kind": "timed", "snr_db": "avg",
+        "core_s_training": speed["train_ms"] / 1e3 * speed["steps"] * speed["batch"],
+    }  # fmt: skip
+
+
+def fidelity_rows(path: str | Path) -> list[dict]:
+    """Return rows of the models in a transfer table, trained on other data and tested on this: its unseen protocol."""
+    with existing(path, "transfer table").open(newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["protocol"] == "unseen"]
+    return [
+        {"scheme": f"{row['scheme']} trained on {row['trained_on']}", "kind": "fidelity", "snr_db": row["snr_db"],
+         "unseen_percent": float(row["accuracy_percent"]), "hardware": row["hardware"],
+         **{name: float(row[name]) for name in ("difference_points", "low", "high")}}
+        for row in rows
+    ]  # fmt: skip
+
+
+def mark_front(rows: list[dict]) -> None:
+    """Mark in every SNR's trained rows those that no other beats in unseen accuracy over inference time."""
+    for snr in {row["snr_db"] for row in rows}:
+        group = [row for row in rows if row["snr_db"] == snr and row["kind"] == "trained"]
+        cost = np.array([_or_nan(row["inference_ms_64"]) for row in group])
+        value = np.array([row["unseen_percent"] for row in group])
+        for row, best in zip(group, pareto(cost, value) if group else (), strict=True):
+            row["front"] = "yes" if best else "no"
+
+
+def _or_nan(value: float | None) -> float:
+    return math.nan if value is None else value
+
+
+def _cell(value: object) -> object:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else value
+
+
+def write(
+    runs: list[Run], schemes: dict[str, Scheme], speeds: dict[str, dict], shard_bytes: float, fidelity: list[dict],
+    out: str | Path, seed: int,
+) -> None:  # fmt: skip
+    """Write accuracy_cost.csv: trained schemes in the table's order, then the timed ones, then `fidelity` rows.
+
+    Raises: InputError for a run without a scheme or a speed.
+    """
+    order = [name for name in schemes if name in {run.scheme for run in runs}]
+    by_name = {run.scheme: run for run in runs}
+    lacking = sorted(set(by_name) - set(order)) or sorted(set(order) - set(speeds))
+    if lacking or not order:
+        raise InputError(f"{lacking}: no row in the table of schemes, or no record of speed")
+    base = by_name[order[0]]
+    rows: list[dict] = []
+    for name in order:
+        rows += trained_rows(by_name[name], base, schemes[name], speeds[name], shard_bytes, seed)
+    rows += [timed_row(schemes[name], speeds[name], shard_bytes) for name in speeds if name not in by_name]
+    mark_front(rows)
+    with replacing(out) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows([[_cell(row.get(name)) for name in COLUMNS] for row in rows + fidelity])

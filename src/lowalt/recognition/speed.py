@@ -1,0 +1,105 @@
+"""What a scheme's network costs in time on this machine: inference a sample, and a training step a sample.
+
+Untrained weights are timed, since time does not depend on them; images are in memory, so reading is not in it. The
+least of several passes counts, on one thread in processor time: what else runs on a machine only ever adds.
+"""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+import torch
+
+from lowalt.command import pick
+from lowalt.hardware import describe
+from lowalt.recognition import network, recipe
+from lowalt.recognition.inference import Machine
+from lowalt.recognition.schemes import SPECTRA, Scheme
+from lowalt.recognition.training import objective
+from lowalt.tiles import colour_map
+
+BATCHES = (1, 64)
+
+
+def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30) -> float:
+    """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
+
+    Calls stop once they took `limit_s` together; a first call that alone takes that long is the measurement.
+    """
+    begin = clock()
+    work()
+    spent = best = clock() - begin
+    if spent > limit_s:
+        return best
+    best = float("inf")
+    for _ in range(repeats):
+        start = clock()
+        work()
+        best = min(best, clock() - start)
+        spent += clock() - start
+        if spent > limit_s:
+            break
+    return best
+
+
+def _clock(machine: Machine, threads: int) -> Callable[[], float]:
+    """Processor time of one thread; else time that passed, a GPU's work finished."""
+    if machine.device.type == "cuda":
+
+        def finished() -> float:
+            torch.cuda.synchronize()
+            return time.perf_counter()
+
+        return finished
+    return time.process_time if threads == 1 else time.perf_counter
+
+
+def _images(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
+    shape = (samples, len(scheme.columns), size, size)
+    return torch.randint(0, 256, shape, dtype=torch.uint8, generator=torch.Generator().manual_seed(0))
+
+
+def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
+    """Return the times of a scheme's network on one machine, in ms a sample, and its size.
+
+    settings: {seed, size, colour_map, network, training, augmentation}, as for a training; limit_s: seconds spent on
+    one figure. A batch that one call cannot do within the limit is left out (None); the training step takes the largest
+    power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at least.
+    Raises: InputError for a wrong setting.
+    """
+    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")
+    block = recipe.check(settings["training"])
+    recipe.seeded(settings["seed"], ("speed",), block["threads"])
+    machine = Machine.here(block["precision"])
+    palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
+    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes)
+    layout = torch.channels_last if block["channels_last"] else torch.contiguous_format
+    model, clock = model.to(machine.device, memory_format=layout), _clock(machine, block["threads"])
+    times: dict[str, float | None] = {}
+    one = 0.0
+    with torch.inference_mode(), machine.autocast():
+        model.eval()
+        for batch in BATCHES:
+            images = _images(batch, scheme, settings["size"]).to(machine.device)
+            fits = one * batch < limit_s
+            least = least_s(lambda x=images: model(x), limit_s, clock) / batch if fits else None
+            times[f"inference_ms_{batch}"] = 1e3 * least if fits else None
+            one = one or least
+    # Forward and backward cost about three times a forward.
+    most = max(1.0, min(block["batch"], limit_s / 4 / (3 * one)))
+    batch = 1 << int(np.log2(most))
+    images, labels = _images(batch, scheme, settings["size"]).to(machine.device), torch.arange(batch) % 4
+    labels, steps = labels.to(machine.device), recipe.optimiser(model, block)
+    model.train()
+
+    def step() -> None:
+        objective(model, images, labels, block, machine).backward()
+        steps.step()
+        steps.zero_grad(set_to_none=True)
+
+    return {
+        "scheme": scheme.name, "size": settings["size"], "parameters": network.parameters(model), **times,
+        "train_ms": 1e3 * least_s(step, limit_s, clock) / batch, "train_batch": batch, "precision": machine.precision,
+        "threads": block["threads"], "batch": block["batch"], "steps": block["steps"],
+        "backbone": scheme.backbone or settings["network"]["backbone"], "hardware": describe(),
+    }  # fmt: skip

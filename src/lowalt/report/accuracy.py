@@ -1,0 +1,100 @@
+"""The figure of accuracy over time, from accuracy_cost.csv: `python -m lowalt.report.accuracy --table --figure`."""
+
+import argparse
+
+from matplotlib import pyplot as plt
+
+from lowalt.command import run
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.report.figures import SNR_LABELS, png
+from lowalt.report.tables import read_csv
+
+NEEDED = ("scheme", "kind", "snr_db", "seen_percent", "unseen_percent", "inference_ms_64", "core_s_training", "front")
+FIDELITY = ("difference_points", "low", "high")
+
+
+def _points(panel, rows: list[dict], across: str, label: str) -> None:
+    """Seen (hollow) and unseen (filled) accuracy of each scheme over a cost; the front of the unseen is joined."""
+    for number, row in enumerate(rows):
+        colour, x = plt.cm.tab20(number % 20), float(row[across])
+        panel.plot(x, float(row["unseen_percent"]), "o", color=colour, label=row["scheme"])
+        if row["seen_percent"]:
+            panel.plot(x, float(row["seen_percent"]), "o", color=colour, fillstyle="none")
+    front = sorted((float(row[across]), float(row["unseen_percent"])) for row in rows if row["front"] == "yes")
+    if across == "inference_ms_64" and front:
+        panel.step(*zip(*front, strict=True), where="post", color="0.5", lw=1, zorder=0)
+    panel.set(xscale="log", xlabel=label, ylabel="accuracy (%)")
+    panel.grid(alpha=0.3, which="both")
+
+
+def draw(rows: list[dict[str, str]]) -> bytes:
+    """Draw a table of accuracy and its cost; returns PNG bytes.
+
+    Left and middle: accuracy over inference and training time, averaged over SNRs, the front joined and times of
+    networks that were only timed as ticks below; right: unseen accuracy by SNR of the rows on the front, and what
+    training on echoes at a tolerance changes.
+    Raises: InputError where no row was trained.
+    """
+    average = [row for row in rows if row["snr_db"] == "avg"]
+    trained = [row for row in average if row["kind"] == "trained"]
+    if not trained:
+        raise InputError("accuracy_cost: no trained row, expected at least one")
+    fidelity = [row for row in average if row["kind"] == "fidelity"]
+    figure, panels = plt.subplots(1, 4 if fidelity else 3, figsize=(21 if fidelity else 16, 5.2))
+    _points(panels[0], trained, "inference_ms_64", "inference, ms a sample on one core (batch of 64)")
+    _points(panels[1], trained, "core_s_training", "training, core-seconds")
+    panels[0].set_title(
+        "filled: unseen subtypes, hollow: seen;\ngrey: unseen accuracy that nothing faster beats", fontsize=9
+    )
+    timed = [row for row in average if row["kind"] == "timed"]
+    low = min(float(row["unseen_percent"]) for row in trained)
+    for row in timed:
+        for panel, column in ((panels[0], "inference_ms_64"), (panels[1], "core_s_training")):
+            if row[column] or row.get("inference_ms_1"):
+                x = float(row[column] or row["inference_ms_1"])
+                panel.axvline(x, color="0.8", lw=1, zorder=0)
+                panel.text(x, low, f"{row['scheme']} (timed only)", rotation=90, fontsize=7, ha="right", va="bottom")
+    panels[1].set_title("networks only timed: training extrapolated", fontsize=9)
+    best = [row["scheme"] for row in trained if row["front"] == "yes"]
+    for name in best:
+        found = [row for row in rows if row["scheme"] == name and row["kind"] == "trained" and row["snr_db"] != "avg"]
+        labels = [SNR_LABELS.get(row["snr_db"], row["snr_db"]) for row in found]
+        colour = plt.cm.tab20([row["scheme"] for row in trained].index(name) % 20)
+        panels[2].plot(labels, [float(row["unseen_percent"]) for row in found], "o-", color=colour, label=name)
+    panels[2].set(xlabel="SNR (dB)", ylabel="unseen accuracy (%)")
+    panels[2].set_title("by SNR, what nothing faster beats", fontsize=9)
+    panels[2].grid(alpha=0.3)
+    if fidelity:
+        values = [float(row["difference_points"]) for row in fidelity]
+        bars = [[value - float(row["low"]) for value, row in zip(values, fidelity, strict=True)],
+                [float(row["high"]) - value for value, row in zip(values, fidelity, strict=True)]]  # fmt: skip
+        panels[3].errorbar(range(len(values)), values, yerr=bars, fmt="o", capsize=4)
+        panels[3].axhline(0, color="0.6", lw=1)
+        names = [row["scheme"].rpartition(" ")[2].removeprefix("fidelity-") for row in fidelity]
+        panels[3].set_xticks(range(len(names)), names)
+        panels[3].set(xlabel="tolerance of the echoes trained on", ylabel="unseen accuracy less exact (points)")
+        panels[3].set_title("tested on exact echoes; bars: 95 % intervals", fontsize=9)
+        panels[3].grid(alpha=0.3)
+    names, handles = {}, panels[0].get_legend_handles_labels()
+    names.update(zip(handles[1], handles[0], strict=True))
+    figure.legend(names.values(), names.keys(), loc="upper center", bbox_to_anchor=(0.5, 0), ncols=6, fontsize=8)
+    hardware = next((row["hardware"] for row in trained if row.get("hardware")), "")
+    figure.suptitle(f"What accuracy costs in time ({hardware})", fontsize=10)
+    figure.tight_layout()
+    return png(figure)
+
+
+def main(arguments: list[str]) -> None:
+    """Write the figure."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.report.accuracy", description=__doc__)
+    options.add_argument("--table", required=True, help="accuracy_cost.csv")
+    options.add_argument("--figure", required=True, help="picture to write (.png)")
+    given = options.parse_args(arguments)
+    picture = draw(read_csv(given.table, *NEEDED, *FIDELITY))
+    with replacing(given.figure) as temporary:
+        temporary.write_bytes(picture)
+
+
+if __name__ == "__main__":
+    run(main)

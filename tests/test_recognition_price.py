@@ -1,0 +1,152 @@
+"""What accuracy costs in time: fronts, paired differences and extrapolation by construction; times that add up."""
+
+import csv
+import io
+import itertools
+import json
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from PIL import Image
+
+from lowalt.errors import InputError
+from lowalt.recognition import predictions, price, samples, schemes, statistics
+from lowalt.recognition.tables import Run
+from lowalt.report.accuracy import draw
+
+SNRS = (3.0, np.inf)
+HEAD = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
+ROWS = ("base,ABC,VRP+TRP+VT,attention,,unseen,,,", "small,A,VT,attention,,unseen,24,,0.5",
+        "large,ABC,VRP+TRP+VT,mean,vit_base_patch16_224,unseen,224,,")  # fmt: skip
+
+
+@settings(deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 5)), min_size=1, max_size=12))
+def test_the_front_is_what_no_point_beats_by_the_definition(points):
+    found = statistics.pareto(*(np.array(column, float) for column in zip(*points, strict=True)))
+    for kept, (cost, value) in zip(found, points, strict=True):
+        beaten = any(c <= cost and v >= value and (c < cost or v > value) for c, v in points)
+        assert kept == (not beaten)
+
+
+def test_points_without_a_cost_are_on_no_front():
+    assert statistics.pareto(np.array([np.nan, 2.0]), np.array([9.0, 1.0])).tolist() == [False, True]
+
+
+def run_of(folder, name, wrong, count=40):
+    """Predictions of 40 motion models of unseen and 40 of seen subtypes, the first `wrong` of each called wrong."""
+    columns = {"group": np.repeat(["unseen", "seen"], 2 * count), "fold": np.full(4 * count, "test")}
+    model = np.tile(np.arange(count).repeat(2), 2)
+    label = model % 4
+    facts = samples.Facts(
+        key=np.array([f"k{n:03d}" for n in range(4 * count)]), subtype=np.char.add(columns["group"], label.astype(str)),
+        model=model, snr_db=np.tile(SNRS, 2 * count), label=label, range_m=np.ones((4 * count, 3)),
+        aspect_rad=np.ones((4 * count, 3)), **columns,
+    )  # fmt: skip
+    guess = np.where(model < wrong, (label + 1) % 4, label)
+    path = folder / f"{name}.csv"
+    predictions.write(path, predictions.from_facts(facts, (0,), np.eye(4)[guess]))
+    path.with_suffix(".json").write_text(json.dumps(
+        {"protocol": "unseen", "scheme": name, "seed": 0, "hardware": "here", "steps": 30, "train_samples": 77,
+         "train_processor_s": 12.5}))  # fmt: skip
+    return Run(path)
+
+
+def speed_of(folder, name, fast):
+    path = folder / f"speed-{name}.json"
+    path.write_text(json.dumps(
+        {"scheme": name, "size": 24, "parameters": 99, "inference_ms_1": 2 * fast, "inference_ms_64": fast,
+         "train_ms": 3.0, "batch": 8, "steps": 1000, "backbone": "x", "hardware": "here"}))  # fmt: skip
+    return path
+
+
+@pytest.fixture
+def table(tmp_path):
+    (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
+    (tmp_path / "transfer.csv").write_text(
+        "protocol,scheme,trained_on,snr_db,accuracy_percent,own_percent,difference_points,low,high,samples,hardware\n"
+        "seen,ABC,rough,avg,50,60,-10,-12,-8,80,here\nunseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here\n"
+    )
+    runs = [run_of(tmp_path, "small", 10), run_of(tmp_path, "base", 4)]
+    speeds = price.read_speeds(
+        [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
+    )
+    found = schemes.read(tmp_path / "schemes.csv")
+    out = tmp_path / "accuracy_cost.csv"
+    price.write(runs, found, speeds, 280000.0, price.fidelity_rows(tmp_path / "transfer.csv"), out, 1)
+    with out.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_accuracy_differences_and_costs_are_those_put_in(table):
+    base, small, large, rough = (row for row in table if row["snr_db"] == "avg")
+    assert [row["kind"] for row in (base, small, large, rough)] == ["trained", "trained", "timed", "fidelity"]
+    assert (float(base["unseen_percent"]), float(small["unseen_percent"])) == (90.0, 75.0)
+    assert (float(base["seen_percent"]), float(small["seen_percent"])) == (90.0, 75.0)
+    assert (float(base["difference_points"]), float(small["difference_points"])) == (0.0, -15.0)
+    assert -30 < float(small["low"]) < -15 < float(small["high"]) < 0
+    assert (small["stations"], small["spectra"], small["network_bytes"]) == ("A", "VT", str(24**2))
+    assert (small["steps"], small["train_samples"], float(small["core_s_training"])) == ("30", "77", 12.5)
+    assert (base["front"], small["front"]) == ("yes", "yes")
+    # A thousand steps of eight samples, three milliseconds each; no accuracy for what was not trained.
+    assert float(large["core_s_training"]) == pytest.approx(24.0)
+    assert large["unseen_percent"] == large["seen_percent"] == large["front"] == ""
+    assert (rough["scheme"], float(rough["high"])) == ("ABC trained on rough", 0.5)
+    assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
+
+
+def test_runs_without_speed_or_row_are_refused(table, tmp_path):
+    found, run = schemes.read(tmp_path / "schemes.csv"), run_of(tmp_path, "base", 0)
+    with pytest.raises(InputError, match="base"):
+        price.write([run], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+    with pytest.raises(InputError, match="stranger"):
+        price.write([run_of(tmp_path, "stranger", 0)], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+    (tmp_path / "bad.json").write_text("{}")
+    with pytest.raises(InputError, match=r"bad\.json: not a record of speed"):
+        price.read_speeds([tmp_path / "bad.json"])
+
+
+def test_the_figure_is_a_picture_and_repeats(table):
+    first = draw(table)
+    assert first == draw(table)
+    pixels = np.asarray(Image.open(io.BytesIO(first)).convert("L"))
+    assert pixels.min() < 100 < 250 < pixels.max()
+    with pytest.raises(InputError, match="no trained row"):
+        draw([row for row in table if row["kind"] != "trained"])
+
+
+def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
+    from lowalt.recognition.speed import least_s
+
+    now, spans = [0.0], itertools.chain([9.0, 3.0, 2.0, 4.0], itertools.repeat(5.0))
+
+    def work():
+        now[0] += next(spans)
+
+    assert least_s(work, 20.0, lambda: now[0]) == 2.0
+    assert next(spans) == 5.0
+    spans = iter([30.0])
+    assert least_s(work, 20.0, lambda: now[0]) == 30.0
+
+
+def test_more_views_take_longer_to_recognise():
+    from lowalt.recognition.speed import measure
+
+    training = {
+        "steps": 10, "batch": 4, "snrs_per_model": 1, "rate": 1e-3, "backbone_rate": 1.0, "weight_decay": 0.0,
+        "warmup": 0.1, "clip": 1.0, "label_smoothing": 0.0, "alone": 0.5, "ema": 0.9, "precision": "fp32",
+        "channels_last": True, "compile": False, "validate_every": 5, "patience": 0, "checkpoint_s": 9.0, "threads": 1,
+        "workers": 0,
+    }  # fmt: skip
+    block = {"backbone": "test_vit", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
+             "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
+    given = {"seed": 1, "size": 32, "colour_map": "gray", "network": block, "training": training, "augmentation": {}}
+    nine = measure(schemes.Scheme("nine", (0, 1, 2), (0, 1, 2)), given, 0.3)
+    one = measure(schemes.Scheme("one", (0,), (0,)), given, 0.3)
+    assert nine["inference_ms_64"] > 2 * one["inference_ms_64"] > 0
+    assert nine["train_ms"] > nine["inference_ms_64"]
+    assert nine["train_batch"] in (1, 2, 4)
+    # Only the modality embedding grows with the spectra.
+    assert nine["parameters"] - one["parameters"] == 2 * 64
