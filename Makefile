@@ -8,7 +8,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost tables estimate reference pictures pins help
+.PHONY: all default data real test test-slow lint format bench cost accuracy effects tables estimate reference pictures pins help
 
 all: default
 
@@ -58,6 +58,14 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 
 cost: .venv/bench  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
 	$(SNAKEMAKE) -- cost
+
+accuracy: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png
+	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
+	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
+	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy
+
+effects: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
+	$(SNAKEMAKE) -- effects
 
 tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data
 	$(SNAKEMAKE) --configfile config/tables.yaml

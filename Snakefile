@@ -10,12 +10,15 @@ configfile: "config/default.yaml"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/targets.smk"
 include: "workflow/rules/motion.smk"
+include: "workflow/rules/occluders.smk"
 include: "workflow/rules/effects.smk" if config["effects"] else "workflow/rules/echo.smk"
 include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
 include: "workflow/rules/cost.smk"
 include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
+include: "workflow/rules/accuracy.smk"
+include: "workflow/rules/effects_table.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -25,7 +28,9 @@ localrules:
     signals,
     data,
     models,
+    accuracy,
     cost,
+    effects,
 
 
 rule all:
@@ -60,8 +65,20 @@ rule models:
         f"results/{RUN}/config.yaml",
 
 
+rule accuracy:
+    input:
+        f"results/{RUN}/accuracy_cost.csv",
+        f"results/{RUN}/accuracy_cost.png",
+
+
 rule cost:
     input:
         f"results/{RUN}/cost.csv",
         f"results/{RUN}/cost_pixels.csv",
         f"results/{RUN}/cost.png",
+
+
+rule effects:
+    input:
+        f"results/{RUN}/effects.csv",
+        f"results/{RUN}/effects.png",

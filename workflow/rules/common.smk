@@ -1,5 +1,6 @@
 # What the rules share: the checked configuration, the plan that follows from it, and the settings of each stage.
 # This is the only file of the workflow with functions.
+import functools
 import os
 from pathlib import Path
 
@@ -70,6 +71,7 @@ wildcard_constraints:
     # Without other runs nothing matches.
     other="|".join(OTHERS) or "(?!)",
     size=r"\d+",
+    call=r"[a-z0-9_-]+",
     train_seed=r"\d+",
 
 
@@ -80,6 +82,7 @@ TRAININGS = [
     if protocol in scheme.protocols
     for seed in config["recognition"]["seeds"]
 ]
+PRICED = [f"unseen/{scheme.slug}/{config['recognition']['seeds'][0]}" for scheme in TRAINED]
 SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
 RESULT_TABLES = ("accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv")
 
@@ -110,6 +113,67 @@ def group_occluders(wildcards):
 
 def occluders_option(wildcards, input):
     return f"--occluders {input.occluders}" if input.occluders else ""
+
+
+@functools.cache
+def effect_calls():
+    """What is priced: no effects, each alone with its defaults, scenes; {effects, tolerance, snr_db} by name."""
+    from lowalt.report.effect_calls import calls
+
+    try:
+        return calls(config, SCHEMA)
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
+
+
+def effect_call(wildcards):
+    found = effect_calls()
+    if wildcards.call not in found:
+        raise WorkflowError(f"results/{RUN}/effects/{wildcards.call}.npz: no such call, expected one of {list(found)}")
+    return found[wildcards.call]
+
+
+def call_code(wildcards):
+    from lowalt.effects.catalogue import dotted
+
+    return code("lowalt.report.effect_samples", *map(dotted, effect_call(wildcards)["effects"]))
+
+
+def call_occluders(wildcards):
+    """Surface files of all subtypes where the call hides points behind surfaces, none elsewhere."""
+    needed = SLUGS if "occlusion" in effect_call(wildcards)["effects"] else []
+    return [f"results/{wildcards.run}/occluders/{subtype}.npz" for subtype in needed]
+
+
+def call_settings(wildcards):
+    kept = ("network", "spectra", "images", "split", "seed")
+    more = {"name": wildcards.call, "models": config["report"]["effect_models"], "size": pixels(asked_scheme())}
+    return canonical({key: config[key] for key in kept} | effect_call(wildcards) | more)
+
+
+def call_files(wildcards):
+    return [f"results/{wildcards.run}/effects/{name}.npz" for name in effect_calls()]
+
+
+def asked_scheme():
+    """The scheme whose network is asked what effects do: that of the most images, trained on all subtypes."""
+    able = [scheme for scheme in TRAINED if "seen" in scheme.protocols and "seen" in config["recognition"]["protocols"]]
+    if not able:
+        raise WorkflowError("effects: no scheme is trained in the protocol 'seen', expected one in recognition.schemes")
+    return max(able, key=lambda scheme: len(scheme.columns))
+
+
+def asked_model(wildcards):
+    return f"results/{wildcards.run}/models/seen/{asked_scheme().slug}/{config['recognition']['seeds'][0]}/model.pt"
+
+
+def effect_products(wildcards):
+    """Table and figure of priced effects where the report shows them."""
+    return multiext(f"results/{wildcards.run}/effects", ".csv", ".png") if config["report"]["effects"] else []
+
+
+def effect_products_option(wildcards, input):
+    return "--effects {} {}".format(*input.effects) if input.effects else ""
 
 
 def record_files(wildcards):
@@ -208,6 +272,12 @@ def training_settings(wildcards):
     block = config["recognition"]
     kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
     return canonical({"seed": int(wildcards.train_seed), "colour_map": config["images"]["colour_map"], **kept})
+
+
+def speed_settings(wildcards):
+    block = config["recognition"]
+    kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
+    return canonical({"seed": config["seed"], "colour_map": config["images"]["colour_map"], **kept})
 
 
 def benchmark_files(wildcards):

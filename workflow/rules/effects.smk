@@ -1,7 +1,7 @@
 # Echo in a scene with effects: the signals one base station hears, and the powers of the targets' own echoes.
-# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
-# OUTPUTS: results/{run}/occluders/{subtype}.npz where the scene hides points behind surfaces;
-#          results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
+# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
+#                  where the scene hides points behind surfaces
+# OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
 
 
 rule echo:
@@ -32,22 +32,3 @@ rule echo:
     shell:
         "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " {params.occluders} --station {wildcards.station} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
-
-
-rule occluders:
-    input:
-        code=code("lowalt.targets.occluders", *SOURCE_MODULES),
-        files=record_files,
-    output:
-        "results/{run}/occluders/{subtype}.npz",
-    log:
-        "results/{run}/logs/occluders/{subtype}.log",
-    benchmark:
-        "results/{run}/benchmarks/occluders/{subtype}.jsonl"
-    conda:
-        "../../envs/environment.yaml"
-    params:
-        settings=cloud_settings,
-        inputs=f"--inputs {INPUTS}" if INPUTS else "",
-    shell:
-        "python -m lowalt.targets.occluders --settings {params.settings:q} {params.inputs} --out {output:q} 2> {log:q}"

@@ -27,6 +27,11 @@ STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "samp
 COMPARISON_COLUMNS = (
     "protocol", "scheme", "over", "difference_points", "low", "high", "unit", "only_first", "only_second", "mcnemar_p",
 )  # fmt: skip
+EFFECT_COLUMNS = (
+    "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",
+    "pixel_difference", "cells_changed_percent", "snr_db", "accuracy_without_percent", "accuracy_with_percent",
+    "difference_points", "low", "high", "scheme", "protocol", "hardware",
+)  # fmt: skip
 
 
 def network_words(block: dict) -> str:
@@ -105,6 +110,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--gallery", required=True, help="picture of all clouds (.png)")
     options.add_argument("--motion", required=True, help="a motion table; its first model a category is drawn")
     options.add_argument("--benchmarks", nargs="+", required=True, help="benchmark files of all jobs (.jsonl)")
+    options.add_argument("--effects", nargs=2, help="what each effect costs and does: table (.csv) and figure (.png)")
     options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
     options.add_argument("--out", required=True, help="page to write (.html)")
     given = options.parse_args(arguments)
@@ -125,6 +131,11 @@ def main(arguments: list[str]) -> None:
         "clouds": existing(given.gallery, "gallery").read_bytes(),
         "strip": motion_strip([read(path) for path in given.clouds], read_table(given.motion)),
     }
+    priced = []
+    if given.effects:
+        table, drawing = given.effects
+        priced = read_csv(table, *EFFECT_COLUMNS)
+        pictures["effects"] = existing(drawing, "figure of effects").read_bytes()
     labels = [f"{snr:g}" for snr in map(float, config["noise"]["snr_db"])]
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     page = template.from_string(Path(__file__).with_name("page.html").read_text()).render(
@@ -134,7 +145,8 @@ def main(arguments: list[str]) -> None:
         ours=ours, published=paper, network=network_words(config["recognition"]),
         comparisons=read_csv(given.comparisons, *COMPARISON_COLUMNS), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
-        clouds=clouds, times=times, versions=versions(), configuration=yaml.safe_dump(config, sort_keys=False),
+        clouds=clouds, times=times, effects=priced, versions=versions(),
+        configuration=yaml.safe_dump(config, sort_keys=False),
         images={name: picture(data) for name, data in pictures.items()},
     )  # fmt: skip
     with replacing(given.out) as temporary:

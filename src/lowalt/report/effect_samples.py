@@ -1,0 +1,203 @@
+"""One call for effects, measured on test samples of a run: time, signal, range cells, spectra, images for its network.
+
+    python -m lowalt.report.effect_samples --settings JSON --motion a.csv ... --clouds b.npz ... --out adc.npz
+
+Settings: name and effects of the call, the blocks network, spectra, images and split of the configuration, seed, the
+echo's tolerance, snr_db, size (pixels the network sees) and models (motion models of each subtype). Every sample is
+computed with and without the effects, one right after the other, so that both meet the same machine.
+"""
+
+import json
+import time
+import zipfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.command import parser, pick, run
+from lowalt.effects.catalogue import called
+from lowalt.effects.chain import Scene, hear
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.hardware import describe
+from lowalt.motion import read_table
+from lowalt.network import Network
+from lowalt.noise.__main__ import noisy_signals
+from lowalt.splits import fold
+from lowalt.targets.cloud import CATEGORIES, Cloud, read
+from lowalt.tiles import Renderer, resize, split
+from lowalt.tiles.__main__ import renderer
+
+STEP = 8
+"""Steps of the 256 by which a pixel must move to count as changed: about what an eye sees beside the other."""
+ARRAYS = (
+    "subtype", "model", "label", "snr_db", "base_ms", "total_ms", "signal_change", "cells_changed", "pixels_changed",
+    "pixel_difference", "views", "example", "example_subtype",
+)  # fmt: skip
+"""subtype, model, label (K,); snr_db (S,); base_ms, total_ms, signal_change and cells_changed (K, stations);
+pixels_changed and pixel_difference (K,); views (K, S, V, size, size) uint8; example (2, V, S, S) uint8: the spectra of
+the first UAV (of the first target, without one) without and with the effects, free of noise; its name."""
+
+
+class Take(NamedTuple):
+    """What the stations heard of K motion models in one scene.
+
+    signal: (K, stations, N) complex64; cell: (K, stations, N) range cells; power: (K, stations) W, of the echoes
+    alone; ms: (K, stations), processor time each took.
+    """
+
+    signal: np.ndarray
+    cell: np.ndarray
+    power: np.ndarray
+    ms: np.ndarray
+
+
+def tested(rows: list[dict], share: dict, seed: int, count: int) -> list[dict]:
+    """Return the first `count` motion models of each subtype that the split `share` puts into the test fold.
+
+    Raises: InputError where motion models are in several folds, or a subtype has none in the test fold.
+    """
+    if share["by"] != "motion":
+        raise InputError(f"split.by: {share['by']!r}, expected 'motion': else training has heard the test's models")
+    found: dict[str, list[dict]] = {}
+    for row in rows:
+        mine = found.setdefault(row["subtype"], [])
+        if len(mine) < count and fold(share, seed, row["subtype"], row["model"]) == "test":
+            mine.append(row)
+    empty = [name for name, mine in found.items() if not mine]
+    if empty or not found:
+        raise InputError(f"motion: no test models of {empty or 'any subtype'} among {len(rows)} rows")
+    return [row for mine in found.values() for row in mine]
+
+
+def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occluders: dict[str, dict]) -> list[Take]:
+    """Return what all stations hear of every motion model in each scene, the scenes taking turns sample by sample.
+
+    occluders: surfaces of each subtype, where a scene hides points behind them.
+    Raises: InputError naming the sample that has no cloud or cannot be computed with.
+    """
+    network = scenes[0].network
+    shape = (len(rows), len(network.stations))
+    found = [
+        Take(
+            np.empty((*shape, network.symbols), np.complex64), np.empty((*shape, network.symbols), np.int64),
+            np.empty(shape), np.empty(shape),
+        )
+        for _ in scenes
+    ]  # fmt: skip
+    for index, row in enumerate(rows):
+        if row["subtype"] not in clouds:
+            raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of it among {sorted(clouds)}")
+        given = (clouds[row["subtype"]], row, occluders.get(row["subtype"]))
+        for place, station in enumerate(network.stations):
+            pairs = list(zip(scenes, found, strict=True))
+            # In turns, since whoever comes second finds the target's data in the processor's caches.
+            for scene, take in pairs if (index + place) % 2 else pairs[::-1]:
+                if index == place == 0:
+                    # What is compiled or looked up once is no cost of a sample.
+                    hear(scene, station, *given)
+                start = time.process_time()
+                heard = hear(scene, station, *given)
+                take.ms[index, place] = 1e3 * (time.process_time() - start)
+                take.signal[index, place], take.cell[index, place] = heard.signal, heard.cell
+                take.power[index, place] = heard.power
+    return found
+
+
+def signal_change(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return the root mean square of after - before over that of before; both (..., N), the result (...)."""
+    before, after = np.asarray(before, np.complex128), np.asarray(after, np.complex128)
+    return np.linalg.norm(after - before, axis=-1) / np.linalg.norm(before, axis=-1)
+
+
+def pixel_change(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+    """Return the share of values of two uint8 arrays of equal shape that differ by more than STEP, and the mean |step|.
+
+    Raises: InputError where the shapes differ.
+    """
+    if before.shape != after.shape:
+        raise InputError(f"spectra: shapes {before.shape} and {after.shape}, expected equal shapes")
+    step = np.abs(before.astype(np.int16) - after.astype(np.int16))
+    return float(np.mean(step > STEP)), float(step.mean())
+
+
+def views(tiles: Renderer, signals: np.ndarray, size: int) -> np.ndarray:
+    """Return what a network sees of signals (K, S, stations, N): index images (K, S, 3 stations, size, size) uint8."""
+    return np.stack([[resize(split(tiles.tile(one)), size) for one in levels] for levels in signals])
+
+
+def measure(
+    scenes: tuple[Scene, Scene], tiles: Renderer, clouds: dict[str, Cloud], rows: list[dict],
+    occluders: dict[str, dict], snrs: list[float], size: int,
+) -> dict[str, np.ndarray]:  # fmt: skip
+    """Return ARRAYS for the samples `rows` in a scene without and one with effects; snrs in dB.
+
+    Noise is drawn as the noise stage does, so that without effects the images are the run's own.
+    Raises: InputError as `takes` does.
+    """
+    before, after = takes(list(scenes), clouds, rows, occluders)
+    names = [station.name for station in tiles.network.stations]
+    power = after.power.T if scenes[1].effects else None
+    noisy = noisy_signals(after.signal.swapaxes(0, 1), rows, names, snrs, scenes[1].seed, power)
+    changed, difference = np.empty(len(rows)), np.empty(len(rows))
+    shown = next((index for index, row in enumerate(rows) if row["category"] == "UAV"), 0)
+    for index in range(len(rows)):
+        pair = [tiles.tile(take.signal[index]) for take in (before, after)]
+        changed[index], difference[index] = pixel_change(*pair)
+        if index == shown:
+            example = np.stack([split(tile) for tile in pair])
+    return {
+        "subtype": np.array([row["subtype"] for row in rows]), "model": np.array([row["model"] for row in rows]),
+        "label": np.array([CATEGORIES.index(row["category"]) for row in rows]), "snr_db": np.array(snrs, float),
+        "base_ms": before.ms, "total_ms": after.ms, "signal_change": signal_change(before.signal, after.signal),
+        "cells_changed": np.mean(before.cell != after.cell, axis=2), "pixels_changed": changed,
+        "pixel_difference": difference, "views": views(tiles, noisy, size), "example": example,
+        "example_subtype": np.array(rows[shown]["subtype"]),
+    }  # fmt: skip
+
+
+def read_samples(path: str | Path) -> tuple[dict, dict[str, np.ndarray]]:
+    """Return the header {name, effects, hardware} and ARRAYS of a file this command wrote.
+
+    Raises: InputError where the file is missing or no such file.
+    """
+    existing(path, "effect")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return json.loads(str(data["header"])), {name: data[name] for name in ARRAYS}
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path}: not a file of an effect's samples ({error})") from error
+
+
+def main(arguments: list[str]) -> None:
+    """Measure one call for effects and write its file."""
+    options = parser("lowalt.report.effect_samples", __doc__.splitlines()[0])
+    options.add_argument("--motion", nargs="+", required=True, help="motion tables that have test models")
+    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of their subtypes")
+    options.add_argument("--occluders", nargs="*", default=[], help="surface files of their subtypes")
+    options.add_argument("--out", required=True, help="file to write (.npz)")
+    given = options.parse_args(arguments)
+    keys = ("name", "effects", "network", "spectra", "images", "split", "seed", "tolerance", "snr_db", "size", "models")
+    block = dict(zip(keys, pick(given.settings, *keys), strict=True))
+    network = Network.from_settings(block["network"])
+    tiles = renderer({key: block[key] for key in ("network", "spectra", "images")})
+    rows = [row for path in given.motion for row in read_table(path)]
+    rows = tested(rows, block["split"], block["seed"], block["models"])
+    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    occluders = {}
+    if given.occluders:
+        from lowalt.targets.occluders import read as read_occluders
+
+        occluders = {surfaces["subtype"]: surfaces for surfaces in map(read_occluders, given.occluders)}
+    base = Scene(network, block["seed"], block["tolerance"], ())
+    scene = Scene(network, block["seed"], block["tolerance"], tuple(called(block["effects"])))
+    snrs = [float(snr) for snr in block["snr_db"]]
+    found = measure((base, scene), tiles, clouds, rows, occluders, snrs, block["size"])
+    header = {"name": block["name"], "effects": list(block["effects"]), "hardware": describe()}
+    with replacing(given.out) as temporary:
+        np.savez_compressed(temporary, header=np.array(json.dumps(header, sort_keys=True)), **found)
+
+
+if __name__ == "__main__":
+    run(main)

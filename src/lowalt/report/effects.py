@@ -1,0 +1,181 @@
+"""What each effect costs and does, alone and together: the table and the figure of a run.
+
+    python -m lowalt.report.effects --settings JSON --samples none.npz adc.npz ... --model model.pt
+        --table effects.csv --figure effects.png
+
+Settings: seed, and evaluation of the configuration's recognition block. The files are those of
+`lowalt.report.effect_samples`; the one without effects gives the accuracies that all others are held against.
+"""
+
+import sys
+from csv import DictWriter
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.command import parser, pick, run
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.report.effect_samples import read_samples
+from lowalt.streams import stream
+
+COLUMNS = (
+    "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",
+    "pixel_difference", "cells_changed_percent", "snr_db", "samples", "accuracy_without_percent",
+    "accuracy_with_percent", "difference_points", "low", "high", "scheme", "protocol", "hardware",
+)  # fmt: skip
+"""One row a call: an effect alone with its defaults, a scene's effects together, or none.
+
+base_ms, added_ms: processor time a sample and station, median over samples and stations; parts_ms: sum of the added
+times that a scene's effects have alone; signal_change: root mean square of Y_bin's change over Y_bin's, median;
+pixels_changed_percent: of all spectra's pixels, by more than 8 of 255, without noise; pixel_difference: mean absolute
+change, of 255; cells_changed_percent: OFDM symbols whose range cell is another; snr_db: at which the network was asked,
+with a blank between them; difference_points: accuracy with less accuracy without, on the same samples and noise, and
+its 95 % interval, which resamples whole motion models.
+"""
+NONE = "none"
+"""Name of the call for no effects."""
+
+
+def correct(probabilities: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """Return whether the most probable class is the true one; probabilities (K, S, classes), labels (K,) -> (K, S)."""
+    return probabilities.argmax(axis=-1) == labels[:, None]
+
+
+def difference(
+    without: np.ndarray, with_it: np.ndarray, motion: np.ndarray, rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """Return accuracy with less accuracy without in percentage points, and the ends of its 95 % interval.
+
+    without, with_it: (K, S) bool, the same samples; motion: (K,) names of motion models, which are resampled whole.
+    Source: as `lowalt.recognition.statistics.bootstrap`.
+    """
+    from lowalt.recognition.statistics import bootstrap
+
+    change = 100.0 * (with_it.astype(float) - without)
+    return tuple(bootstrap(np.repeat(motion, change.shape[1]), change.ravel(), rng))
+
+
+def added_ms(samples: dict[str, np.ndarray]) -> float:
+    """Return the median over samples and stations of the processor time that effects added (ms)."""
+    return float(np.median(samples["total_ms"] - samples["base_ms"]))
+
+
+def same_samples(base: dict[str, np.ndarray], other: dict[str, np.ndarray], name: str) -> list[int]:
+    """Return the places of other's SNRs among the base's.
+
+    Raises: InputError naming the call whose samples are others than the base's, or that has an SNR of its own.
+    """
+    if any(not np.array_equal(base[key], other[key]) for key in ("subtype", "model", "label")):
+        raise InputError(f"{name}: its motion models are not those of {NONE!r}, expected the same")
+    known = base["snr_db"].tolist()
+    if not set(other["snr_db"].tolist()) <= set(known):
+        raise InputError(f"{name}: SNRs {other['snr_db'].tolist()}, expected some of {known}")
+    return [known.index(snr) for snr in other["snr_db"].tolist()]
+
+
+def rows(calls: list[tuple[dict, dict]], right: dict[str, np.ndarray], network: dict, seed: int) -> list[dict]:
+    """Return a row (keys COLUMNS) for every call, none first, then in the order given.
+
+    calls: (header, arrays) of each; right: (K, S) bool of each by name; network: {scheme, protocol} of the network.
+    Raises: InputError where there is no call without effects, or the samples differ.
+    """
+    named = {header["name"]: (header, arrays) for header, arrays in calls}
+    if NONE not in named:
+        raise InputError(f"--samples: {sorted(named)}, expected {NONE!r} among them")
+    base = named[NONE][1]
+    motion = np.array([f"{s}/{m}" for s, m in zip(base["subtype"], base["model"], strict=True)])
+    added = {name: added_ms(arrays) for name, (_, arrays) in named.items()}
+    result = []
+    for name in sorted(named, key=lambda name: name != NONE):
+        header, arrays = named[name]
+        places = same_samples(base, arrays, name)
+        without, with_it = right[NONE][:, places], right[name]
+        value, low, high = difference(without, with_it, motion, stream(seed, "bootstrap", "effects", name))
+        parts = [added[part] for part in header["effects"] if part in added] if len(header["effects"]) > 1 else []
+        # A sum without all its parts would pass for one with them.
+        whole = len(parts) == len(header["effects"])
+        result.append({
+            "call": name, "effects": " ".join(header["effects"]), "motion_models": len(motion),
+            "base_ms": float(np.median(arrays["base_ms"])), "added_ms": added[name],
+            "parts_ms": sum(parts) if parts and whole else "",
+            "signal_change": float(np.median(arrays["signal_change"])),
+            "pixels_changed_percent": 100 * float(arrays["pixels_changed"].mean()),
+            "pixel_difference": float(arrays["pixel_difference"].mean()),
+            "cells_changed_percent": 100 * float(arrays["cells_changed"].mean()),
+            "snr_db": " ".join(f"{snr:g}" for snr in arrays["snr_db"]), "samples": with_it.size,
+            "accuracy_without_percent": 100 * float(without.mean()),
+            "accuracy_with_percent": 100 * float(with_it.mean()),
+            "difference_points": value, "low": low, "high": high, **network, "hardware": header["hardware"],
+        })  # fmt: skip
+    return result
+
+
+def write(path: str | Path, table: list[dict]) -> None:
+    """Write the rows as CSV, numbers to six digits."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = DictWriter(file, COLUMNS, lineterminator="\n")
+        writer.writeheader()
+        for row in table:
+            writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()})
+
+
+class _Held:
+    """Images in memory as `inference.probabilities` asks for them: those of every motion model at every SNR."""
+
+    def __init__(self, views: np.ndarray, columns: list[int]):
+        """views: (K, S, V, size, size) uint8; columns: the network's views among the V."""
+        self.images = views.reshape(-1, *views.shape[2:])[:, columns]
+
+    def views(self, numbers: np.ndarray) -> np.ndarray:
+        """Return the images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
+        return self.images[numbers]
+
+
+def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple[dict[str, np.ndarray], dict]:
+    """Return which samples of each call a trained model recognises, (K, S) bool by name, and {scheme, protocol}.
+
+    model: model.pt; block: recognition.evaluation. Raises: InputError where the images are not of the model's size.
+    """
+    from lowalt.recognition import recipe, runs
+    from lowalt.recognition.inference import Machine, probabilities
+
+    batch, threads, precision = pick(block, "batch", "threads", "precision")
+    trained = runs.load(model)
+    recipe.seeded(trained.seed, ("evaluate",), threads)
+    machine = Machine.here(precision)
+    network = trained.model.to(machine.device)
+    found = {}
+    for header, arrays in calls:
+        if arrays["views"].shape[-1] != trained.size:
+            raise InputError(f"{header['name']}: images of {arrays['views'].shape[-1]} pixels, {model} {trained.size}")
+        count = arrays["views"].shape[0] * arrays["views"].shape[1]
+        held = _Held(arrays["views"], trained.scheme.columns)
+        told = probabilities(network, held, np.arange(count), machine, batch)
+        found[header["name"]] = correct(told.reshape(*arrays["views"].shape[:2], -1), arrays["label"])
+    return found, {"scheme": trained.scheme.name, "protocol": trained.protocol}
+
+
+def main(arguments: list[str]) -> None:
+    """Ask the trained network, and write the table and the figure."""
+    from lowalt.report.effects_figure import figure
+
+    options = parser("lowalt.report.effects", __doc__.splitlines()[0])
+    options.add_argument("--samples", nargs="+", required=True, help="files of lowalt.report.effect_samples")
+    options.add_argument("--model", required=True, help="model.pt of a network trained without effects")
+    options.add_argument("--table", required=True, help="table to write (.csv)")
+    options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
+    given = options.parse_args(arguments)
+    seed, evaluation = pick(given.settings, "seed", "evaluation")
+    calls = [read_samples(path) for path in given.samples]
+    right, network = recognised(given.model, calls, evaluation)
+    table = rows(calls, right, network, seed)
+    write(given.table, table)
+    examples = {header["name"]: (str(arrays["example_subtype"]), arrays["example"]) for header, arrays in calls}
+    with replacing(given.figure) as temporary:
+        temporary.write_bytes(figure(table, examples))
+    print(f"{given.table}: {len(table)} calls, {len(calls[0][1]['label'])} motion models", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,47 @@
+# Effects priced: what each effect costs and does, alone and together, on test samples of a run without effects.
+# REQUIRED INPUTS: results/{run}/clouds/*.npz, results/{run}/motion/{group}-00000.csv, a model trained on the run
+# OUTPUTS: results/{run}/effects/{call}.npz, results/{run}/effects.csv, results/{run}/effects.png
+
+
+rule effect_samples:
+    input:
+        code=call_code,
+        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=PLAN.groups),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        occluders=call_occluders,
+    output:
+        "results/{run}/effects/{call}.npz",
+    log:
+        "results/{run}/logs/effects/{call}.log",
+    benchmark:
+        "results/{run}/benchmarks/effects/{call}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=call_settings,
+        occluders=occluders_option,
+    shell:
+        "python -m lowalt.report.effect_samples --settings {params.settings:q} --motion {input.motion:q}"
+        " --clouds {input.clouds:q} {params.occluders} --out {output:q} 2> {log:q}"
+
+
+rule effects_table:
+    input:
+        code=code("lowalt.report.effects"),
+        samples=call_files,
+        model=asked_model,
+    output:
+        table="results/{run}/effects.csv",
+        figure="results/{run}/effects.png",
+    log:
+        "results/{run}/logs/effects_table.log",
+    benchmark:
+        "results/{run}/benchmarks/effects_table.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    threads: config["recognition"]["evaluation"]["threads"]
+    params:
+        settings=canonical({"seed": config["seed"], "evaluation": config["recognition"]["evaluation"]}),
+    shell:
+        "python -m lowalt.report.effects --settings {params.settings:q} --samples {input.samples:q}"
+        " --model {input.model:q} --table {output.table:q} --figure {output.figure:q} 2> {log:q}"

@@ -1,0 +1,22 @@
+# Occluders: the opaque surfaces of a subtype, made only where something asks for points hidden behind them.
+# REQUIRED INPUTS: as the cloud of the subtype
+# OUTPUTS: results/{run}/occluders/{subtype}.npz
+
+
+rule occluders:
+    input:
+        code=code("lowalt.targets.occluders", *SOURCE_MODULES),
+        files=record_files,
+    output:
+        "results/{run}/occluders/{subtype}.npz",
+    log:
+        "results/{run}/logs/occluders/{subtype}.log",
+    benchmark:
+        "results/{run}/benchmarks/occluders/{subtype}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=cloud_settings,
+        inputs=f"--inputs {INPUTS}" if INPUTS else "",
+    shell:
+        "python -m lowalt.targets.occluders --settings {params.settings:q} {params.inputs} --out {output:q} 2> {log:q}"
