@@ -20,6 +20,7 @@ from lowalt.targets.records import load_records
 from lowalt.targets.sampling import sample_surface
 from lowalt.targets.skeleton import NODES
 from lowalt.targets.surfaces import Surface, box, cylinder, ellipsoid
+from real_inputs import FOLDER, needs_inputs
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 NOTHING = np.full(3, np.nan)
@@ -35,7 +36,7 @@ def scene(points, normals, surfaces: list[Surface], part, kinds=("body",), close
         record={"subtype": "test", "category": "UAV", "source": "t", "checksum": ""},
     )  # fmt: skip
     row = {"subtype": "test", "model": 0, **dict.fromkeys(NUMBERS, 0.0), **values}
-    given = occluders.from_surfaces(surfaces, np.full(count, 1e-9), np.full(count, closed)) | {"subtype": "test"}
+    given = occluders.from_surfaces(surfaces, np.full(len(points), 1e-9), np.full(count, closed)) | {"subtype": "test"}
     return View(NETWORK, NETWORK.station("A"), cloud, row, NETWORK.times_s, occluders=given)
 
 
@@ -113,7 +114,7 @@ def cast(view: View, n: int) -> np.ndarray:
     given, (rotation, translation, _, part) = view.occluders, view.motion
     owner = given["vertex_part"]
     vertices = np.einsum("kij,kj->ki", rotation[n][owner], given["vertices"]) + translation[n][owner]
-    start = view.cloud.points + given["offset_m"][part][:, None] * view.cloud.normals
+    start = view.cloud.points + given["offset_m"][:, None] * view.cloud.normals
     start = np.einsum("kij,kj->ki", rotation[n][part], start) + translation[n][part]
     a, b, c = (vertices[given["faces"][:, corner]] for corner in range(3))
     result = np.zeros(len(start), bool)
@@ -230,3 +231,26 @@ def test_strength_scales_and_a_target_without_its_surfaces_is_refused(tmp_path):
     path.write_bytes(first[:500])
     with pytest.raises(InputError, match="not a file of occluders"):
         occluders.read(path)
+
+
+@needs_inputs
+@pytest.mark.parametrize("name", ["DJI Mini 2", "NIO ET5T 2023"])
+def test_the_surfaces_of_a_users_mesh_lie_where_its_cloud_does(name):
+    config = load_yaml("config/default.yaml")
+    records = [*config["targets"]["records"], "config/targets/real.yaml"]
+    record = load_records(config["targets"]["table"], records)[name]
+    cloud = make(record, FOLDER, 1)
+    given = occluders.make(record, FOLDER, 1) | {"subtype": name}
+    size = np.ptp(cloud.points, axis=0).max()
+    for part in range(len(cloud.kinds)):
+        mine = given["vertices"][given["vertex_part"] == part]
+        points = cloud.points[cloud.part == part]
+        assert (points.min(axis=0) > mine.min(axis=0) - 0.02 * size).all()
+        assert (points.max(axis=0) < mine.max(axis=0) + 0.02 * size).all()
+    assert np.quantile(given["offset_m"], 0.9) < 0.005 * size
+    assert len(given["faces"]) < 10_000
+    row = {"subtype": name, "model": 0, **dict.fromkeys(NUMBERS, 0.4), "x_m": 150.0, "y_m": 100.0, "z_m": 60.0}
+    view = View(NETWORK, NETWORK.station("A"), cloud, row, NETWORK.times_s, occluders=given)
+    found = occlusion.hidden(view)
+    assert (found[200] == cast(view, 200)).all()
+    assert 0.2 < found.mean() < 0.8

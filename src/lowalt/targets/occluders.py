@@ -2,7 +2,7 @@
 
 Triangles for targets with a surface, each vertex riding on the part it belongs to; capsules along the bones for
 recordings, whose nodes have none. Built-in shapes keep all their triangles, so that points lie exactly on them; user's
-meshes are simplified, and the file says how far each part's points then lie off.
+meshes are simplified, and the file says how far each point then lies off.
 """
 
 import json
@@ -19,9 +19,9 @@ from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged
 
 ARRAYS = ("vertices", "vertex_part", "faces", "offset_m", "closed", "bones", "radius_m")
-"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) vertices; offset_m (P,) m, how far off the
-surface a part's points are to start; closed (P,) bool, whether a part's surface is closed; bones (B, 2) nodes at the
-ends of capsules; radius_m (B,) m."""
+"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) vertices; offset_m (L,) m, how far off the
+surface each of the cloud's points is to start; closed (P,) bool, whether a part's surface is closed; bones (B, 2)
+nodes at the ends of capsules; radius_m (B,) m."""
 
 STATURE_M = 1.756
 RADII_M = {
@@ -36,6 +36,19 @@ GRAIN = 30
 """Triangles that a cut goes through are divided down to this fraction of the part's extent."""
 
 
+def longest_edge(corners: np.ndarray) -> np.ndarray:
+    """Return the longest edge (F,) of triangles (F, 3, 3)."""
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
+def quartered(corners: np.ndarray) -> np.ndarray:
+    """Return triangles (F, 3, 3) each divided into four at the middles of its edges, (4 F, 3, 3), copies in turn."""
+    a, b, c = np.moveaxis(corners, 1, 0)
+    ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
+    four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
+    return np.concatenate([np.stack(three, axis=1) for three in four])
+
+
 def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
     """Return a surface without its triangles inside the convex `cuts`, divided finely along their borders."""
     corners = surface.vertices[surface.faces]
@@ -46,16 +59,13 @@ def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
         while len(corners):
             apart = ((corners.max(axis=1) <= low) | (corners.min(axis=1) >= high)).any(axis=1)
             within = inside(volume, corners.reshape(-1, 3)).reshape(-1, 3)
-            size = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+            size = longest_edge(corners)
             # Three corners outside do not say that a large triangle is.
             outside = apart | (~within.any(axis=1) & (size < 0.3 * (high - low).min()))
             small = ~within.all(axis=1) & ~outside & (size <= grain)
             small[small] = ~inside(volume, corners[small].mean(axis=1))
             kept += [corners[outside | small]]
-            a, b, c = np.moveaxis(corners[~within.all(axis=1) & ~outside & (size > grain)], 1, 0)
-            ab, bc, ca = (a + b) / 2, (b + c) / 2, (c + a) / 2
-            four = [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-            corners = np.concatenate([np.stack(three, axis=1) for three in four])
+            corners = quartered(corners[~within.all(axis=1) & ~outside & (size > grain)])
         corners = np.concatenate(kept)
     vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
     return Surface(vertices, faces.reshape(-1, 3))
@@ -74,7 +84,7 @@ def part_surface(part: Part) -> Surface:
 
 
 def from_surfaces(surfaces: list[Surface], offset_m: np.ndarray, closed: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the arrays of one surface a part, in the cloud's order of parts; offset_m: (P,) m; closed: (P,)."""
+    """Return the arrays of one surface a part, in the cloud's order of parts; offset_m: (L,) m; closed: (P,)."""
     whole = merged(surfaces)
     owner = np.repeat(np.arange(len(surfaces)), [len(surface.vertices) for surface in surfaces])
     return {
@@ -108,7 +118,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
         surfaces = [part_surface(part) for part in parts]
         # Clears a point's own triangle by more than rounding, and stays on it where a point stands by its corner.
         offset = 1e-9 * np.ptp(merged(surfaces).vertices, axis=0).max()
-        return from_surfaces(surfaces, np.full(len(parts), offset), np.array([not part.cuts for part in parts]))
+        return from_surfaces(surfaces, np.full(record["points"], offset), np.array([not part.cuts for part in parts]))
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
     if source != "mesh":

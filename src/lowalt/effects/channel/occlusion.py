@@ -32,10 +32,10 @@ def hidden(view: View) -> np.ndarray:
     make = "make them with python -m lowalt.targets.occluders"
     if surfaces is None:
         raise InputError(f"effects.occlusion: {cloud.subtype} has no surfaces, {make}")
-    if surfaces["subtype"] != cloud.subtype or len(surfaces["offset_m"]) != len(cloud.kinds):
+    if surfaces["subtype"] != cloud.subtype or len(surfaces["offset_m"]) != len(cloud.points):
         raise InputError(
-            f"effects.occlusion: surfaces of {surfaces['subtype']} with {len(surfaces['offset_m'])} parts, expected "
-            f"those of {cloud.subtype} with {len(cloud.kinds)}; {make}"
+            f"effects.occlusion: surfaces of {surfaces['subtype']} with {len(surfaces['offset_m'])} points, expected "
+            f"those of {cloud.subtype} with {len(cloud.points)}; {make}"
         )
     place = np.asarray(view.station.position_m, float)
     result = np.zeros(view.places.shape[:2], np.bool_)
@@ -44,7 +44,7 @@ def hidden(view: View) -> np.ndarray:
         return result
     rotation, translation, points, part = view.motion
     known = np.isfinite(cloud.normals).all(axis=1)
-    offset = surfaces["offset_m"][part]
+    offset = surfaces["offset_m"]
     start = points + np.where(known[:, None], offset[:, None] * cloud.normals, 0.0)
     range_m = np.linalg.norm(view.aim_m - place)
     toward = np.where(known, 0.0, offset / range_m)
