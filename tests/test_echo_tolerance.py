@@ -77,10 +77,10 @@ def test_fitted_cosines_keep_their_bound(band, error):
 
 
 @pytest.mark.parametrize("kind", ["inverse", "excess", "cosine", "sine"])
-@pytest.mark.parametrize("error", [1e-3, 1e-7, 1e-15])
-def test_fixed_functions_keep_their_bound(kind, error):
+@pytest.mark.parametrize("degree", [3, 5, 7, 10])
+def test_fixed_functions_keep_their_bound(kind, degree):
     reach = 0.25 if kind in ("cosine", "sine") else 0.1
-    coefficients, bound = fits.smooth(kind, reach, error)
+    coefficients, bound = fits.smooth(kind, reach, degree)
     x = np.linspace(1e-6 if kind in ("cosine", "sine") else -reach, reach, 200)
     exact = {
         "inverse": lambda v: 1 / mpmath.sqrt(1 + v), "excess": lambda v: (mpmath.sqrt(1 + v) - 1) / v,
@@ -90,7 +90,7 @@ def test_fixed_functions_keep_their_bound(kind, error):
     with mpmath.workdps(40):
         truth = np.array([float(exact(mpmath.mpf(v))) for v in x])
     found = np.polynomial.polynomial.polyval(x, coefficients)
-    assert abs(found - truth).max() <= bound + 1e-14
+    assert abs(found - truth).max() <= bound + 1e-14 and bound < 2e-3
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 17, 24, 25, 256, 3300])
@@ -100,7 +100,7 @@ def test_the_cell_kernel_is_a_short_cosine_sum(count):
     for x in np.linspace(-fits.CELL_REACH, fits.CELL_REACH, 33):
         truth = np.cos(2 * np.pi * m * x / count).mean()
         assert abs((weights * np.cos(rates * x)).sum() - truth) < 5e-15
-    assert len(weights) <= 12 and (rates >= 0).all()
+    assert len(weights) <= 16 and (rates >= 0).all()
 
 
 @pytest.mark.parametrize("distance", [0.01, 1.0, 1e3, 1e5, 1e7])

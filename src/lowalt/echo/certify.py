@@ -1,93 +1,103 @@
-"""Which cell is the strongest, for certain: near cells computed, the others excluded by a bound, more if it fails."""
+"""Which cell is the strongest, for certain: cells from the points' moments, the others excluded by a bound."""
 
 import math
 
-from lowalt.echo import lanes
-from lowalt.echo.answers import NEAR_TIE
-from lowalt.echo.compile import LEAN
-from lowalt.echo.segment import FIRST, WIDEST
+import numpy as np
 
-RING = 8
-"""Cells added on either side where the bound cannot yet decide."""
+from lowalt.echo.answers import NEAR_TIE
+from lowalt.echo.cells import SIDE
+from lowalt.echo.compile import LEAN, VECTOR
+
 FINE, AGAIN = 0, 1
 """State of a symbol: done, or to be computed again with the finest plan or the general kernel."""
 
 
+@VECTOR
+def cell_sums(kernels, place, moments, first, last, sums):
+    """Fill sums (2 SIDE + 1, 2) with the real and imaginary parts of cells first..last, counted from -SIDE."""
+    place = np.uint64(place)
+    for j in range(np.uint64(first), np.uint64(last + 1)):
+        re, im = 0.0, 0.0
+        for k in range(np.uint64(kernels.shape[2])):
+            re += kernels[place, j, k] * moments[0, k]
+            im += kernels[place, j, k] * moments[1, k]
+        sums[j, 0], sums[j, 1] = re, im
+
+
+@VECTOR
+def _product(sines, place, moments, shift):
+    """Size of the sum of z sin(pi u) v^shift, as far as the moments reach."""
+    re, im = 0.0, 0.0
+    place, shift = np.uint64(place), np.uint64(shift)
+    for i in range(np.uint64(sines.shape[1]) - shift):
+        re += sines[place, i] * moments[0, i + shift]
+        im += sines[place, i] * moments[1, i + shift]
+    return math.sqrt(re * re + im * im)
+
+
 @LEAN
-def far_limit(c0, c1, a2, distance, reach, count):
-    """Bound of |sum| in every cell at least `distance` from the expansion's centre; see `answers.far_bound`."""
-    if distance - reach <= 0.0:
+def far_moments(sines, place, moments, half, total, second, error, far):
+    """Fill far (4,) with bounds of |sum c y^k|, k = 0, 1, 2, and of sum |c y^3|; y in cells from the place.
+
+    c = z sin(pi u). The sine's orders that the moments do not reach are bounded by the sum of |z| v^2.
+    """
+    degree = sines.shape[1] - 1
+    scale, missing = 1.0, 0.0
+    for k in range(3):
+        far[k] = scale * (_product(sines, place, moments, k) + missing * second + error * total)
+        missing += abs(sines[place, degree - k])
+        scale *= half
+    far[3] = scale * second
+
+
+@LEAN
+def far_limit(far, distance, half, count):
+    """Bound of |sum| in every cell at least `distance` from the place; see `answers.far_bound`.
+
+    g(x) = 1 / (M sin(pi x / M)) expanded to third order: |g'''| <= 6 (pi / M)^3 / (M sin^4(pi x / M)). All factors fall
+    with distance up to M / 2; the sine is bounded from below by x - x^3 / 6.
+    """
+    if distance - half <= 0.0:
         return math.inf
     step = math.pi / count
-    s, k = math.sin(step * distance), math.cos(step * distance)
-    near = math.sin(step * (distance - reach))
-    return (c0 / s + c1 * step * abs(k) / (s * s) + a2 * step * step / near**3) / count
+    x, near = step * distance, step * (distance - half)
+    s = step / (x * (1.0 - x * x / 6.0))
+    n = step / (near * (1.0 - near * near / 6.0))
+    return (far[0] * s + (far[1] + far[2] * s) * s * s + far[3] * (n * n) * (n * n)) / math.pi * (1.0 + 1e-9)
 
 
 @LEAN
-def near_cells(place, deep, window):
-    """Cells first..last of the window that can well be a symbol's strongest; the bound looks after the others."""
-    margin = 0.6 + 1.5 * deep
-    first, last = math.ceil(place - margin), math.floor(place + margin)
-    return max(0, min(first, window - 1)), max(0, min(last, window - 1))
-
-
-@LEAN
-def rank(sums, lowest, highest):
-    """Largest and second largest |sum| of the cells lowest..highest, and the place of the largest."""
-    best, second, which = -1.0, -1.0, lowest
-    for cell in range(lowest, highest + 1):
-        strength = abs(sums[cell])
+def rank(sums, first, last):
+    """Largest and second largest |sum| of the cells first..last, and the place of the largest."""
+    best, second, which = -1.0, -1.0, first
+    for j in range(first, last + 1):
+        strength = sums[j, 0] * sums[j, 0] + sums[j, 1] * sums[j, 1]
         if strength > best:
-            best, second, which = strength, best, cell
+            best, second, which = strength, best, j
         elif strength > second:
             second = strength
-    return best, second, which
+    return math.sqrt(best), math.sqrt(second) if second > 0.0 else second, which
 
 
 @LEAN
-def one_cell(row, degree, at, size, u, weight, real, imag):
-    """Sum of one symbol's points in one cell of the window."""
-    lanes.horner(u[at : at + size], row, degree, weight[at : at + size], size)
-    re, im = lanes.weigh(weight, real, imag, at, size)
-    return complex(re, im)
+def certify(kernels, sines, place, centre, moments, deep, half, totals, error, bound, count, sums, far):
+    """Strongest cell of one symbol: (state, place in `sums`, near-tie, lead), more cells as the bound asks.
 
-
-@LEAN
-def certify(
-    place, deep, c0, c1, a2, slack, bound, sums, first, last, window, at, size, typed, degree, shape, arrays
-):  # fmt: skip
-    """Strongest cell of one symbol: (state, place in `sums`, near-tie, gap), more cells as the bound asks.
-
-    gap: lower bound of how much larger |sum| is there than in any other cell, negative where none is proved.
-    sums: (RING + WIDEST + RING,), the window's cells from RING on. shape: (count, half-width, centre) of the cells.
-    arrays: sin(pi u), u, real and imaginary parts and room for weights, needed only where the first bound fails.
+    centre: of the expansion, in cells from the nearest whole one. deep: how far the points reach (cells). totals: sums
+    of |z| and of |z| v^2. lead: lower bound of how much larger |sum| is there than elsewhere, negative where none is
+    proved. sums, far: room.
     """
-    count, half, centre = int(shape[0]), shape[1], shape[2]
-    lowest, highest = first + RING, last + RING
-    for grow in range(3):
-        if grow == 1:
-            sin_u, u, real, imag, weight = arrays
-            for cell in range(window):
-                if cell < first or cell > last:
-                    sums[RING + cell] = one_cell(typed[FIRST + cell], degree, at, size, u, weight, real, imag)
-            lowest, highest = RING, RING + window - 1
-        if grow == 2:
-            if count < 3 * RING + WIDEST:
-                break
-            for j in range(1, RING + 1):
-                for cell in (-j, window - 1 + j):
-                    re, im = lanes.distant_cell(cell, half, centre, count, sin_u, u, real, imag, at, size)
-                    # Only an upper bound of the size, since the sine is coarse; no value is taken from here.
-                    sums[RING + cell] = math.hypot(re, im) + slack
-            lowest, highest = 0, 2 * RING + window - 1
-        best, second, which = rank(sums, lowest, highest)
-        if grow == 2 and not RING <= which < RING + window:
-            break
-        gap = min(place - (lowest - 1 - RING), highest + 1 - RING - place, 0.5 * count)
-        far = far_limit(c0, c1, a2, gap, deep, count)
-        if far + bound < best * (1.0 - NEAR_TIE) - bound:
-            return FINE, which, best - second <= NEAR_TIE * best, best - max(second, far) - 2.0 * bound
-        if size == 0:
-            break
+    far_moments(sines, place, moments, half, totals[0], totals[1], error, far)
+    margin = 0.6 + 1.5 * deep
+    first = SIDE + max(-SIDE, min(math.ceil(centre - margin), SIDE))
+    last = SIDE + max(-SIDE, min(math.floor(centre + margin), SIDE))
+    for whole in range(2):
+        if whole:
+            first, last = 0, 2 * SIDE
+        cell_sums(kernels, place, moments, first, last, sums)
+        best, second, which = rank(sums, first, last)
+        gap = min(centre - (first - 1 - SIDE), last + 1 - SIDE - centre, 0.5 * count)
+        limit = far_limit(far, gap, half, count)
+        if limit + bound < best * (1.0 - NEAR_TIE) - bound:
+            return FINE, which, best - second <= NEAR_TIE * best, best - max(second, limit) - 2.0 * bound
     return AGAIN, 0, False, 0.0

@@ -108,8 +108,8 @@ def explain(result: EchoResult) -> str:
     aim = "exact mode" if choice.error is None else f"plan for {choice.error:.1e} of the sum of amplitudes"
     return "\n".join([
         f"target radius {choice.size_m:.3g} m, at most {choice.spread:.3g} of the range",
-        f"{aim}: {kind}, orders of 1/r {choice.orders[0]}, range {choice.orders[1]}, cosine {choice.orders[2]}, "
-        f"sine {choice.orders[3]}",
+        f"{aim}: {kind}, ranges by {'polynomials' if choice.near else 'roots'}, orders of cosine {choice.orders[0]}, "
+        f"sine {choice.orders[1]}, cell kernel {choice.orders[2]}",
         f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, "
         f"{choice.general} by the general kernel",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",

@@ -4,16 +4,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo import fast
+from lowalt.echo import fast, lanes
+from lowalt.echo.cells import Cells, cells
 from lowalt.echo.certify import FINE
 from lowalt.echo.fits import folding
 from lowalt.echo.layout import layout
 from lowalt.echo.motion import Scene
-from lowalt.echo.plan import SPREAD_LIMIT, Plan, general_share, plan, rules
+from lowalt.echo.plan import BLOCK, SPREAD_LIMIT, Plan, general_share, plan, round_up, rules
 from lowalt.echo.radar import Radar
 from lowalt.echo.spans import SIZE, SPREAD, segments, spans
 
-LONGEST = 64
+LONGEST = 100
 """Most symbols of a segment."""
 
 
@@ -45,14 +46,16 @@ class Choice(NamedTuple):
     """What was decided for a sample, and by which bounds.
 
     error: what the cheap plan was to keep, relative to the sum of amplitudes (None: exact mode only); single: float32
-    after the phase; orders: polynomial orders of 1/r, range, cosine, sine; cheap, exact, general: symbols by kernel;
+    after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials, not
+    roots; cheap, exact, general: symbols by kernel;
     spread: largest target radius over range; size_m: largest radius (m); general_share: error bound of the general
     kernel relative to its sums of amplitudes and of risks.
     """
 
     error: float | None
     single: bool
-    orders: tuple[int, int, int, int]
+    orders: tuple[int, int, int]
+    near: bool
     cheap: int
     exact: int
     general: int
@@ -71,7 +74,7 @@ def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float |
     found = Found.empty(len(refs))
     everyone = np.arange(len(refs))
     exact = sample.plan(0.0)
-    if not sample.spread < SPREAD_LIMIT:
+    if not sample.spread < SPREAD_LIMIT or sample.table(exact) is None:
         return found, everyone, sample.choice(None, exact, 0, 0, len(refs))
     chosen, error, cheap = exact, None, 0
     if tolerance is not None and len(refs) > PROBES:
@@ -80,7 +83,7 @@ def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float |
         share = abs(found.values[probes]).max() / (found.totals[probes].max() + sample.peaks(probes).max())
         error = 0.5 * tolerance * share
         chosen = sample.plan(error)
-        if chosen.fits[2].size < exact.fits[2].size:
+        if chosen.fits[2].size < exact.fits[2].size and sample.table(chosen) is not None:
             sample.run(everyone, chosen, False, found)
             good = (found.state == FINE) & (found.bounds <= tolerance * _floor_of_largest(found))
             cheap = int(good.sum())
@@ -128,17 +131,26 @@ class _Sample:
         if len(symbols) < len(refs):
             refs, span = refs[symbols], span[symbols]
         table = rules(self.radar)
-        segs = np.empty((len(symbols), 8))
-        count = segments(span, self.radar.cells, table[1][0], table[3][0], LONGEST, segs)
+        segs = np.empty((len(symbols), 6))
+        count = segments(span, table[1][0], table[3][0], LONGEST, segs)
         widest = max(len(rates) for rates in table[1::2])
-        rooms, work, small = fast.rooms_for(len(self.lay.amplitude), widest, chosen.single)
+        kernels = self.table(chosen)
+        rooms, work, small = fast.rooms_for(widest, kernels.kernels.shape[2], self.lay.amplitude, chosen.single)
         fast.run(
-            self.scene, self.lay, self.radar, refs, span, segs[:count], symbols, self.aims, table, chosen.fits,
-            folding(), (chosen.fit, chosen.share, chosen.peak, float(final)), rooms, work, small, tuple(found),
+            self.scene, self.lay, self.radar, refs, span, segs[:count], symbols, self.aims, table, tuple(kernels),
+            chosen.fits, folding(),
+            (chosen.fit, chosen.share, chosen.peak, 2.0**-24 if chosen.single else 2.0**-53,
+             BLOCK if chosen.single else lanes.TILE, chosen.near, float(final)),
+            rooms, work, small, tuple(found),
         )  # fmt: skip
+
+    def table(self, chosen: Plan) -> Cells | None:
+        """The cell kernel as the plan wants it; None where the target is too deep for it."""
+        return cells(self.radar.subcarriers, round_up(self.size_m * self.radar.cells, 6), chosen.fit)
 
     def choice(self, error, chosen: Plan, cheap: int, exact: int, general: int) -> Choice:
         """The record of what was done."""
         share = general_share(self.radar, self.size_m, len(self.lay.amplitude))
-        orders = tuple(len(c) - 1 for c in chosen.fits)
-        return Choice(error, chosen.single, orders, cheap, exact, general, self.spread, self.size_m, share)
+        table = self.table(chosen)
+        orders = (*(len(c) - 1 for c in chosen.fits[2:]), table.kernels.shape[2] - 1 if table else 0)
+        return Choice(error, chosen.single, orders, chosen.near, cheap, exact, general, self.spread, self.size_m, share)

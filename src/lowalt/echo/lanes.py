@@ -1,4 +1,4 @@
-"""The fast kernel: short loops over a tile of symbols and points that the compiler turns into vector instructions.
+"""The fast kernel: short loops over a tile of one symbol's points that the compiler turns into vector instructions.
 
 A tile's arrays stay in the first-level cache. Every smooth factor is a polynomial whose degree the plan has chosen
 by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
@@ -7,18 +7,19 @@ unsigned: a signed one may be negative, and Python's wrap-around of those would 
 views of arrays would do as well, but cost a counted reference each.
 """
 
+import math
+
 import numpy as np
 
 from lowalt.echo.compile import LEAN, VECTOR
 
 TILE = 256
-"""Points worked on at a time: some fifteen arrays of 2 kB stay in the nearest cache."""
-KEPT = 512
-"""Largest target whose waves are all kept until its strongest cell is certain."""
-ROW = KEPT + 24
-"""Room of a work array, of odd length: rows a whole 4096 bytes apart would make loads wait for unrelated stores."""
+"""Most points worked on at a time: a dozen arrays of 2 kB stay in the nearest cache."""
 LANES = 16
 """Tiles hold whole multiples of this many points; the padding has no amplitude."""
+ROW = TILE + LANES + 8
+"""Room of a work array: a tile and what the last run of a part may write beyond it; of odd length, since rows a
+whole 4096 bytes apart would make loads wait for unrelated stores."""
 
 
 @LEAN
@@ -29,150 +30,192 @@ def chunk_of(points: int) -> int:
 
 
 @VECTOR
-def horner(x, c, degree, out, size):
-    """out[:size] = sum of c[k] x^k for k up to `degree`, four orders a pass over the tile."""
-    k = degree
-    top = c[degree]
+def horner(x, c, row, degree, out, size):
+    """out[:size] = sum of c[row, k] x^k for k up to `degree`, four orders a pass over the tile."""
+    top = c[row, degree]
     first = degree & 3
     if first == 0:
-        for i in range(size):
+        for i in range(np.uint64(size)):
             out[i] = top
     elif first == 1:
-        c0 = c[degree - 1]
-        for i in range(size):
+        c0 = c[row, degree - 1]
+        for i in range(np.uint64(size)):
             out[i] = top * x[i] + c0
     elif first == 2:
-        c0, c1 = c[degree - 1], c[degree - 2]
-        for i in range(size):
+        c0, c1 = c[row, degree - 1], c[row, degree - 2]
+        for i in range(np.uint64(size)):
             t = x[i]
             out[i] = (top * t + c0) * t + c1
     else:
-        c0, c1, c2 = c[degree - 1], c[degree - 2], c[degree - 3]
-        for i in range(size):
+        c0, c1, c2 = c[row, degree - 1], c[row, degree - 2], c[row, degree - 3]
+        for i in range(np.uint64(size)):
             t = x[i]
             out[i] = ((top * t + c0) * t + c1) * t + c2
     k = degree - first
     while k > 0:
-        c0, c1, c2, c3 = c[k - 1], c[k - 2], c[k - 3], c[k - 4]
-        for i in range(size):
+        c0, c1, c2, c3 = c[row, k - 1], c[row, k - 2], c[row, k - 3], c[row, k - 4]
+        for i in range(np.uint64(size)):
             t = x[i]
             out[i] = (((out[i] * t + c0) * t + c1) * t + c2) * t + c3
         k -= 4
 
 
 @VECTOR
-def place_part(px, py, pz, low, size, m, ex, ey, ez, at):
-    """Fill offsets ex, ey, ez from `at` with `size` points of a part from `low`.
+def place_part(px, py, pz, low, size, m, eps, ey, ez, at):
+    """Place `size` points of a part from `low`, and up to LANES - 1 beyond: eps, ey, ez from `at`.
 
-    m: 12 numbers, the rows of the part's matrix, then its offset, all over r_ref.
+    m: the rows of the part's matrix, then its offset, all over r_ref; twice the unit vector to the reference; scale
+    and shift of ey and of ez. eps = r^2 / r_ref^2 - 1. Whole vectors: single steps would cost more.
     """
     m0, m1, m2, m3, m4, m5 = m[0], m[1], m[2], m[3], m[4], m[5]
     m6, m7, m8, m9, m10, m11 = m[6], m[7], m[8], m[9], m[10], m[11]
+    hx, hy, hz, ys, y0, zs, z0 = m[12], m[13], m[14], m[15], m[16], m[17], m[18]
     at, low = np.uint64(at), np.uint64(low)
-    for i in range(np.uint64(size)):
+    for i in range(np.uint64(-(-size // LANES) * LANES)):
         x, y, z = px[low + i], py[low + i], pz[low + i]
-        ex[at + i] = m0 * x + m1 * y + m2 * z + m9
-        ey[at + i] = m3 * x + m4 * y + m5 * z + m10
-        ez[at + i] = m6 * x + m7 * y + m8 * z + m11
+        a = m0 * x + m1 * y + m2 * z + m9
+        b = m3 * x + m4 * y + m5 * z + m10
+        c = m6 * x + m7 * y + m8 * z + m11
+        eps[at + i] = a * (hx + a) + b * (hy + b) + c * (hz + c)
+        ey[at + i] = b * ys + y0
+        ez[at + i] = c * zs + z0
 
 
 @VECTOR
-def relative_excess(ex, ey, ez, hx, hy, hz, eps, at, size):
-    """eps = r^2 / r_ref^2 - 1 from offsets per r_ref and twice the unit vector (hx, hy, hz) to the reference."""
-    at = np.uint64(at)
+def place_nodes(translation, n, q, low, size, cosine, sine, scale, m, eps, ey, ez):
+    """As `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
+    hx, hy, hz, ys, y0, zs, z0 = m[12], m[13], m[14], m[15], m[16], m[17], m[18]
+    n, low, q = np.uint64(n), np.uint64(low), np.uint64(q)
+    px, py, pz = translation[n, q, 0], translation[n, q, 1], translation[n, q, 2]
     for i in range(np.uint64(size)):
-        j = at + i
-        eps[j] = ex[j] * (hx + ex[j]) + ey[j] * (hy + ey[j]) + ez[j] * (hz + ez[j])
+        x, y = translation[n, low + i, 0] - px, translation[n, low + i, 1] - py
+        a, b = (cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale
+        c = (translation[n, low + i, 2] - pz) * scale
+        eps[i] = a * (hx + a) + b * (hy + b) + c * (hz + c)
+        ey[i] = b * ys + y0
+        ez[i] = c * zs + z0
 
 
 @VECTOR
-def arguments(k, s, ey, ez, eps, inverse, excess, amplitude, first, psi, omega, u, turn, amp, at, size):
-    """From the two polynomials: arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2], amplitude.
+def geometry(eps, ey, ez, k, size, psi, omega, cells, turn, square):
+    """Arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2] and (r_ref / r)^2, by root and quotient.
 
-    k: (symbols, 16), row s the symbol's constants: y and z of the unit vector, scale and shift of psi, omega and u,
-    turns per excess, per psi and per omega, the reference's turn, 1 / r_ref^2.
+    k: shifts of psi and omega, scale and shift of the cells, turns per relative range, per psi and per omega, the
+    reference's turn. ey and ez come scaled. The range difference is eps / (1 + sqrt(1 + eps)): nothing cancels.
     """
-    hy, hz, sp, cp, so, co, su, cu = k[s, 0], k[s, 1], k[s, 2], k[s, 3], k[s, 4], k[s, 5], k[s, 6], k[s, 7]
-    te, tp, to, t0, inverse_r2 = k[s, 8], k[s, 9], k[s, 10], k[s, 11], k[s, 12]
-    at, first = np.uint64(at), np.uint64(first)
+    cp, co, su, cu, td, tp, to, t0 = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
     for i in range(np.uint64(size)):
-        j = at + i
-        f = inverse[j]
-        d = eps[j] * excess[j]
-        p = (hy + ey[j]) * f * sp - cp
-        o = (hz + ez[j]) * f * so - co
-        psi[j] = p
-        omega[j] = o
-        u[j] = d * su + cu
-        t = te * d + tp * p + to * o + t0
-        turn[j] = t - np.rint(t)
-        amp[j] = amplitude[first + i] * f * f * inverse_r2
+        e = eps[i]
+        r = math.sqrt(1.0 + e)
+        q = 1.0 / (r + r * r)
+        d, f = e * (q * r), q + q * r
+        p, o = ey[i] * f - cp, ez[i] * f - co
+        t = td * d + tp * p + to * o + t0
+        psi[i] = p
+        omega[i] = o
+        cells[i] = su * d + cu
+        turn[i] = t - np.rint(t)
+        square[i] = f * f
 
 
 @VECTOR
-def waves(size, amp, gain_h, gain_v, cosine, sine, turn, real, imag):
-    """real, imag = amplitude times gains times (cosine, sine); `sine` comes divided by the turn."""
-    for i in range(size):
-        a = amp[i] * gain_h[i] * gain_v[i]
-        real[i] = a * cosine[i]
-        imag[i] = a * sine[i] * turn[i]
-        amp[i] = abs(a)
-
-
-@VECTOR
-def squares(size, turn, square):
-    """square = turn^2."""
-    for i in range(size):
-        square[i] = turn[i] * turn[i]
-
-
-@VECTOR
-def weigh(weight, real, imag, at, size):
-    """Sums of weight * real and weight * imag."""
-    re, im = weight[0] - weight[0], weight[0] - weight[0]
-    at = np.uint64(at)
+def near_geometry(eps, ey, ez, k, excess, inverse, size, psi, omega, cells, turn, square):
+    """As `geometry`, with polynomials of degree 4 and 3 in eps for the range difference over eps and for 1 / r."""
+    cp, co, su, cu, td, tp, to, t0 = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
+    c0, c1, c2, c3, c4 = excess[0], excess[1], excess[2], excess[3], excess[4]
+    f0, f1, f2, f3 = inverse[0], inverse[1], inverse[2], inverse[3]
     for i in range(np.uint64(size)):
-        j = at + i
-        re += weight[j] * real[j]
-        im += weight[j] * imag[j]
-    return re, im
+        e = eps[i]
+        d = e * ((((c4 * e + c3) * e + c2) * e + c1) * e + c0)
+        f = ((f3 * e + f2) * e + f1) * e + f0
+        p, o = ey[i] * f - cp, ez[i] * f - co
+        t = td * d + tp * p + to * o + t0
+        psi[i] = p
+        omega[i] = o
+        cells[i] = su * d + cu
+        turn[i] = t - np.rint(t)
+        square[i] = f * f
 
 
 @VECTOR
-def far_sums(sine, u, real, imag, amp, at, size):
-    """Sums of c and c u with c = z sin(pi u), and of |z|, |z| u and |z| u^2, for the bound on far cells."""
-    a = sine[0] - sine[0]
-    b, c, d, total, first, second = a, a, a, a, a, a
-    at = np.uint64(at)
-    for i in range(np.uint64(size)):
-        j = at + i
-        x, y, t, w = real[j] * sine[j], imag[j] * sine[j], u[j], amp[j]
-        a += x
-        b += y
-        c += x * t
-        d += y * t
-        total += w
-        first += w * t
-        second += w * t * t
-    return a, b, c, d, total, first, second
-
-
-@VECTOR
-def distant_cell(cell, scale, shift, count, sine, u, real, imag, at, size):
-    """Sum in one cell, which no point is near, of c / (M sin(pi (cell - u) / M)) with c = z sin(pi u).
-
-    u: on [-1, 1], cells = scale u + shift. |pi (cell - cells) / M| must stay below 1.6 for the sine's polynomial.
+def waves_5(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
+    """real, imag = amplitude times gains times (cosine, sine) of `turn`; returns sums of |amplitude| and of it times
+    cells^2. c, s: coefficients of cos(2 pi t) and sin(2 pi t) / t in t^2, of degree 5.
     """
-    re, im = 0.0, 0.0
-    step = np.pi / count
+    c0, c1, c2, c3, c4, c5 = c[0], c[1], c[2], c[3], c[4], c[5]
+    s0, s1, s2, s3, s4, s5 = s[0], s[1], s[2], s[3], s[4], s[5]
+    total, second = c0 - c0, c0 - c0
+    first = np.uint64(first)
+    for i in range(np.uint64(size)):
+        t, v = turn[i], cells[i]
+        x = t * t
+        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
+        b = abs(a)
+        total += b
+        second += b * v * v
+        real[i] = a * (((((c5 * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
+        imag[i] = a * t * (((((s5 * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
+    return total, second
+
+
+@VECTOR
+def waves_7(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
+    """As `waves_5`, of degree 7."""
+    c0, c1, c2, c3, c4, c5, c6, c7 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
+    s0, s1, s2, s3, s4, s5, s6, s7 = s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]
+    total, second = c0 - c0, c0 - c0
+    first = np.uint64(first)
+    for i in range(np.uint64(size)):
+        t, v = turn[i], cells[i]
+        x = t * t
+        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
+        b = abs(a)
+        total += b
+        second += b * v * v
+        real[i] = a * (((((((c7 * x + c6) * x + c5) * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
+        imag[i] = a * t * (((((((s7 * x + s6) * x + s5) * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
+    return total, second
+
+
+@VECTOR
+def waves_10(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
+    """As `waves_5`, of degree 10."""
+    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]
+    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10 = s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10]
+    total, second = c0 - c0, c0 - c0
+    first = np.uint64(first)
+    for i in range(np.uint64(size)):
+        t, v = turn[i], cells[i]
+        x = t * t
+        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
+        b = abs(a)
+        total += b
+        second += b * v * v
+        high = ((((c10 * x + c9) * x + c8) * x + c7) * x + c6) * x + c5
+        real[i] = a * (((((high * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
+        high = ((((s10 * x + s9) * x + s8) * x + s7) * x + s6) * x + s5
+        imag[i] = a * t * (((((high * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
+    return total, second
+
+
+@VECTOR
+def moments(real, imag, cells, at, size):
+    """Sums of real and of imag times 1, v, v^2, v^3 with v = cells, which are then multiplied by v^4, from `at` on."""
+    a = real[0] - real[0]
+    a0, a1, a2, a3, b0, b1, b2, b3 = a, a, a, a, a, a, a, a
     at = np.uint64(at)
     for i in range(np.uint64(size)):
-        j = at + i
-        x = (cell - shift - scale * u[j]) * step
-        q = x * x
-        s = x * (1.0 + q * (-1 / 6 + q * (1 / 120 + q * (-1 / 5040 + q * (1 / 362880 + q * (
-            -1 / 39916800 + q * (1 / 6227020800 + q * (-1 / 1307674368000))))))))  # fmt: skip
-        w = sine[j] / s
-        re += w * real[j]
-        im += w * imag[j]
-    return re / count, im / count
+        x, y, t = real[at + i], imag[at + i], cells[at + i]
+        t2 = t * t
+        t3, t4 = t2 * t, t2 * t2
+        a0 += x
+        b0 += y
+        a1 += x * t
+        b1 += y * t
+        a2 += x * t2
+        b2 += y * t2
+        a3 += x * t3
+        b3 += y * t3
+        real[at + i] = x * t4
+        imag[at + i] = y * t4
+    return a0, a1, a2, a3, b0, b1, b2, b3

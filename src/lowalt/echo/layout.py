@@ -16,7 +16,7 @@ class Layout(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     z: np.ndarray
-    """(L,) m in the frame of the point's part."""
+    """(L + LANES,) m in the frame of the point's part; zero beyond the last point."""
     amplitude: np.ndarray
     """(padded L,) sqrt(rcs) times the radar's scale and the arrays' peak gain; zero in the padding."""
     parts: np.ndarray
@@ -72,7 +72,8 @@ def layout(scene: Scene, peak: float) -> Layout:
         return Layout(
             empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, float(amplitude.sum())
         )  # fmt: skip
-    x, y, z = np.empty((3, count))
+    # Runs are placed in whole vectors: what is read beyond the last point must be there.
+    x, y, z = np.zeros((3, count + LANES))
     starts, parts = np.empty(count + 1, np.int64), np.empty(count, np.int64)
     centres, radii = np.empty((count, 3)), np.empty(count)
     runs = _runs(points, part, chunk_of(len(amplitude)), x, y, z, starts, parts, centres, radii)

@@ -14,7 +14,7 @@ from lowalt.network import SPEED_OF_LIGHT, Network, Station
 def positions(motion: Rigid) -> np.ndarray:
     """All positions (N, L, 3) in metres."""
     turned = np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points)
-    return turned + motion.translation[:, motion.part]
+    return np.ascontiguousarray(turned + motion.translation[:, motion.part])
 
 
 def _ratio(x: np.ndarray, count: int) -> np.ndarray:

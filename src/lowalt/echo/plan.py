@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.fits import array_rule, cell_rule, smooth
+from lowalt.echo.fits import array_rule, smooth
 from lowalt.echo.radar import Radar
 
 SPREAD_LIMIT = 0.22
@@ -17,27 +17,36 @@ FINEST = 1e-15
 
 class Plan(NamedTuple):
     """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
-    relative to the sum of amplitudes and to the sum of peak amplitudes; `single`: float32 after the phase."""
+    relative to the sum of amplitudes and to the sum of peak amplitudes; `single`: float32 after the phase; `near`:
+    ranges by polynomials rather than roots; `fits`: of the range, of 1 / r, cosine, sine."""
 
     fit: float
     share: float
     peak: float
     single: bool
+    near: bool
     fits: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
+WAVES = (5, 7, 10)
+"""Degrees in t^2 of cosine and sine that `lanes` has loops for."""
+BLOCK = 128
+"""Most float32 numbers summed as such: more would round away what a tolerance of 1e-4 leaves."""
+SINGLE = 400 * 2.0**-24
+"""Least error for which float32 after the phase is worth trying: what its bound comes to."""
+
+
 def rules(radar: Radar):
-    """Cosine sums of the horizontal and vertical gain and the cell kernel, for `fast.run`."""
+    """Cosine sums of the horizontal and vertical gain, for `fast.run`."""
     return (
         *array_rule(radar.transmit_h, radar.receive_h, radar.kappa),
         *array_rule(radar.transmit_v, radar.receive_v, radar.kappa),
-        *cell_rule(radar.subcarriers),
     )
 
 
-def _round_up(value: float) -> float:
-    """Next power of the square root of two, so that few polynomials serve all samples."""
-    return 2.0 ** (math.ceil(2 * math.log2(max(value, 1e-9))) / 2)
+def round_up(value: float, steps: int = 2) -> float:
+    """Next of `steps` steps an octave, so that few polynomials serve all samples."""
+    return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 
 
 def plan(radar: Radar, spread: float, size_m: float, points: int, error: float) -> Plan:
@@ -47,7 +56,7 @@ def plan(radar: Radar, spread: float, size_m: float, points: int, error: float) 
     """
     return _plan(
         radar.turns, radar.kappa, radar.transmit_h + radar.receive_h - 2, radar.transmit_v + radar.receive_v - 2,
-        min(0.5, _round_up(2.01 * spread + spread * spread)), _round_up(size_m), -(-points // 512),
+        min(0.5, round_up(2.01 * spread + spread * spread)), round_up(size_m), -(-points // 512),
         2.0 ** math.floor(math.log2(max(error, FINEST))),
     )  # fmt: skip
 
@@ -57,20 +66,27 @@ def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
     wave = 2 * np.pi * turns * 2 * size_m
     array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
     unit = 2.0**-53
-    single = error > 600 * 2.0**-24
+    single = error > SINGLE
     coarse = 2.0**-24 if single else unit
-    part = error / 8
-    inverse, inverse_error = smooth("inverse", reach, part / (2 + 2 * array_phase))
-    excess, excess_error = smooth("excess", reach, part / max(wave, 1.0))
-    cosine, cosine_error = smooth("cosine", 0.25, part)
-    sine, sine_error = smooth("sine", 0.25, part)
-    rounding = (16 * wave + 8 * array_phase + 30) * unit + (300 + 80) * coarse + tiles * unit + 4 * np.pi * coarse
-    share = (
-        wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
-    )  # fmt: skip
+    part = error / 6
+    excess, excess_error = smooth("excess", reach, 4)
+    inverse, inverse_error = smooth("inverse", reach, 3)
+    near = wave * excess_error + (2 + array_phase) * inverse_error <= 2 * part
+    if not near:
+        excess_error = inverse_error = 0.0
+    for degree in WAVES:
+        cosine, cosine_error = smooth("cosine", 0.25, degree)
+        sine, sine_error = smooth("sine", 0.25, degree)
+        if cosine_error + 0.5 * sine_error <= 2 * part:
+            break
+    # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
+    # and the products that make the amplitude another 16.
+    rounding = (16 * wave + 8 * array_phase + 30) * unit + (85 + 16) * coarse + tiles * unit
+    share = wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
     kind = np.float32 if single else np.float64
-    fits = (inverse, excess, cosine.astype(kind), sine.astype(kind))
-    return Plan(max(part, FINEST), share, array_phase * inverse_error + 80 * coarse, single, fits)
+    fits = (excess, inverse, cosine.astype(kind), sine.astype(kind))
+    peak = array_phase * inverse_error + 8 * array_phase * unit
+    return Plan(max(part, FINEST), share, peak, single, bool(near), fits)
 
 
 def general_share(radar: Radar, size_m: float, points: int) -> tuple[float, float]:

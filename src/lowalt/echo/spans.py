@@ -8,6 +8,8 @@ from lowalt.echo.compile import LEAN, PLAIN
 
 PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
 """Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
+DRIFT = 1.0
+"""Radians of gain phase that a segment's directions may drift beyond what the target itself spans."""
 
 
 @LEAN
@@ -60,37 +62,35 @@ def norm(rotation, n, p):
 
 
 @PLAIN
-def segments(span, cells_per_m, rate_h, rate_v, longest, out):
-    """Cut the symbols into runs over which gains and cell kernels stay short polynomials.
+def segments(span, rate_h, rate_v, longest, out):
+    """Cut the symbols into runs over which the array gains stay short polynomials.
 
-    Fills out (N, 8): first symbol, end, centre and half-width of psi, of omega and of the range cell (relative to no
-    base). Returns how many runs there are. A single symbol may be wider than the limits; the plan looks at that.
+    Fills out (N, 6): first symbol, end, centre and half-width of psi and of omega. Returns how many runs there are.
+    A single symbol may be wider than the limits; the plan looks at that.
     """
     count = 0
     n = 0
     while n < len(span):
-        low = np.array([np.inf, np.inf, np.inf])
-        high = np.array([-np.inf, -np.inf, -np.inf])
+        low = np.array([np.inf, np.inf])
+        high = np.array([-np.inf, -np.inf])
         end = n
-        room_h, room_v, room = 0.0, 0.0, 0.0
+        room_h, room_v = 0.0, 0.0
         while end < len(span) and end - n < longest:
             d = span[end, SPREAD]
             turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
-            deep = span[end, SIZE] * cells_per_m
-            a, b, c = span[end, PSI], span[end, OMEGA], span[end, CELL]
-            l0, l1, l2 = min(low[0], a - turn), min(low[1], b - turn), min(low[2], c - deep)
-            h0, h1, h2 = max(high[0], a + turn), max(high[1], b + turn), max(high[2], c + deep)
+            a, b = span[end, PSI], span[end, OMEGA]
+            l0, l1 = min(low[0], a - turn), min(low[1], b - turn)
+            h0, h1 = max(high[0], a + turn), max(high[1], b + turn)
             if end == n:
-                # A target wide in itself still gets some symbols of common polynomials.
-                room_h = max(4.0, 1.2 * (h0 - l0) * rate_h + 1.0)
-                room_v = max(4.0, 1.2 * (h1 - l1) * rate_v + 1.0)
-                room = min(2.4, max(1.3, h2 - l2 + 0.5))
-            elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v or h2 - l2 > room:
+                # Room for drift: long runs of common polynomials against polynomials of low degree.
+                room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
+                room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
+            elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:
                 break
-            low[0], low[1], low[2], high[0], high[1], high[2] = l0, l1, l2, h0, h1, h2
+            low[0], low[1], high[0], high[1] = l0, l1, h0, h1
             end += 1
         out[count, 0], out[count, 1] = n, end
-        for i in range(3):
+        for i in range(2):
             out[count, 2 + 2 * i] = 0.5 * (low[i] + high[i])
             out[count, 3 + 2 * i] = 0.5 * (high[i] - low[i]) * (1.0 + 1e-9) + 1e-9
         count += 1

@@ -1,0 +1,77 @@
+"""Range cells from a target's moments: the tabulated kernels, and the bound on the cells that are not computed."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.echo import echo_signal
+from lowalt.echo.cells import PLACES, SIDE, cells
+from lowalt.echo.certify import far_limit, far_moments
+from test_echo import cloud_in_motion, network, relative
+
+
+def kernel(x, count):
+    """The range-cell kernel's real part as the plain mean of cosines."""
+    m = np.arange(count) - (count - 1) / 2
+    return np.cos(2 * np.pi * np.multiply.outer(x, m) / count).mean(axis=-1)
+
+
+@pytest.mark.parametrize("count", [11, 64, 256])
+@pytest.mark.parametrize("deep, error", [(0.02, 1e-3), (0.4, 1e-6), (1.3, 1e-9), (2.0, 1e-14)])
+def test_tabulated_kernels_keep_their_error(count, deep, error):
+    table = cells(count, deep, error)
+    assert table.error <= error
+    v = np.linspace(-1, 1, 31)
+    powers = v[:, None] ** np.arange(table.kernels.shape[2])
+    for place in (0, 7, PLACES):
+        u = place / PLACES - 0.5 + table.half * v
+        for j in range(-SIDE, SIDE + 1):
+            found = powers @ table.kernels[place, j + SIDE]
+            assert abs(found - kernel(j - u, count)).max() <= table.error + 1e-13
+        assert abs(powers @ table.sines[place] - np.sin(np.pi * u)).max() <= table.error + 1e-13
+    assert np.abs(table.kernels[..., 0]).max() <= table.sizes[0] <= 1.01
+
+
+def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
+    assert cells(256, 2.4, 1e-6) is not None and cells(256, 2.6, 1e-6) is None
+    assert cells(2 * SIDE + 3, 0.2, 1e-6) is not None and cells(2 * SIDE + 2, 0.2, 1e-6) is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 10_000), points=st.integers(1, 60), deep=st.floats(0.01, 1.5), count=st.integers(20, 300),
+    place=st.integers(0, PLACES), side=st.integers(2, SIDE), error=st.sampled_from([1e-4, 1e-12]),
+)  # fmt: skip
+def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, side, error):
+    rng = np.random.default_rng(seed)
+    table = cells(count, deep, error)
+    v = rng.uniform(-deep, deep, points) / table.half
+    z = rng.normal(size=points) + 1j * rng.normal(size=points)
+    # Half of the cases all but cancel, where a bound by the sum of amplitudes would decide nothing.
+    z -= z.mean() * (seed % 2)
+    powers = v[:, None] ** np.arange(table.kernels.shape[2])
+    sums = z @ powers
+    far, centre = np.empty(4), place / PLACES - 0.5
+    total, second = abs(z).sum(), (abs(z) * v**2).sum()
+    far_moments(table.sines, place, np.stack([sums.real, sums.imag]), table.half, total, second, table.error, far)
+    gap = min(centre + side + 1, side + 1 - centre, 0.5 * count)
+    limit = far_limit(far, gap, table.half, count)
+    beyond = np.arange(side + 1, count - side)
+    truth = abs(kernel(beyond[:, None] - (centre + table.half * v), count) @ z)
+    assert (truth <= limit * (1 + 1e-9) + 1e-13 * total).all()
+    # The bound is worth having: for a shallow target it is close to the nearest cell beyond.
+    assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
+
+
+def test_ranges_by_roots_and_by_polynomials_agree():
+    net = network(symbols=60)
+    motion = cloud_in_motion(np.random.default_rng(2), 60, 300, (400.0, 30.0, 60.0), 0.3)
+    arguments = (net, net.stations[0], motion, 1.0, motion.translation[0, 0])
+    exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-5)
+    assert not exact.choice.near and loose.choice.near and loose.choice.cheap > 50
+    assert 1e-15 < relative(loose.signal, exact.signal) <= loose.bound <= 1e-5
+    close = cloud_in_motion(np.random.default_rng(2), 60, 300, (20.0, 3.0, 30.0), 0.8)
+    arguments = (net, net.stations[0], close, 1.0, close.translation[0, 0])
+    exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-7)
+    assert not loose.choice.near and relative(loose.signal, exact.signal) <= loose.bound <= 1e-7
