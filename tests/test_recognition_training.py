@@ -265,18 +265,21 @@ def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
     assert slow == {id(value) for value in model.backbone.parameters()}
 
 
-def predict_all(trained, views, out, ranks):
-    settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32"})
-    arguments = ["evaluate", "--settings", settings, "--views", str(views),
-                 "--model", str(trained / "model.pt"), "--out", str(out)]  # fmt: skip
+def run_ranks(arguments, ranks):
     if ranks == 1:
         main(arguments)
-    else:
-        port = str(20000 + os.getpid() % 20000)
-        launch = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port]
-        environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-        command = [sys.executable, *launch, "-m", "lowalt.recognition", *arguments]
-        subprocess.run(command, check=True, capture_output=True, env=environment)
+        return
+    port = str(20000 + os.getpid() % 20000)
+    launch = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    command = [sys.executable, *launch, "-m", "lowalt.recognition", *arguments]
+    subprocess.run(command, check=True, capture_output=True, env=environment)
+
+
+def predict_all(trained, views, out, ranks):
+    settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32"})
+    run_ranks(["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
+               "--out", str(out)], ranks)  # fmt: skip
     return predictions.read(out)
 
 
@@ -286,6 +289,68 @@ def test_two_ranks_evaluate_to_the_same_bytes_as_one(trained, views, tmp_path):
     assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
     assert set(found.fold) == {"val", "test"}
     assert found.correct.mean() > 0.9
+
+
+def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
+    """Gradients are means over the ranks' equal shares, so a step is that of one rank with the whole batch."""
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    weights, losses = {}, {}
+    for name, ranks, batch in (("one", 1, 8), ("two", 2, 8), ("half", 1, 4)):
+        settings = with_training(steps=12, validate_every=6, batch=batch)
+        settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
+        settings["network"] = {**SETTINGS["network"], "dropout": 0.0}
+        line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen"]
+        run_ranks([*line, "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(tmp_path / name)], ranks)
+        found = checkpoint.load(tmp_path / name / "model.pt")[1]["weights"]
+        weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
+        with (tmp_path / name / "history.csv").open(newline="") as file:
+            losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
+        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == ranks
+    apart = {name: float((weights[name] - weights["one"]).norm() / weights["one"].norm()) for name in ("two", "half")}
+    # Sums in another order, which Adam magnifies where a gradient is zero but for rounding.
+    assert apart["two"] < 1e-4 < 1e-3 < apart["half"]
+    assert losses["two"] == pytest.approx(losses["one"], rel=1e-4)
+    assert losses["half"] != pytest.approx(losses["one"], rel=1e-3)
+
+
+def test_metrics_for_tensorboard_are_those_of_the_history(views, tmp_path, monkeypatch):
+    pytest.importorskip("tensorboard")
+    from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    settings = with_training(steps=8, validate_every=4)
+    runs.train(sources(views), SCHEME, "seen", settings, tmp_path, events=True)
+    found = EventAccumulator(str(tmp_path / "events")).Reload()
+    with (tmp_path / "history.csv").open(newline="") as file:
+        history = list(csv.DictReader(file))
+    for name in ("train_loss", "validation_accuracy", "rate"):
+        assert [entry.step for entry in found.Scalars(name)] == [4, 8]
+        assert [entry.value for entry in found.Scalars(name)] == pytest.approx([float(row[name]) for row in history])
+    assert 0 <= found.Scalars("waiting_share")[-1].value <= 1
+
+
+def test_tensorboard_asked_for_and_absent_is_named(views, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
+    with pytest.raises(InputError, match=r"tensorboard is not installed.*lowalt\[tensorboard\]"):
+        runs.train(sources(views), SCHEME, "seen", with_training(steps=4), tmp_path, events=True)
+
+
+@pytest.mark.slow
+def test_an_onnx_file_gives_the_same_answers_at_any_batch_size(trained, views, tmp_path):
+    pytest.importorskip("onnxscript")
+    onnxruntime = pytest.importorskip("onnxruntime")
+    from lowalt.recognition.export import export
+
+    model = runs.load(trained / "model.pt")
+    export(model, tmp_path / "model.onnx")
+    session = onnxruntime.InferenceSession(str(tmp_path / "model.onnx"), providers=["CPUExecutionProvider"])
+    source = sources(views)["validation"]
+    for count in (1, 5):
+        index = source.views(np.arange(count))
+        with torch.inference_mode():
+            expected = model.model(torch.from_numpy(index)).softmax(1).numpy()
+        (found,) = session.run(None, {session.get_inputs()[0].name: index})
+        np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
 def test_an_exported_program_gives_the_same_answers_at_any_batch_size(trained, views, tmp_path):

@@ -64,10 +64,11 @@ rule train:
     params:
         settings=training_settings,
         source=source_option,
+        events="--tensorboard" if config["recognition"]["tensorboard"] else "",
     shell:
         "python -m lowalt.recognition train --settings {params.settings:q} {params.source} --frozen {input.frozen:q}"
         " --schemes {input.schemes:q} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
-        " --out $(dirname {output.model:q}) 2> {log:q}"
+        " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"
 
 
 rule evaluate:

@@ -73,6 +73,7 @@ def _train(arguments: list[str]) -> None:
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     given = line.parse_args(arguments)
     if given.frozen:
@@ -86,7 +87,7 @@ def _train(arguments: list[str]) -> None:
     }
     if scheme.share < 1:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    train(samples, scheme, given.protocol, settings, Path(given.out))
+    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
 
 
 def _evaluate(arguments: list[str]) -> None:

@@ -42,4 +42,6 @@ def export(trained: Trained, out: str | Path) -> None:
         try:
             torch.onnx.export(model, (example,), temporary, dynamic_shapes=dynamic, dynamo=True, external_data=False)
         except ImportError as error:
-            raise InputError(f"--out {out}: ONNX needs the packages onnx and onnxscript ({error})") from error
+            raise InputError(
+                f"--out {out}: ONNX needs onnx and onnxscript ({error}), expected `pip install 'lowalt[export]'`"
+            ) from error

@@ -18,7 +18,7 @@ from lowalt.command import pick
 from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.hardware import describe
-from lowalt.recognition import augment, checkpoint, network, predictions, recipe
+from lowalt.recognition import augment, checkpoint, metrics, network, predictions, recipe
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
@@ -30,10 +30,13 @@ from lowalt.tiles import colour_map, resize
 Samples = ViewSamples | ShardSamples
 
 
-def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path) -> None:
+def train(
+    samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False
+) -> None:
     """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
 
-    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training, augmentation}.
+    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training, augmentation};
+    events: whether to write the metrics for TensorBoard too, into `events/` of the folder.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")
@@ -54,6 +57,8 @@ def train(samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: 
     resumed = trainer.resume()
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
+    if events and machine.rank == 0:
+        trainer.metrics = metrics.tensorboard(folder / "events", trainer.at.steps)
     start, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
     at = trainer.fit()
     seconds, busy = time.monotonic() - start, time.process_time() - busy

@@ -22,6 +22,7 @@ from lowalt.files import replacing
 from lowalt.recognition import checkpoint
 from lowalt.recognition.augment import augment
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.recipe import check, optimiser, schedule
 from lowalt.recognition.statistics import cross_entropy
@@ -113,6 +114,7 @@ class Trainer:
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
         self.best_weights: dict = {}
         self.waited_s = 0.0
+        self.metrics: Metrics | None = None
         self.at = Progress()
 
     def _order(self, epoch: int) -> np.ndarray:
@@ -240,10 +242,14 @@ class Trainer:
         speed = (self.at.steps - first) / spent
         left = (self.block["steps"] - self.at.steps) / speed
         row = dict(zip(HISTORY, self.at.history[-1], strict=True))
+        pace = {"samples_per_s": speed * self.block["batch"], "waiting_share": self.waited_s / spent}
+        if self.metrics:
+            self.metrics(row["step"], {name: row[name] for name in HISTORY[3:]} | pace)
         print(
             f"step {row['step']}/{self.block['steps']} loss {row['train_loss']:.4f} "
             f"validation {100 * row['validation_accuracy']:.2f} % (loss {row['validation_loss']:.4f}) "
-            f"{speed * self.block['batch']:.0f} samples/s, {left:.0f} s left",
+            f"{pace['samples_per_s']:.0f} samples/s, {100 * pace['waiting_share']:.1f} % of the time waiting for data, "
+            f"{left:.0f} s left",
             file=sys.stderr, flush=True,
         )  # fmt: skip
 
