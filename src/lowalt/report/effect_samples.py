@@ -53,7 +53,7 @@ class Take(NamedTuple):
     ms: np.ndarray
 
 
-def tested(rows: list[dict], share: dict, seed: int, count: int) -> list[dict]:
+def held_out(rows: list[dict], share: dict, seed: int, count: int) -> list[dict]:
     """Return the first `count` motion models of each subtype that the split `share` puts into the test fold.
 
     Raises: InputError where motion models are in several folds, or a subtype has none in the test fold.
@@ -183,7 +183,7 @@ def main(arguments: list[str]) -> None:
     network = Network.from_settings(block["network"])
     tiles = renderer({key: block[key] for key in ("network", "spectra", "images")})
     rows = [row for path in given.motion for row in read_table(path)]
-    rows = tested(rows, block["split"], block["seed"], block["models"])
+    rows = held_out(rows, block["split"], block["seed"], block["models"])
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
     occluders = {}
     if given.occluders:

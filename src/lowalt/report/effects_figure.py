@@ -4,7 +4,8 @@ import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from lowalt.report.figures import png
+from lowalt.report.effect_samples import pixel_change
+from lowalt.report.figures import SNR_LABELS, png
 from lowalt.tiles.render import VIEWS
 
 ACROSS = 4
@@ -25,16 +26,22 @@ def _pairs(panels: np.ndarray, table: list[dict], examples: dict, colours: str) 
         gap = np.full((example.shape[2], 6), np.nan)
         pair = np.hstack([example[0, number].astype(float), gap, example[1, number].astype(float)])
         panel.imshow(pair, cmap=colours, vmin=0, vmax=255, aspect="auto", interpolation="nearest")
-        panel.set_title(f"{row['call']} ({VIEWS[number].upper()})", fontsize=9)
+        share, _ = pixel_change(example[0, number], example[1, number])
+        panel.set_title(f"{row['call']} ({VIEWS[number].upper()}, {100 * share:.2g} % changed)", fontsize=9)
     for panel in panels[len(table) :]:
         panel.axis("off")
     for panel in panels:
         panel.set(xticks=[], yticks=[])
 
 
+def _levels(text: str) -> str:
+    """The SNRs of a row in words: "13 inf" is "13 dB and ∞"."""
+    return " and ".join(SNR_LABELS.get(level, f"{level} dB") for level in text.split())
+
+
 def _bars(times, losses, table: list[dict]) -> None:
     """Draw time added (log) and accuracy change with its interval, a bar a row, the first on top."""
-    names, places = [row["call"] for row in table], np.arange(len(table))[::-1]
+    places = np.arange(len(table))[::-1]
     together = ["C1" if row["parts_ms"] != "" else "C0" for row in table]
     smallest = min((row["added_ms"] for row in table if row["added_ms"] > 0), default=1.0)
     floor = 10.0 ** np.floor(np.log10(smallest))
@@ -48,12 +55,13 @@ def _bars(times, losses, table: list[dict]) -> None:
     spread = np.abs(np.array([[row["low"], row["high"]] for row in table]) - value[:, None]).T
     losses.barh(places, value, xerr=spread, color=together, error_kw={"lw": 0.9, "capsize": 2})
     losses.axvline(0, color="0.3", lw=0.8)
-    alone = " (* at " + " ".join(sorted({row["snr_db"] for row in table if row["snr_db"] != table[0]["snr_db"]})) + ")"
-    mixed = any(row["snr_db"] != table[0]["snr_db"] for row in table)
-    losses.set_xlabel(f"accuracy change, points, at SNR {table[0]['snr_db']} dB" + alone * mixed)
+    usual = table[0]["snr_db"]
+    others = sorted({_levels(row["snr_db"]) for row in table if row["snr_db"] != usual})
+    marked = f"; *: {', '.join(others)}" if others else ""
+    losses.set_xlabel(f"accuracy change, points, and its 95 % interval; SNR {_levels(usual)}{marked}")
+    names = [row["call"] + " *" * (row["snr_db"] != usual) for row in table]
     for panel in (times, losses):
-        panel.set_yticks(places, [name + " *" * (row["snr_db"] != table[0]["snr_db"])
-                                  for name, row in zip(names, table, strict=True)], fontsize=9)  # fmt: skip
+        panel.set_yticks(places, names, fontsize=9)
         panel.grid(axis="x", alpha=0.3)
         panel.set_ylim(-0.6, len(table) - 0.4)
 
