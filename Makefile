@@ -16,7 +16,7 @@ $(SETUP): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c envs/constraints.txt \
-		-e '.[workflow,recognition,test,lint]'
+		-e '.[workflow,cost,recognition,test,lint]'
 	touch $@
 
 default: $(SETUP)  ## the embedded default: data, training, evaluation, report in results/default
@@ -45,7 +45,7 @@ format: $(SETUP)
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
 
-# Benchmarks need a finished `make data`, a quiet machine and the extra `bench` (FINUFFT, the echo's named peer).
+# Benchmarks need a finished `make data`, a quiet machine and the extra `bench` (zlib-ng, a peer of the PNG writer).
 .venv/bench: $(SETUP)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c envs/constraints.txt -e '.[bench]'
 	touch $@
@@ -56,7 +56,7 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 
-cost: .venv/bench  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
+cost: $(SETUP)  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
 	$(SNAKEMAKE) -- cost
 
 accuracy: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png

@@ -44,7 +44,8 @@ def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> lis
     first = list({cloud.category: cloud for cloud in reversed(clouds)}.values())
     block = {
         "motion": config["motion"], "seed": 1, "distances_m": [200.0], "points": [31, 185, 400], "repeats": repeats,
-        "tolerances": [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9], "direct": direct,
+        "tolerances": [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9], "direct_distances_m": [200.0],
+        "direct_repeats": repeats if direct else 0,
     }  # fmt: skip
     return cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
 

@@ -107,7 +107,7 @@ def test_the_cost_table_has_every_method_and_its_error():
     given = sample(craft(), published, network, motion, 1, 150.0, 40)
     assert len(given[1]) == 40
     assert np.linalg.norm(given[2] - [0, 0, 25]) == pytest.approx(150)
-    block = {"repeats": 1, "direct": True, "tolerances": [1e-3, 1e-9]}
+    block = {"repeats": 1, "direct_repeats": 1, "tolerances": [1e-3, 1e-9]}
     pytest.importorskip("finufft")
     rows = rows_of(network, craft(), given, 150.0, 1, block)
     assert all(set(row) == set(COLUMNS) for row in rows) and len(rows) == 7

@@ -9,6 +9,7 @@ import pytest
 from lowalt.echo.cost import COLUMNS as MEASURED
 from lowalt.errors import InputError
 from lowalt.report.cost import changes, figure, main, pixels, saved, signals
+from lowalt.report.cost_table import summary
 from lowalt.report.tables import read_csv
 from lowalt.tiles.__main__ import renderer
 from test_echo_command import craft
@@ -32,7 +33,10 @@ BLOCK = {
     },
     "seed": 1, "distances_m": [150.0], "tolerances": [0.3, 1e-9], "models": 2,
 }  # fmt: skip
-SETTINGS = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES, **BLOCK}
+SETTINGS = {
+    "network": NETWORK, "spectra": SPECTRA, "images": IMAGES, "motion": BLOCK["motion"], "seed": BLOCK["seed"],
+    "cost": {key: BLOCK[key] for key in ("distances_m", "tolerances", "models")},
+}  # fmt: skip
 
 
 @pytest.fixture
@@ -96,17 +100,21 @@ def test_time_saved_is_taken_from_the_same_cloud_and_distance():
         measured_row(tolerance="exact", seconds="9.0", range_m="30.0"),
         measured_row(method="FINUFFT", tolerance="1e-09", seconds="1.0"),
     ]  # fmt: skip
-    row = {"subtype": "DJI Mini 2", "range_m": 150.0, "tolerance": 1e-3}
+    row = {"subtype": "DJI Mini 2", "points": 20, "range_m": 150.0, "tolerance": 1e-3}
     assert saved(table, row) == pytest.approx(0.25)
     assert saved(table, row | {"tolerance": 1e-9}) == saved(table, row | {"range_m": 30.0}) == ""
+    assert saved(table, row | {"points": 400}) == ""
 
 
 def test_the_command_writes_a_table_and_a_figure(cloud, tmp_path):
     from lowalt.targets.cloud import write
 
     write(tmp_path / "craft.npz", cloud)
-    table = [measured_row(tolerance=name, seconds=time) for name, time in (("exact", "2e-3"), ("0.3", "1e-3"))]
-    table.append(measured_row(method="FINUFFT", tolerance="1e-09", seconds="5e-2"))
+    table = [
+        measured_row(tolerance=name, seconds=time, points=str(len(cloud.points)))
+        for name, time in (("exact", "2e-3"), ("0.3", "1e-3"))
+    ]
+    table.append(measured_row(method="FINUFFT", tolerance="1e-09", seconds="5e-2", points="400"))
     lines = [",".join(MEASURED), *(",".join(row[name] for name in MEASURED) for row in table)]
     (tmp_path / "cost.csv").write_text("\n".join(lines) + "\n")
     arguments = ["--settings", json.dumps(SETTINGS), "--table", str(tmp_path / "cost.csv"), "--clouds",
@@ -120,5 +128,28 @@ def test_the_command_writes_a_table_and_a_figure(cloud, tmp_path):
         {**row, "range_m": 150.0, "tolerance": float(row["tolerance"]), "changed_share": 0.5} for row in (coarse, fine)
     ]
     panels = figure(table, rows).axes
-    assert [panel.get_xlabel() for panel in panels] == ["measured error / largest value", "tolerance asked for"]
-    assert panels[0].get_title() == "UAV, 20 points" and len(panels[0].lines) == 1 + len(table)
+    named = ["measured error / largest value"] * 2 + ["tolerance asked for"]
+    assert [panel.get_xlabel() for panel in panels] == named
+    titles = [f"UAV, {len(cloud.points)} points", "UAV, 400 points", ""]
+    assert [panel.get_title() for panel in panels] == titles
+    # One point a measurement, and the engine's curve at the one distance.
+    assert [len(panel.lines) for panel in panels[:2]] == [1 + 2, 1 + 1]
+
+
+def test_the_summary_compares_where_all_methods_were_timed():
+    shown = {"hardware": "one core"}
+    table = [
+        measured_row(tolerance="exact", seconds="2e-3", relative_error="1e-13", **shown),
+        measured_row(tolerance="exact", seconds="4e-3", relative_error="3e-13", points="400", **shown),
+        measured_row(tolerance="exact", seconds="9.0", relative_error="5e-12", range_m="30.0", **shown),
+        measured_row(tolerance="0.001", seconds="1e-3", relative_error="1e-5", **shown),
+        measured_row(tolerance="0.001", seconds="9.0", relative_error="1e-6", range_m="30.0", **shown),
+        measured_row(method="FINUFFT", tolerance="1e-09", seconds="0.3", relative_error="1e-10", **shown),
+    ]  # fmt: skip
+    changed = [{"tolerance": "0.001", "pixels": "100", "changed_pixels": "2"}] * 3
+    found = summary(table, changed)
+    assert (found["range_m"], found["samples"], found["hardware"]) == (150.0, 2, "one core")
+    exact, loose, peer = found["rows"]
+    assert exact["seconds"] == pytest.approx(3e-3) and exact["over_finufft"] == pytest.approx(100)
+    assert (exact["error"], exact["pixels"], exact["over_direct"]) == (5e-12, None, None)
+    assert loose["pixels"] == [6, 300] and loose["error"] == 1e-5 and peer["over_finufft"] == 1

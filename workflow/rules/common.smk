@@ -209,10 +209,18 @@ def cost_clouds(wildcards):
     return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
 
 
-def cost_settings(*kept, **more):
-    """The configuration's blocks `kept`, with the distances and tolerances at which accuracy is priced."""
-    grid = {"distances_m": [30.0, 200.0, 1000.0], "tolerances": [float(f"1e-{order}") for order in range(2, 13)]}
-    return canonical({key: config[key] for key in kept} | grid | more)
+def cost_settings(*kept):
+    """The configuration's blocks `kept`, the seed, and how accuracy is priced."""
+    return canonical({key: config[key] for key in (*kept, "seed", "cost")})
+
+
+def cost_products(wildcards):
+    """Tables and figure of what accuracy costs, where the report shows them."""
+    return multiext(f"results/{wildcards.run}/cost", ".csv", "_pixels.csv", ".png") if config["report"]["cost"] else []
+
+
+def cost_products_option(wildcards, input):
+    return "--cost {} {} {}".format(*input.cost) if input.cost else ""
 
 
 def chunk_echoes(wildcards):

@@ -1,5 +1,5 @@
 # Cost: what the echo's accuracy costs in time, and how many pixels change at each tolerance; one cloud a category.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; the extra `bench` (FINUFFT); a quiet machine
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing of this workflow runs beside it)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost_pixels.csv, results/{run}/cost.png
 
 
@@ -16,10 +16,12 @@ rule cost_table:
         "results/{run}/benchmarks/cost.jsonl"
     conda:
         "../../envs/environment.yaml"
+    threads: workflow.cores
     params:
-        settings=cost_settings("network", "motion", "seed", points=[], repeats=5, direct=True),
+        settings=cost_settings("network", "motion"),
     shell:
-        "python -m lowalt.echo.cost --settings {params.settings:q} --clouds {input.clouds:q}"
+        "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
+        " python -m lowalt.echo.cost --settings {params.settings:q} --clouds {input.clouds:q}"
         " --targets {input.targets:q} --out {output:q} 2> {log:q}"
 
 
@@ -39,7 +41,7 @@ rule cost_figure:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=cost_settings("network", "motion", "spectra", "images", "seed", models=5),
+        settings=cost_settings("network", "motion", "spectra", "images"),
     shell:
         "python -m lowalt.report.cost --settings {params.settings:q} --table {input.table:q}"
         " --clouds {input.clouds:q} --targets {input.targets:q} --out-table {output.table:q}"

@@ -1,6 +1,6 @@
 # Report: one self-contained page of the run, and the table of what each stage took.
 # REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark,
-#                  and where report.effects says so what effects cost and do
+#                  where report.cost says so what accuracy costs, and where report.effects does what effects do
 # OUTPUTS: results/{run}/report.html, results/{run}/stages.csv
 
 
@@ -16,6 +16,7 @@ rule report:
         gallery="results/{run}/clouds.png",
         motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks[0]),
         benchmarks=benchmark_files,
+        cost=cost_products,
         effects=effect_products,
     output:
         page="results/{run}/report.html",
@@ -26,10 +27,11 @@ rule report:
         "../../envs/environment.yaml"
     params:
         settings=report_settings,
+        cost=cost_products_option,
         effects=effect_products_option,
     shell:
         "python -m lowalt.report --settings {params.settings:q} --accuracy results/{wildcards.run}/accuracy.csv"
         " --published {input.published:q} --confusion results/{wildcards.run}/confusion.csv"
         " --subtypes results/{wildcards.run}/subtypes.csv --comparisons results/{wildcards.run}/comparisons.csv"
         " --index {input.index:q} --clouds {input.clouds:q} --gallery {input.gallery:q} --motion {input.motion:q}"
-        " --benchmarks {input.benchmarks:q} {params.effects} --stages {output.stages:q} --out {output.page:q} 2> {log:q}"
+        " --benchmarks {input.benchmarks:q} {params.cost} {params.effects} --stages {output.stages:q} --out {output.page:q} 2> {log:q}"

@@ -2,8 +2,7 @@
 
     python -m lowalt.echo.cost --settings JSON --clouds a.npz ... --targets config/targets.csv --out cost.csv
 
-Settings: network and motion blocks of the configuration, seed, distances_m, points (counts to resample each cloud to;
-empty: the cloud as it is), repeats, tolerances, direct (whether to time the slow direct sum).
+Settings: network, motion and cost blocks of the configuration, and its seed.
 """
 
 import csv
@@ -68,13 +67,13 @@ def sample(
     return moved, cloud.rcs_m2[order], np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
-def timed(call: Callable[[], np.ndarray], repeats: int) -> tuple[float, np.ndarray]:
-    """Median seconds of `repeats` calls after a first one, and the result."""
-    result = call()
+def timed(call: Callable[[], np.ndarray], repeats: int, warm: bool = True) -> tuple[float, np.ndarray]:
+    """Median seconds of `repeats` calls, after a first one where `warm` says so, and the result."""
+    result = call() if warm else np.empty(0)
     spent = []
     for _ in range(repeats):
         start = time.perf_counter()
-        call()
+        result = call()
         spent.append(time.perf_counter() - start)
     return statistics.median(spent), result
 
@@ -93,7 +92,10 @@ def error(signal: np.ndarray, truth: dict[int, np.ndarray]) -> float:
 
 
 def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, seed: int, block: dict) -> list[dict]:
-    """Measure all methods on one sample; seconds are medians, ratios come from the same run."""
+    """Measure all methods on one sample; seconds are medians, ratios come from the same run.
+
+    block: tolerances, repeats, and direct_repeats for the slow direct sum (0: leave it out), which needs no first call.
+    """
     station = network.stations[0]
     arguments = (network, station, *given)
     repeats = block["repeats"]
@@ -105,11 +107,11 @@ def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, see
     }  # fmt: skip
     rows = []
     slow = [("closed form, numpy", "", peers.closed), ("FINUFFT", 1e-9, peers.finufft)]
-    if block["direct"]:
+    if block["direct_repeats"]:
         slow += [("direct sum, numpy", "", peers.direct), ("factored sum, numpy", "", peers.factored)]
     for method, tolerance, function in slow:
-        few = 1 if function is peers.direct else repeats
-        seconds, signal = timed(lambda function=function: function(*arguments), few)
+        few = block["direct_repeats"] if function is peers.direct else repeats
+        seconds, signal = timed(lambda function=function: function(*arguments), few, function is not peers.direct)
         rows.append(base | {"method": method, "tolerance": tolerance, "seconds": seconds,
                             "relative_error": error(signal, truth)})  # fmt: skip
     for tolerance in (None, *block["tolerances"]):
@@ -129,15 +131,19 @@ def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, see
 
 
 def measure(network: Network, clouds: list[Cloud], published: dict, block: dict) -> list[dict]:
-    """Return the table's rows (keys COLUMNS) for all clouds, distances and numbers of points."""
+    """Return the table's rows (keys COLUMNS) for all clouds, distances and numbers of points (0: the cloud as it is).
+
+    The direct sum, whose time does not depend on the distance, is timed at `direct_distances_m` alone.
+    """
     rows = []
     for cloud in clouds:
         for distance_m in block["distances_m"]:
-            for points in block["points"] or [None]:
+            direct = block["direct_repeats"] if distance_m in block["direct_distances_m"] else 0
+            for points in block["points"]:
                 given = sample(
-                    cloud, published[cloud.subtype], network, block["motion"], block["seed"], distance_m, points
+                    cloud, published[cloud.subtype], network, block["motion"], block["seed"], distance_m, points or None
                 )
-                rows += rows_of(network, cloud, given, distance_m, block["seed"], block)
+                rows += rows_of(network, cloud, given, distance_m, block["seed"], block | {"direct_repeats": direct})
                 print(f"{cloud.subtype}, {distance_m} m, {len(given[1])} points", file=sys.stderr)
     return rows
 
@@ -157,9 +163,9 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--targets", required=True, help="table of published targets (config/targets.csv)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
-    keys = ("network", "motion", "seed", "distances_m", "points", "repeats", "tolerances", "direct")
-    block = dict(zip(keys, pick(given.settings, *keys), strict=True))
-    network = Network.from_settings(block["network"])
+    network, motion, seed, block = pick(given.settings, "network", "motion", "seed", "cost")
+    block |= {"motion": motion, "seed": seed}
+    network = Network.from_settings(network)
     write(given.out, measure(network, [read(path) for path in given.clouds], load_table(given.targets), block))
 
 

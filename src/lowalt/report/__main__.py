@@ -14,6 +14,7 @@ from lowalt.files import existing, replacing, sha256
 from lowalt.hardware import describe
 from lowalt.motion import read_table
 from lowalt.report import figures
+from lowalt.report.cost_table import read_summary
 from lowalt.report.made_with import versions
 from lowalt.report.strip import motion_strip
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, stage_times
@@ -110,6 +111,9 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--gallery", required=True, help="picture of all clouds (.png)")
     options.add_argument("--motion", required=True, help="a motion table; its first model a category is drawn")
     options.add_argument("--benchmarks", nargs="+", required=True, help="benchmark files of all jobs (.jsonl)")
+    options.add_argument(
+        "--cost", nargs=3, help="what accuracy costs: table of times, of changed pixels (.csv) and figure (.png)"
+    )
     options.add_argument("--effects", nargs=2, help="what each effect costs and does: table (.csv) and figure (.png)")
     options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
     options.add_argument("--out", required=True, help="page to write (.html)")
@@ -131,6 +135,10 @@ def main(arguments: list[str]) -> None:
         "clouds": existing(given.gallery, "gallery").read_bytes(),
         "strip": motion_strip([read(path) for path in given.clouds], read_table(given.motion)),
     }
+    cost = None
+    if given.cost:
+        cost = read_summary(*given.cost[:2])
+        pictures["cost"] = existing(given.cost[2], "figure of what accuracy costs").read_bytes()
     priced = []
     if given.effects:
         table, drawing = given.effects
@@ -145,7 +153,7 @@ def main(arguments: list[str]) -> None:
         ours=ours, published=paper, network=network_words(config["recognition"]),
         comparisons=read_csv(given.comparisons, *COMPARISON_COLUMNS), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
-        clouds=clouds, times=times, effects=priced, versions=versions(),
+        clouds=clouds, times=times, cost=cost, effects=priced, versions=versions(),
         configuration=yaml.safe_dump(config, sort_keys=False),
         images={name: picture(data) for name, data in pictures.items()},
     )  # fmt: skip

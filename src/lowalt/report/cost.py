@@ -3,8 +3,8 @@
     python -m lowalt.report.cost --settings JSON --table cost.csv --clouds a.npz ... --targets config/targets.csv
         --out-table cost_pixels.csv --figure cost.png
 
-Settings: network, motion, spectra and images blocks of the configuration, seed, distances_m, tolerances, models
-(motion models for each cloud and distance). `--table` is what `lowalt.echo.cost` measured on the same clouds.
+Settings: network, motion, spectra, images and cost blocks of the configuration, and its seed. `--table` is what
+`lowalt.echo.cost` measured on the same clouds; its rows with a cloud's own number of points tell the time saved.
 """
 
 import sys
@@ -28,10 +28,10 @@ from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images
 
 COLUMNS = (
-    "category", "subtype", "range_m", "tolerance", "models", "pixels", "changed_pixels", "changed_share",
+    "category", "subtype", "points", "range_m", "tolerance", "models", "pixels", "changed_pixels", "changed_share",
     "largest_step", "time_saved",
 )  # fmt: skip
-NEEDED = ("method", "category", "subtype", "range_m", "tolerance", "seconds", "relative_error")
+NEEDED = ("method", "category", "subtype", "points", "range_m", "tolerance", "seconds", "relative_error")
 """Columns of the measured table that are used here."""
 
 
@@ -82,8 +82,8 @@ def pixels(renderer: Renderer, clouds: list[Cloud], published: dict, block: dict
                 for tolerance, (changed, largest) in found.items():
                     more, step = changes(exact, renderer.tile(signals(network, given, tolerance)))
                     found[tolerance] = changed + more, max(largest, step)
-            base = {"category": cloud.category, "subtype": cloud.subtype, "range_m": distance_m,
-                    "models": block["models"], "pixels": count}  # fmt: skip
+            base = {"category": cloud.category, "subtype": cloud.subtype, "points": len(cloud.points),
+                    "range_m": distance_m, "models": block["models"], "pixels": count}  # fmt: skip
             rows += [
                 base | {"tolerance": tolerance, "changed_pixels": changed, "changed_share": changed / count,
                         "largest_step": largest}
@@ -99,7 +99,8 @@ def saved(measured: Iterable[dict[str, str]], row: dict) -> float | str:
         line["tolerance"]: float(line["seconds"])
         for line in measured
         if line["method"] == "engine"
-        and (line["subtype"], float(line["range_m"])) == (row["subtype"], float(row["range_m"]))
+        and (line["subtype"], int(line["points"]), float(line["range_m"]))
+        == (row["subtype"], row["points"], float(row["range_m"]))
     }
     cheap = times.get(str(float(row["tolerance"])))
     return "" if cheap is None or "exact" not in times else 1 - cheap / times["exact"]
@@ -135,25 +136,34 @@ def _pixel_panel(panel, rows: list[dict], distances: list[float]) -> None:
 
 
 def figure(measured: list[dict[str, str]], rows: list[dict]):
-    """Return the matplotlib figure, a column a category: time over error above, changed pixels over tolerance below."""
+    """Return the matplotlib figure, a column a category: time over error above, a row a number of points, and changed
+    pixels over tolerance below."""
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
     categories = list(dict.fromkeys(row["category"] for row in rows))
     distances = sorted({float(row["range_m"]) for row in rows} | {float(line["range_m"]) for line in measured})
     methods = list(dict.fromkeys(line["method"] for line in measured))
-    result = Figure(figsize=(3.6 * len(categories) + 0.6, 7.6), dpi=110, layout="constrained")
-    panels = result.subplots(2, len(categories), sharey="row", squeeze=False)
+    by_category = {name: [line for line in measured if line["category"] == name] for name in categories}
+    counts = {name: sorted({int(line["points"]) for line in mine}) for name, mine in by_category.items()}
+    tall = max(map(len, counts.values()))
+    result = Figure(figsize=(3.6 * len(categories) + 0.6, 3.3 * tall + 4), dpi=110, layout="constrained")
+    panels = result.subplots(tall + 1, len(categories), sharey="row", squeeze=False)
     for column, category in enumerate(categories):
-        mine = [line for line in measured if line["category"] == category]
-        _time_panel(panels[0, column], mine, methods, distances)
-        _pixel_panel(panels[1, column], [row for row in rows if row["category"] == category], distances)
-        points = sorted({int(line["points"]) for line in mine})
-        panels[0, column].set_title(f"{category}, {' and '.join(map(str, points))} points", fontsize=10)
+        for row in range(tall):
+            if row >= len(counts[category]):
+                panels[row, column].set_visible(False)
+                continue
+            points = counts[category][row]
+            mine = [line for line in by_category[category] if int(line["points"]) == points]
+            _time_panel(panels[row, column], mine, methods, distances)
+            panels[row, column].set_title(f"{category}, {points} points", fontsize=10)
+        _pixel_panel(panels[tall, column], [row for row in rows if row["category"] == category], distances)
     top = 100 * max(row["changed_share"] for row in rows)
-    panels[1, 0].set_ylim(-2e-4, max(2 * top, 1e-2))
-    panels[0, 0].set_ylabel("time a signal (ms), one core")
-    panels[1, 0].set_ylabel("8-bit pixels that change (%)")
+    panels[tall, 0].set_ylim(-2e-4, max(2 * top, 1e-2))
+    for row in range(tall):
+        panels[row, 0].set_ylabel("time a signal (ms), one core")
+    panels[tall, 0].set_ylabel("8-bit pixels that change (%)")
     keys = [Line2D([], [], color=f"C{index}", marker=".", linestyle="none", markersize=10, label=method)
             for index, method in enumerate(methods)]  # fmt: skip
     keys += [Line2D([], [], color="0.3", marker="osD^v"[index % 5], linestyle="none", label=f"{distance:g} m")
@@ -172,11 +182,13 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--out-table", required=True, help="table of changed pixels to write (.csv)")
     options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
     given = options.parse_args(arguments)
-    keys = ("network", "motion", "spectra", "images", "seed", "distances_m", "tolerances", "models")
-    block = dict(zip(keys, pick(given.settings, *keys), strict=True))
-    measured = read_csv(given.table, *NEEDED, "points")
-    network, spectra = Network.from_settings(block["network"]), Spectra.from_settings(block["spectra"])
-    renderer = Renderer(network, spectra, Images.from_settings(block["images"]))
+    keys = ("network", "motion", "spectra", "images", "seed", "cost")
+    network, motion, spectra, images, seed, block = pick(given.settings, *keys)
+    block |= {"motion": motion, "seed": seed}
+    measured = read_csv(given.table, *NEEDED)
+    renderer = Renderer(
+        Network.from_settings(network), Spectra.from_settings(spectra), Images.from_settings(images)
+    )  # fmt: skip
     rows = pixels(renderer, [read(path) for path in given.clouds], load_table(given.targets), block)
     with replacing(given.out_table) as temporary, temporary.open("w", newline="") as file:
         writer = DictWriter(file, COLUMNS, lineterminator="\n")
