@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.errors import InputError
-from lowalt.recognition import freeze, order, predictions, protocols, samples, schemes, tables
+from lowalt.recognition import freeze, order, orderings, predictions, protocols, samples, schemes, tables
 from lowalt.recognition.augment import KEYS, augment
 from lowalt.streams import stream
 
 SUBTYPES = {"Mini": ("seen", 0), "Avata": ("unseen", 0), "Crow": ("seen", 1), "Owl": ("unseen", 1),
             "M9": ("seen", 2), "A6": ("unseen", 2), "Walk": ("seen", 3), "Run": ("unseen", 3)}  # fmt: skip
 SNRS = (3.0, 13.0, np.inf)
+PUBLISHED = orderings.read_published("config/published_accuracy.csv")
 
 
 def facts(models=10, snrs=SNRS):
@@ -270,11 +271,13 @@ def test_tables_say_what_the_predictions_say(tmp_path):
     weak, _, weak_guess = run_files(tmp_path, "seen", "A:VRP+TRP+VT", 0.6, seed=3)
     weak.with_suffix(".json").write_text(weak.with_suffix(".json").read_text().replace('"seed": 3', '"seed": 0'))
     unseen, *_ = run_files(tmp_path, "unseen", "A:VT", 0.7)
-    tables.write([tables.Run(p) for p in (unseen, weak, path)], names, tmp_path / "out", seed=1)
+    tables.write([tables.Run(p) for p in (unseen, weak, path)], names, PUBLISHED, tmp_path / "out", seed=1)
     test = found.fold == "test"
     accuracy = read_rows(tmp_path / "out/accuracy.csv")
     assert [row["scheme"] for row in accuracy] == ["A:VRP+TRP+VT"] * 4 + ["ABC:VRP+TRP+VT"] * 4 + ["A:VT"] * 4
-    assert list(accuracy[0]) == ["protocol", "scheme", "snr_db", "accuracy_percent", "samples", "hardware"]
+    head = ["protocol", "scheme", "snr_db", "accuracy_percent", "samples", "hardware", "seeds", "spread_points"]
+    assert list(accuracy[0]) == head
+    assert (accuracy[0]["seeds"], accuracy[0]["spread_points"]) == ("1", "")
     for row in accuracy[4:7]:
         chosen = test & (found.snr_db == float(row["snr_db"]))
         assert float(row["accuracy_percent"]) == pytest.approx(100 * (guess == found.label)[chosen].mean(), abs=1e-4)
@@ -296,6 +299,13 @@ def test_tables_say_what_the_predictions_say(tmp_path):
         assert float(row["difference_points"]) == pytest.approx(gain, abs=1e-3)
         assert float(row["low"]) < gain < float(row["high"])
         assert float(row["low"]) > 0 and float(row["mcnemar_p"]) < 1e-3
+    (ordering,) = read_rows(tmp_path / "out/orderings.csv")
+    assert (ordering["ordering"], ordering["over"]) == ("holds", "A:VRP+TRP+VT")
+    assert float(ordering["paper_points"]) == pytest.approx(99.88 - 98.94)
+    bands = [row for row in read_rows(tmp_path / "out/reliability.csv") if row["scheme"] == "ABC:VRP+TRP+VT"]
+    assert sum(int(row["samples"]) for row in bands) == test.sum()
+    right = sum(int(row["samples"]) * float(row["accuracy_percent"]) for row in bands) / test.sum()
+    assert right == pytest.approx(100 * (guess == found.label)[test].mean(), abs=1e-3)
     alarms = read_rows(tmp_path / "out/alarms.csv")
     assert [float(row["asked_percent"]) for row in alarms[:3]] == [90, 95, 99]
 
@@ -304,20 +314,45 @@ def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
     names = list(schemes.read("config/schemes.csv"))
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
     with pytest.raises(InputError, match="two prediction files"):
-        tables.write([tables.Run(path), tables.Run(path)], names, tmp_path, 1)
+        tables.write([tables.Run(path), tables.Run(path)], names, {}, tmp_path, 1)
     other, *_ = run_files(tmp_path, "seen", "D:VT", 0.9)
     with pytest.raises(InputError, match="D:VT"):
-        tables.write([tables.Run(other)], names, tmp_path, 1)
+        tables.write([tables.Run(other)], names, {}, tmp_path, 1)
 
 
 def test_several_seeds_are_averaged(tmp_path):
     names = list(schemes.read("config/schemes.csv"))
     paths = [run_files(tmp_path, "seen", "A:VT", 0.9, seed=seed)[0] for seed in (0, 1, 2)]
-    tables.write([tables.Run(path) for path in paths], names, tmp_path, 1)
+    tables.write([tables.Run(path) for path in paths], names, {}, tmp_path, 1)
     seeds = [float(row["accuracy_percent"]) for row in read_rows(tmp_path / "seeds.csv")]
     average = next(row for row in read_rows(tmp_path / "accuracy.csv") if row["snr_db"] == "avg")
     assert len(seeds) == 3 and len(set(seeds)) > 1
     assert float(average["accuracy_percent"]) == pytest.approx(np.mean(seeds), abs=1e-3)
+    assert average["seeds"] == "3"
+    assert float(average["spread_points"]) == pytest.approx(np.std(seeds, ddof=1), abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ordering"),
+    [("0.1", "2.0", "holds"), ("-2.0", "-0.1", "reversed"), ("-0.1", "0.1", "undecided"), ("0.0", "1.0", "undecided")],
+)
+def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, ordering):
+    compared = [
+        ["seen", "ABC:X", "A:X", "stations", unit, "1.0", low, high, 3, 4, "0.5"]
+        for unit in ("motion model", "subtype")
+    ]
+    published = {("seen", "ABC:X"): 99.0, ("seen", "A:X"): 97.5}
+    assert list(orderings.ordering_rows(compared, published)) == [
+        ["seen", "ABC:X", "A:X", "stations", "1.50", "1.0", low, high, ordering]
+    ]
+    assert next(orderings.ordering_rows(compared, {}))[4] == ""
+
+
+def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
+    assert PUBLISHED["seen", "ABC:VRP+TRP+VT"] == 99.88
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match=r"other\.csv: not a table"):
+        orderings.read_published(tmp_path / "other.csv")
 
 
 def test_frozen_inputs_are_held_to_their_checksums(tmp_path):

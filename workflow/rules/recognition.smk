@@ -40,6 +40,24 @@ rule freeze:
         " --out {output:q} 2> {log:q}"
 
 
+rule distances:
+    input:
+        code=code("lowalt.recognition", "lowalt.recognition.distances"),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=PLAN.groups),
+    output:
+        "results/{run}/distances.csv",
+    log:
+        "results/{run}/logs/distances.log",
+    benchmark:
+        "results/{run}/benchmarks/distances.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    shell:
+        "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q} --motion {input.motion:q}"
+        " --out {output:q} 2> {log:q}"
+
+
 rule train:
     input:
         unpack(sample_source),
@@ -105,6 +123,7 @@ rule tables:
         predictions=expand("results/{{run}}/predictions/{training}.csv", training=TRAININGS),
         about=expand("results/{{run}}/predictions/{training}.json", training=TRAININGS),
         schemes=config["recognition"]["table"],
+        published=config["report"]["published"],
     output:
         multiext("results/{run}/", *RESULT_TABLES),
     log:
@@ -117,7 +136,7 @@ rule tables:
         settings=canonical({"seed": config["seed"]}),
     shell:
         "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"
+        " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"
 
 
 rule transfer_evaluate:

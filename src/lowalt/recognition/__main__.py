@@ -113,14 +113,17 @@ def _evaluate(arguments: list[str]) -> None:
 def _tables(arguments: list[str]) -> None:
     """Write accuracy.csv and its companions from prediction files. Settings: seed."""
     from lowalt.recognition import tables
+    from lowalt.recognition.orderings import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
     line.add_argument("--predictions", nargs="+", required=True, help="prediction files (.csv), records beside them")
+    line.add_argument("--published", required=True, help="the paper's accuracies (.csv)")
     line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
     line.add_argument("--out", required=True, help="folder for the tables")
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
-    tables.write([tables.Run(path) for path in given.predictions], list(read(given.schemes)), given.out, seed)
+    runs, published = [tables.Run(path) for path in given.predictions], read_published(given.published)
+    tables.write(runs, list(read(given.schemes)), published, given.out, seed)
 
 
 def _transfer(arguments: list[str]) -> None:
@@ -141,6 +144,22 @@ def _transfer(arguments: list[str]) -> None:
         transfer.check_folds(first, other)
     own, other = ([Run(path) for path in paths] for paths in (given.own, given.other))
     transfer.write(own, other, list(read(given.schemes)), given.out, seed)
+
+
+def _distances(arguments: list[str]) -> None:
+    """Write how far the subtypes of a category lie from each other. Settings: none ({})."""
+    from lowalt.motion import read_table
+    from lowalt.recognition import distances
+    from lowalt.targets.cloud import read as read_cloud
+
+    line = parser("lowalt.recognition distances", _distances.__doc__)
+    line.add_argument("--clouds", nargs="+", required=True, help="all cloud files")
+    line.add_argument("--motion", nargs="+", required=True, help="motion tables with a row of every subtype")
+    line.add_argument("--out", required=True, help="table to write (.csv)")
+    given = line.parse_args(arguments)
+    pick(given.settings)
+    motion = [row for path in given.motion for row in read_table(path)]
+    distances.write(given.out, distances.rows([read_cloud(path) for path in given.clouds], motion))
 
 
 def _speed(arguments: list[str]) -> None:
@@ -221,9 +240,9 @@ def _export(arguments: list[str]) -> None:
 
 
 COMMANDS = {
-    "views": _views, "freeze": _freeze, "train": _train, "evaluate": _evaluate, "tables": _tables,
-    "transfer": _transfer, "speed": _speed, "price": _price, "score": _score,
-    "predict": _predict, "export": _export,
+    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train, "evaluate": _evaluate,
+    "tables": _tables, "transfer": _transfer, "speed": _speed, "price": _price, "score": _score, "predict": _predict,
+    "export": _export,
 }  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 """From prediction files to the paper's tables and what stands behind them, as CSV; test data chooses nothing.
 
 Files written, each with the columns `protocol, scheme` first:
-    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged
+    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged,
+                     seeds says how many and spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
     seeds.csv        seed, accuracy_percent on average over the SNRs
     confusion.csv    category, predicted, samples
@@ -10,7 +11,10 @@ Files written, each with the columns `protocol, scheme` first:
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
     alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test
     calibration.csv  calibration error, Brier score, cross entropy on test
+    reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
     comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit, McNemar's test
+    orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval by
+                     motion model lies above zero), is reversed (below) or is undecided (zero inside)
 """
 
 import csv
@@ -23,6 +27,7 @@ import numpy as np
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing
 from lowalt.recognition import predictions
+from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import (
@@ -32,19 +37,13 @@ from lowalt.recognition.statistics import (
     calibration,
     confusion,
     mcnemar,
+    reliability,
     threshold,
 )
 from lowalt.streams import stream
 from lowalt.targets.cloud import CATEGORIES
 
 DETECTIONS = (0.9, 0.95, 0.99)
-CLAIMS = (
-    *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
-    *(("ABC:VRP+TRP+VT", f"{one}:VRP+TRP+VT", "three stations over one") for one in "ABC"),
-    *(("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
-      for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
-)  # fmt: skip
-"""The paper's claims: the scheme said to be better, the other, and the claim's name."""
 
 
 class Run:
@@ -82,14 +81,16 @@ def _percent(share: float) -> str:
 
 
 def accuracy_rows(runs: list[Run], part: str) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy_percent, samples, hardware] of one scheme's runs (its seeds), averaged."""
+    """Yield rows [snr_db, accuracy_percent, samples, hardware, seeds, spread_points] of one scheme's runs, averaged."""
     parts = [run.part(part) for run in runs]
     tables = [accuracy_by(found.snr_db, found.correct) for found in parts]
-    for snr in tables[0]:
-        mean = np.mean([table[snr][0] for table in tables])
-        yield [snr_text(snr), _percent(mean), tables[0][snr][1], runs[0].hardware]
-    average = np.mean([[share for share, _ in table.values()] for table in tables])
-    yield ["avg", _percent(average), len(parts[0]), runs[0].hardware]
+    shares = {snr_text(snr): [table[snr][0] for table in tables] for snr in tables[0]}
+    counts = {snr_text(snr): count for snr, (_, count) in tables[0].items()}
+    shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
+    counts["avg"] = len(parts[0])
+    for snr, values in shares.items():
+        spread = _percent(np.std(values, ddof=1)) if len(values) > 1 else ""
+        yield [snr, _percent(np.mean(values)), counts[snr], runs[0].hardware, len(values), spread]
 
 
 def seed_rows(runs: list[Run]) -> Iterable[list]:
@@ -143,6 +144,14 @@ def calibration_rows(runs: list[Run]) -> Iterable[list]:
         yield [f"{value:.6f}" for value in calibration(run.test.probabilities, run.test.label).values()]
 
 
+def reliability_rows(runs: list[Run]) -> Iterable[list]:
+    """Yield rows [from, to, confidence_percent, accuracy_percent, samples] over bands of confidence."""
+    probabilities = np.concatenate([run.test.probabilities for run in runs])
+    labels = np.concatenate([run.test.label for run in runs])
+    for low, high, confidence, share, count in reliability(probabilities, labels):
+        yield [f"{low:.4f}", f"{high:.4f}", _percent(confidence), _percent(share), count]
+
+
 def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[list]:
     """Yield rows [unit, difference, low, high, only_first, only_second, p] of two schemes on the same samples.
 
@@ -166,10 +175,11 @@ def _write(path: Path, columns: list[str], rows: list[list]) -> None:
         writer.writerows(rows)
 
 
-def write(runs: list[Run], order: list[str], folder: str | Path, seed: int) -> None:
+def write(runs: list[Run], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
     """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
 
-    seed: of the bootstrap. Raises: InputError for a scheme outside `order` or the same run twice.
+    published: as `orderings.read_published` gives it; seed: of the bootstrap.
+    Raises: InputError for a scheme outside `order` or the same run twice.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
@@ -181,10 +191,11 @@ def write(runs: list[Run], order: list[str], folder: str | Path, seed: int) -> N
         group.append(run)
     keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
     share = ["accuracy_percent", "samples"]
+    measured = ["snr_db", *share, "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     alarm = ["asked_percent", "threshold", "detected_percent", "bird_percent", "vehicle_percent", "pedestrian_percent"]
     tables = {
-        "accuracy": (["snr_db", *share, "hardware"], lambda group: accuracy_rows(group, "test")),
+        "accuracy": (measured, lambda group: accuracy_rows(group, "test")),
         "seeds": (["seed", "accuracy_percent"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "subtypes": (["category", "subtype", *share], subtype_rows),
@@ -192,12 +203,13 @@ def write(runs: list[Run], order: list[str], folder: str | Path, seed: int) -> N
         "aspects": (bands, lambda group: band_rows(group, lambda found: found.aspect_deg, 30)),
         "alarms": (alarm, alarm_rows),
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
+        "reliability": (["from", "to", "confidence_percent", "accuracy_percent", "samples"], reliability_rows),
     }
     for name, (columns, rows) in tables.items():
         _write(Path(folder) / f"{name}.csv", columns, [[*key, *row] for key in keys for row in rows(groups[key])])
     seen = [[*key, *row] for key in keys if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
             for row in accuracy_rows(groups[key], "seen_test")]  # fmt: skip
-    _write(Path(folder) / "seen_test.csv", ["snr_db", *share, "hardware"], seen)
+    _write(Path(folder) / "seen_test.csv", measured, seen)
     compared = [
         [protocol, better, other, claim, *row]
         for protocol in ("seen", "unseen")
@@ -207,3 +219,5 @@ def write(runs: list[Run], order: list[str], folder: str | Path, seed: int) -> N
     ]
     columns = ["over", "claim", "unit", "difference_points", "low", "high", "only_first", "only_second", "mcnemar_p"]
     _write(Path(folder) / "comparisons.csv", columns, compared)
+    columns = ["over", "claim", "paper_points", "difference_points", "low", "high", "ordering"]
+    _write(Path(folder) / "orderings.csv", columns, list(ordering_rows(compared, published)))

@@ -4,24 +4,12 @@ import numpy as np
 from matplotlib import pyplot as plt
 
 from lowalt.motion import positions
+from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures import png
 from lowalt.targets.cloud import CATEGORIES, Cloud
 
 VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
          "Pedestrian": (1, 2, "from the side")}  # fmt: skip
-
-
-def still_row(row: dict) -> dict:
-    """Return the motion row without place, velocity and attitude, so that only the parts' own motion is left."""
-    names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
-    return {**row, **dict.fromkeys(names, 0.0)}
-
-
-def cycle_s(cloud: Cloud, row: dict) -> float:
-    """Return the time of one cycle (s): a turn, a beat, or the whole recording."""
-    if len(cloud.track):
-        return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
-    return 1.0 / row["rate_hz"]
 
 
 def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:

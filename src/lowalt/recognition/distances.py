@@ -1,0 +1,113 @@
+"""How far the subtypes of a category lie from each other, so that an easy subtype can be told from a copied one.
+
+A subtype is taken as the set of points that its cloud sweeps over one cycle (a turn, a beat, a recording) in its own
+frame: shape and own motion together, which is what its micro-Doppler comes from. Two sets are compared as
+distributions by the energy distance, after each is centred and divided by its root mean square radius, so that it
+compares form, and size stands apart as the ratio of these radii. The energy distance is a metric, is zero for equal
+distributions only, needs no correspondence and no grid, and one stray point moves it little, unlike the largest of
+nearest distances (Szekely and Rizzo, J. Stat. Plan. Inference 143, 2013).
+
+distances.csv, one row a subtype:
+    category, subtype, group
+    nearest, distance, size_ratio                the nearest other subtype of the category
+    nearest_trained, trained_distance, trained_size_ratio    the same among the subtypes of the group seen, on which the
+                                                 unseen protocol trains; of a trained subtype, another one
+"""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from lowalt.errors import InputError
+from lowalt.files import replacing
+from lowalt.motion import positions
+from lowalt.targets.cloud import CATEGORIES, Cloud
+
+COLUMNS = (
+    "category", "subtype", "group", "nearest", "distance", "size_ratio", "nearest_trained", "trained_distance",
+    "trained_size_ratio",
+)  # fmt: skip
+INSTANTS, POINTS = 16, 1200
+
+
+def still_row(row: dict) -> dict:
+    """Return the motion row without place, velocity and attitude, so that only the parts' own motion is left."""
+    names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
+    return {**row, **dict.fromkeys(names, 0.0)}
+
+
+def cycle_s(cloud: Cloud, row: dict) -> float:
+    """Return the time of one cycle (s): a turn, a beat, or the whole recording."""
+    if len(cloud.track):
+        return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
+    return 1.0 / row["rate_hz"]
+
+
+def swept(cloud: Cloud, row: dict) -> np.ndarray:
+    """Points (at most 1200, 3) m that a cloud sweeps over one cycle in its own frame, evenly taken from all of them."""
+    times = np.arange(INSTANTS) / INSTANTS * cycle_s(cloud, row)
+    points = positions(cloud, still_row(row), times).reshape(-1, 3)
+    return points[np.linspace(0, len(points) - 1, min(POINTS, len(points))).round().astype(int)]
+
+
+def energy_distance(first: np.ndarray, second: np.ndarray) -> float:
+    """Return the energy distance of two point sets (n, 3) and (m, 3), in their unit.
+
+    sqrt(2 E|X - Y| - E|X - X'| - E|Y - Y'|), over all pairs. Source: Szekely and Rizzo 2013, Eq. 6.
+    """
+    square = 2 * cdist(first, second).mean() - cdist(first, first).mean() - cdist(second, second).mean()
+    return float(np.sqrt(max(square, 0.0)))
+
+
+def form(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return points (n, 3) centred and divided by their root mean square radius, and that radius (m).
+
+    Raises: InputError where all points are one.
+    """
+    centred = points - points.mean(0)
+    radius = float(np.sqrt((centred**2).sum(1).mean()))
+    if not radius > 0:
+        raise InputError(f"distances: {len(points)} points that are all one have no form")
+    return centred / radius, radius
+
+
+def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
+    """Return the rows of distances.csv by category and subtype; `motion` holds at least one row of every subtype.
+
+    Raises: InputError for a cloud without a motion row.
+    """
+    first: dict[str, dict] = {}
+    for row in motion:
+        first.setdefault(row["subtype"], row)
+    lacking = [cloud.subtype for cloud in clouds if cloud.subtype not in first]
+    if lacking:
+        raise InputError(f"distances: no motion row of {lacking}")
+    forms = {cloud.subtype: form(swept(cloud, first[cloud.subtype])) for cloud in clouds}
+    found = []
+    for category in CATEGORIES:
+        names = sorted(cloud.subtype for cloud in clouds if cloud.category == category)
+        apart = {(a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b}
+        for name in names:
+            line = [category, name, first[name]["group"]]
+            for trained in (False, True):
+                others = [
+                    other for other in names if other != name and (not trained or first[other]["group"] == "seen")
+                ]
+                near = min(others, key=lambda other: (apart[min(name, other), max(name, other)], other), default=None)
+                if near is None:
+                    line += ["", "", ""]
+                    continue
+                sizes = sorted((forms[name][1], forms[near][1]))
+                line += [near, f"{apart[min(name, near), max(name, near)]:.4f}", f"{sizes[1] / sizes[0]:.3f}"]
+            found.append(line)
+    return found
+
+
+def write(out: str | Path, lines: list[list]) -> None:
+    """Write distances.csv."""
+    with replacing(out) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        writer.writerows(lines)

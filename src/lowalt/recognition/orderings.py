@@ -1,0 +1,42 @@
+"""The paper's claims, and whether their orderings hold on a run's own data."""
+
+import csv
+from collections.abc import Iterable
+from pathlib import Path
+
+from lowalt.errors import InputError
+from lowalt.files import existing
+
+CLAIMS = (
+    *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
+    *(("ABC:VRP+TRP+VT", f"{one}:VRP+TRP+VT", "three stations over one") for one in "ABC"),
+    *(("ABC:VRP+TRP+VT", f"ABC:{name}mean fusion", "proposed over mean fusion")
+      for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
+)  # fmt: skip
+"""The paper's claims: the scheme said to be better, the other, and the claim's name."""
+
+
+def read_published(path: str | Path) -> dict[tuple[str, str], float]:
+    """Return the paper's accuracy in percent, averaged over the SNRs, by (protocol, scheme).
+
+    Raises: InputError for a file that is no such table.
+    """
+    try:
+        with existing(path, "published accuracies").open(newline="") as file:
+            rows = [row for row in csv.DictReader(file) if row["snr_db"] == "avg"]
+            return {(row["protocol"], row["scheme"]): float(row["accuracy_percent"]) for row in rows}
+    except (KeyError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: not a table of accuracies ({error!r})") from error
+
+
+def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:
+    """Yield rows [protocol, scheme, over, claim, paper_points, difference_points, low, high, ordering].
+
+    compared: the rows of comparisons.csv; those by motion model decide.
+    """
+    for protocol, better, other, claim, unit, difference, low, high, *_ in compared:
+        if unit == "motion model":
+            theirs = [published.get((protocol, name)) for name in (better, other)]
+            paper = "" if None in theirs else f"{theirs[0] - theirs[1]:.2f}"
+            ordering = "holds" if float(low) > 0 else "reversed" if float(high) < 0 else "undecided"
+            yield [protocol, better, other, claim, paper, difference, low, high, ordering]

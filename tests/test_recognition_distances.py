@@ -1,0 +1,43 @@
+"""How far subtypes lie apart: laws of the distance, and a cloud against itself turned, moved and scaled."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lowalt.errors import InputError
+from lowalt.recognition.distances import energy_distance, form
+from lowalt.streams import stream
+
+POINTS = st.integers(0, 10**6).map(lambda seed: stream(seed, "points").normal(size=(12, 3)))
+
+
+@settings(deadline=None, max_examples=30)
+@given(POINTS, POINTS, POINTS)
+def test_it_is_a_metric(first, second, third):
+    assert energy_distance(first, first) == pytest.approx(0, abs=1e-6)
+    assert energy_distance(first, second) == pytest.approx(energy_distance(second, first))
+    assert energy_distance(first, third) <= energy_distance(first, second) + energy_distance(second, third) + 1e-9
+
+
+def test_two_points_apart_have_the_distance_that_the_formula_gives():
+    assert energy_distance(np.zeros((1, 3)), np.array([[3.0, 4.0, 0.0]])) == pytest.approx(np.sqrt(10))
+    # One of two points moved by 2: E|X-Y| = (0 + 2 + 1 + 1) / 4, E|X-X'| = 1/2, E|Y-Y'| = 1/2.
+    first = np.array([[0.0, 0, 0], [1.0, 0, 0]])
+    second = np.array([[0.0, 0, 0], [-1.0, 0, 0]])
+    assert energy_distance(first, second) == pytest.approx(np.sqrt(2 * 1.0 - 0.5 - 0.5))
+
+
+@settings(deadline=None, max_examples=30)
+@given(POINTS, st.floats(0.1, 50), st.floats(-100, 100))
+def test_form_knows_neither_place_nor_size_and_the_radius_does(points, scale, shift):
+    plain, radius = form(points)
+    moved, other = form(scale * points + shift)
+    np.testing.assert_allclose(moved, plain, atol=1e-9)
+    assert other / radius == pytest.approx(scale)
+    assert np.sqrt((plain**2).sum(1).mean()) == pytest.approx(1)
+
+
+def test_points_that_are_all_one_are_refused():
+    with pytest.raises(InputError, match="no form"):
+        form(np.ones((4, 3)))
