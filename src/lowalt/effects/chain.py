@@ -17,6 +17,7 @@ from lowalt.effects.need import Decision
 from lowalt.effects.response import response
 from lowalt.effects.view import View
 from lowalt.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.power import rms
 from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud
 
@@ -56,7 +57,8 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
     view = observe(scene, station, cloud, row, occluders)
     own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
-    power = float(np.mean(abs(own.signal) ** 2))
+    # Of the signal as it is stored, so that noise set against it is what it would be without this chain.
+    power = rms(own.signal.astype(np.complex64)) ** 2
     if not placed(scene.effects, "channel", "receiver", "detection"):
         return Heard(own.signal, own.cell, power, [])
     chain = _Chain(scene, view, power)

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from lowalt.errors import InputError
+from lowalt.power import rms
 
 
 def add_noise(
@@ -27,10 +28,8 @@ def add_noise(
         return signal.copy()
     if power is not None and not 0 <= power < math.inf:
         raise InputError(f"noise: power is {power} W, expected a finite number >= 0")
-    # Scaling by the peak first keeps the mean square of very small or large signals out of under- and overflow.
-    peak = np.abs(signal).max()
-    if (peak if power is None else power) == 0:
+    scale = rms(signal) if power is None else math.sqrt(power)
+    if scale == 0:
         return signal.copy()
-    rms = math.sqrt(power) if power is not None else peak * math.sqrt(np.mean(np.abs(signal / peak) ** 2))
     pair = rng.standard_normal((2, *signal.shape))
-    return signal + rms * 10 ** (-snr_db / 20) * math.sqrt(0.5) * (pair[0] + 1j * pair[1])
+    return signal + scale * 10 ** (-snr_db / 20) * math.sqrt(0.5) * (pair[0] + 1j * pair[1])

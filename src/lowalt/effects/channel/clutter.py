@@ -13,7 +13,6 @@ from scipy.special import gamma, gammaincinv
 
 from lowalt.echo.radar import radar
 from lowalt.echo.terms import aim_cosines
-from lowalt.effects.channel.ground_reflection import centre_hz
 from lowalt.effects.facts import Facts
 from lowalt.effects.view import View
 from lowalt.errors import InputError
@@ -162,7 +161,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     if settings["clutter_to_signal_db"] is not None:
         wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
         power = power * (wanted / power.sum())
-    frequency = centre_hz(network, station)
+    frequency = radar(network, station).centre_hz
     uniform = 1.0 - rng.random((2, len(power)))
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
     still, beta = windblown(settings["wind_mps"], frequency)

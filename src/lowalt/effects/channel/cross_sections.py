@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import j1
 
-from lowalt.effects.channel.ground_reflection import centre_hz
+from lowalt.echo.radar import radar
 from lowalt.effects.view import View
 from lowalt.network import SPEED_OF_LIGHT
 from lowalt.targets.cloud import Cloud
@@ -86,7 +86,7 @@ def visible(settings: dict, view: View) -> np.ndarray:
     cosine = aspect_cosine(view)
     lobe = diffuse(cosine, settings["power"])
     if settings["blades"] == "facet":
-        wave = 2 * np.pi * centre_hz(view.network, view.station) / SPEED_OF_LIGHT
+        wave = 2 * np.pi * radar(view.network, view.station).centre_hz / SPEED_OF_LIGHT
         for mine, radius in _blades(view.cloud):
             lobe[:, mine] = facet(cosine[:, mine], wave * radius)
     strength = settings["strength"]

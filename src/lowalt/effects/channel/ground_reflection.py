@@ -7,11 +7,12 @@ back by either route gives four echoes; the response forms them. Points are take
 import numpy as np
 from scipy.special import i0e
 
+from lowalt.echo.radar import radar
 from lowalt.effects.facts import Facts
 from lowalt.effects.response import Way
 from lowalt.effects.view import View
 from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.network import SPEED_OF_LIGHT
 
 SOURCE = (
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "
@@ -68,17 +69,13 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
     return i0e(2.0 * (2 * np.pi * frequency_hz / SPEED_OF_LIGHT * height_m * sine) ** 2)
 
 
-def centre_hz(network: Network, station: Station) -> float:
-    """Return the middle of a station's band (Hz), at which the ground's coefficient is taken."""
-    return station.frequency_hz + 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz
-
-
 def ways(settings: dict, view: View) -> list[Way]:
     """Return the one further route: images (N, L, 3) m and coefficients (N, L)."""
     images = view.places * [1.0, 1.0, -1.0]
     away = images - np.asarray(view.station.position_m)
     sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
-    frequency = centre_hz(view.network, view.station)
+    # The middle of the station's band stands for all of it.
+    frequency = radar(view.network, view.station).centre_hz
     ground = settings["permittivity"], settings["conductivity_s_m"], frequency, settings["polarisation"]
     coefficient = fresnel(np.clip(sine, 0.0, 1.0), *ground)
     if settings["roughness_m"] > 0:
