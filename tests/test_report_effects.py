@@ -304,3 +304,20 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
     with pytest.raises(InputError, match="images of 16 pixels"):
         small = {"views": views[..., ::2, ::2], "label": label}
         recognised(tmp_path / "model.pt", [({"name": "none"}, small)], settings)
+
+
+@pytest.mark.workflow
+def test_effects_are_priced_where_asked_for_and_nowhere_else(tmp_path):
+    pytest.importorskip("snakemake")
+    from test_workflow import planned, snakemake, workplace
+
+    folder = workplace(tmp_path)
+    priced = {"effect_samples", "occluders", "effects_table"}
+    assert not priced & planned(folder)
+    assert priced | {"cloud", "motion", "train"} <= planned(folder, "--", "effects")
+    shown = folder / "shown.yaml"
+    shown.write_text("report: {effects: true}\n")
+    assert priced | {"report"} <= planned(folder, "--configfile", "overlay.yaml", str(shown))
+    shown.write_text("effects: {adc: {}}\n")
+    text = snakemake(folder, "-n", "--configfile", "overlay.yaml", str(shown), "--", "effects", good=False)
+    assert "effects: ['adc'], expected none" in text
