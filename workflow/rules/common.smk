@@ -84,7 +84,8 @@ TRAININGS = [
 ]
 PRICED = [f"unseen/{scheme.slug}/{config['recognition']['seeds'][0]}" for scheme in TRAINED]
 SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
-RESULT_TABLES = ("accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv")
+TABLE_NAMES = "accuracy confusion subtypes comparisons orderings alarms calibration reliability"
+RESULT_TABLES = [f"{name}.csv" for name in TABLE_NAMES.split()]
 
 
 def code(*modules):
@@ -305,9 +306,19 @@ def benchmark_files(wildcards):
         *views,
         *(f"train/{training}" for training in TRAININGS),
         *(f"evaluate/{training}" for training in TRAININGS),
+        "distances",
         "tables",
     ]
     return [f"{base}/{name}.jsonl" for name in names]
+
+
+def recognition_options(wildcards, input):
+    """The report's options for what recognition left beside its accuracy."""
+    base = f"results/{wildcards.run}"
+    names = ("orderings", "alarms", "calibration", "reliability", "distances")
+    options = [f"--{name} {base}/{name}.csv" for name in names]
+    options += [f"--transfer {input.transfer}"] if input.transfer else []
+    return " ".join(options + ([f"--accuracy-cost {input.accuracy}"] if input.accuracy else []))
 
 
 def report_settings(wildcards):

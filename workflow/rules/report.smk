@@ -15,6 +15,9 @@ rule report:
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
         gallery="results/{run}/clouds.png",
         motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks[0]),
+        distances="results/{run}/distances.csv",
+        transfer=["results/{run}/transfer.csv"] if OTHERS else [],
+        accuracy=config["report"]["accuracy"] or [],
         benchmarks=benchmark_files,
         cost=cost_products,
         effects=effect_products,
@@ -27,6 +30,7 @@ rule report:
         "../../envs/environment.yaml"
     params:
         settings=report_settings,
+        tables=recognition_options,
         cost=cost_products_option,
         effects=effect_products_option,
     shell:
@@ -34,4 +38,5 @@ rule report:
         " --published {input.published:q} --confusion results/{wildcards.run}/confusion.csv"
         " --subtypes results/{wildcards.run}/subtypes.csv --comparisons results/{wildcards.run}/comparisons.csv"
         " --index {input.index:q} --clouds {input.clouds:q} --gallery {input.gallery:q} --motion {input.motion:q}"
+        " {params.tables}"
         " --benchmarks {input.benchmarks:q} {params.cost} {params.effects} --stages {output.stages:q} --out {output.page:q} 2> {log:q}"

@@ -13,7 +13,7 @@ from lowalt.command import parser, pick, run
 from lowalt.files import existing, replacing, sha256
 from lowalt.hardware import describe
 from lowalt.motion import read_table
-from lowalt.report import figures
+from lowalt.report import figures, recognition
 from lowalt.report.cost_table import read_summary
 from lowalt.report.made_with import versions
 from lowalt.report.strip import motion_strip
@@ -115,6 +115,7 @@ def main(arguments: list[str]) -> None:
         "--cost", nargs=3, help="what accuracy costs: table of times, of changed pixels (.csv) and figure (.png)"
     )
     options.add_argument("--effects", nargs=2, help="what each effect costs and does: table (.csv) and figure (.png)")
+    recognition.add_options(options)
     options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
     options.add_argument("--out", required=True, help="page to write (.html)")
     given = options.parse_args(arguments)
@@ -144,6 +145,8 @@ def main(arguments: list[str]) -> None:
         table, drawing = given.effects
         priced = read_csv(table, *EFFECT_COLUMNS)
         pictures["effects"] = existing(drawing, "figure of effects").read_bytes()
+    more = recognition.section(given)
+    pictures |= more.pop("pictures")
     labels = [f"{snr:g}" for snr in map(float, config["noise"]["snr_db"])]
     template = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined)
     page = template.from_string(Path(__file__).with_name("page.html").read_text()).render(
@@ -153,7 +156,7 @@ def main(arguments: list[str]) -> None:
         ours=ours, published=paper, network=network_words(config["recognition"]),
         comparisons=read_csv(given.comparisons, *COMPARISON_COLUMNS), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
-        clouds=clouds, times=times, cost=cost, effects=priced, versions=versions(),
+        clouds=clouds, more=more, times=times, cost=cost, effects=priced, versions=versions(),
         configuration=yaml.safe_dump(config, sort_keys=False),
         images={name: picture(data) for name, data in pictures.items()},
     )  # fmt: skip

@@ -1,0 +1,99 @@
+"""Tables of measured results in Markdown documents, written from the reference CSVs and never by hand.
+
+    python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
+
+replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes` (accuracy of every scheme
+beside the paper's, and which orderings hold) or `cost` (accuracy and its times).
+"""
+
+from pathlib import Path
+
+from lowalt.command import run
+from lowalt.errors import InputError
+from lowalt.files import existing, replacing
+from lowalt.report.recognition import ordering_words
+from lowalt.report.tables import by_scheme, read_csv
+
+PUBLISHED = "config/published_accuracy.csv"
+
+
+def _line(cells: list[str]) -> str:
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def _head(cells: list[str]) -> str:
+    return _line(cells) + _line(["---"] * len(cells))
+
+
+def schemes(prefix: str) -> str:
+    """Return the table of schemes from {prefix}accuracy.csv and {prefix}orderings.csv: averages over the SNRs."""
+    rows = read_csv(f"{prefix}accuracy.csv", "protocol", "scheme", "snr_db", "accuracy_percent", "hardware")
+    ours, paper = by_scheme(rows), by_scheme(read_csv(PUBLISHED, "protocol", "scheme", "snr_db", "accuracy_percent"))
+    text = _head(["scheme", "seen, %", "paper", "unseen, %", "paper"])
+    for scheme in dict.fromkeys(row["scheme"] for row in rows):
+        cells = [scheme]
+        for protocol in ("seen", "unseen"):
+            for source in (ours, paper):
+                value = source.get(protocol, {}).get(scheme, {}).get("avg")
+                cells.append("" if value is None else f"{value:.1f}")
+        text += _line(cells)
+    orderings = read_csv(f"{prefix}orderings.csv", "protocol", "scheme", "over", "difference_points", "low", "ordering")
+    text += "\n" + ordering_words(orderings) + "\n\n" if orderings else "\n"
+    if orderings:
+        names = ("claim", "protocol", "scheme", "over")
+        text += _head([*names, "paper, points", "here, points", "95 % interval", "ordering"])
+        for row in orderings:
+            points = [f"{float(row[name]):+.1f}" if row[name] else "" for name in ("paper_points", "difference_points")]
+            interval = f"{float(row['low']):+.1f} to {float(row['high']):+.1f}"
+            text += _line([*(row[name] for name in names), *points, interval, row["ordering"]])
+    return text + f"\nMeasured on {rows[0]['hardware']}.\n"
+
+
+def cost(prefix: str) -> str:
+    """Return the table of accuracy and its times from {prefix}accuracy_cost.csv, averages over the SNRs."""
+    names = ("scheme", "kind", "pixels", "seen_percent", "unseen_percent", "difference_points", "low", "high",
+             "inference_ms_1", "inference_ms_64", "core_s_training", "front", "hardware")  # fmt: skip
+    rows = [row for row in read_csv(f"{prefix}accuracy_cost.csv", *names) if row["snr_db"] == "avg"]
+    head = ["row", "seen, %", "unseen, %", "unseen, points (95 %)", "inference, ms (batch 1)", "ms (batch 64)",
+            "training, core-s", "front"]  # fmt: skip
+    text = _head(head)
+    for row in rows:
+        number = lambda name, form, row=row: format(float(row[name]), form) if row[name] else ""  # noqa: E731
+        points = number("difference_points", "+.1f")
+        points += f" ({number('low', '+.1f')} to {number('high', '+.1f')})" if points else ""
+        trained = number("core_s_training", ".0f") + (" (extrapolated)" if row["kind"] == "timed" else "")
+        percent = [number(f"{part}_percent", ".1f") for part in ("seen", "unseen")]
+        times = [number("inference_ms_1", ".1f"), number("inference_ms_64", ".2f"), trained]
+        text += _line([row["scheme"], *percent, points, *times, row["front"]])
+    return text + f"\nMeasured on {rows[0]['hardware']}.\n"
+
+
+MAKERS = {"schemes": schemes, "cost": cost}
+
+
+def fill(document: str, name: str, table: str) -> str:
+    """Return the document with `table` between the marks of `name`.
+
+    Raises: InputError where a mark is missing or stands twice.
+    """
+    first, last = f"<!-- {name} -->\n", f"<!-- end of {name} -->"
+    if document.count(first) != 1 or document.count(last) != 1 or document.index(first) > document.index(last):
+        raise InputError(f"document: expected {first.strip()!r} and then {last!r}, each once")
+    before, _, rest = document.partition(first)
+    return before + first + table + last + rest.partition(last)[2]
+
+
+def main(arguments: list[str]) -> None:
+    """Fill the places of one document."""
+    if len(arguments) < 2 or any(pair.partition("=")[0] not in MAKERS for pair in arguments[1:]):
+        raise InputError(f"arguments {arguments}: expected DOCUMENT and NAME=PREFIX, names of {list(MAKERS)}")
+    path = existing(arguments[0], "document")
+    text = path.read_text()
+    for name, _, prefix in (pair.partition("=") for pair in arguments[1:]):
+        text = fill(text, name, MAKERS[name](prefix))
+    with replacing(Path(path)) as temporary:
+        temporary.write_text(text)
+
+
+if __name__ == "__main__":
+    run(main)
