@@ -20,13 +20,13 @@ def test_tables_stand_between_their_marks_and_can_be_written_again(tmp_path):
     (tmp_path / "t-accuracy.csv").write_text(ACCURACY)
     (tmp_path / "t-orderings.csv").write_text(ORDERINGS)
     path = tmp_path / "document.md"
-    path.write_text("before\n<!-- schemes -->\nold\n<!-- end of schemes -->\nafter\n")
+    path.write_text("before\n<!-- schemes -->\nstale\n<!-- end of schemes -->\nafter\n")
     main([str(path), f"schemes={tmp_path}/t-"])
     text = path.read_text()
     assert "| A:VT | 91.2 | 97.9 | 81.0 | 93.4 |" in text
     assert "1 hold; not decided by these samples: A:X over A:VT (seen)." in text
     assert "| spectra | seen | A:X | A:VT | +0.5 | -1.0 | -2.0 to +0.5 | undecided |" in text
-    assert text.startswith("before\n") and text.endswith("\nafter\n") and "old" not in text
+    assert text.startswith("before\n") and text.endswith("\nafter\n") and "stale" not in text
     main([str(path), f"schemes={tmp_path}/t-"])
     assert path.read_text() == text
 
