@@ -2,10 +2,11 @@
 
     python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 50] [--out results/benchmarks/echo.csv]
 
-Writes echo.csv (method, category, points, tolerance, seconds a sample, error, ratios to the peers of the same run):
-one cloud of each category, resampled to 31, 185 and 400 points at 200 m. Writes echo_stage.csv beside it: the stage's
-rate on motion models of mixed subtypes, the shares of its time that poses, signals and kernels take, and how it scales
-with points, symbols, stations and cores. One thread a process; run it on a quiet machine.
+Writes echo.csv (columns COLUMNS; medians of five calls, forty of the engine; ratios to the peers of the same run,
+geometry and gains included on both sides): one cloud of each category, resampled to 31, 185 and 400 points at 200 m.
+Writes echo_stage.csv beside it: the stage's rate on motion models of mixed subtypes by the real command, with one and
+two processes side by side, the shares of its time that poses, signals and kernels take, and how it scales with points,
+symbols, stations and cores. One thread a process; run it on a quiet machine.
 """
 
 import argparse
@@ -16,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,10 @@ from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.records import load_table
 from lowalt.yaml_files import load_yaml
 
+COLUMNS = (
+    "method", "category", "points", "tolerance", "seconds_a_sample", "relative_error", "proved_bound",
+    "ratio_to_finufft", "ratio_to_direct", "hardware",
+)  # fmt: skip
 PAPER = 240_000
 """Motion models of the paper, each seen by three stations."""
 CHUNK = 500
@@ -47,7 +52,16 @@ def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> lis
         "tolerances": [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9], "direct_distances_m": [200.0],
         "direct_repeats": repeats if direct else 0,
     }  # fmt: skip
-    return cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
+    rows = cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
+    return [{name: (row | {"seconds_a_sample": row["seconds"]})[name] for name in COLUMNS} for row in rows]
+
+
+def write(path: Path, columns: Sequence[str], rows: list[dict]) -> None:
+    """Write a table as CSV."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        table = csv.DictWriter(file, columns, lineterminator="\n")
+        table.writeheader()
+        table.writerows(rows)
 
 
 def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
@@ -64,10 +78,10 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
     return rows
 
 
-def stage(config: dict, paths: list[str], rows: list[dict], processes: int, folder: Path) -> float:
-    """Seconds that the echo command takes for all rows: a job a chunk, all stations, `processes` jobs at a time."""
+def stage(config: dict, paths: list[str], rows: list[dict], names: list[str], processes: int, folder: Path) -> float:
+    """Seconds that the echo command takes for all rows: a job a chunk, the stations `names`, `processes` at a time."""
     block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
-    names, jobs = list(config["network"]["stations"]), []
+    jobs = []
     for part in range(0, len(rows), CHUNK):
         table = folder / f"{part}.csv"
         write_table(table, rows[part : part + CHUNK])
@@ -137,25 +151,22 @@ def main() -> None:
     line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo.csv"))
     given = line.parse_args()
     config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
-    cost.write(given.out, tables(config, clouds, given.repeats, not given.no_direct))
+    write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
-    stations = len(config["network"]["stations"])
+    everyone = list(config["network"]["stations"])
     result = scaling(config, clouds[0])
     with tempfile.TemporaryDirectory() as folder:
-        for processes in (1, 2):
-            seconds = stage(config, given.clouds, rows, processes, Path(folder))
-            result.append({"what": f"echo stage, {len(rows)} models x {stations} stations, {processes} process(es)",
+        for processes, names in ((1, everyone[:1]), (1, everyone), (2, everyone)):
+            seconds = stage(config, given.clouds, rows, names, processes, Path(folder))
+            result.append({"what": f"echo stage, {len(rows)} models x {len(names)} stations, {processes} process(es)",
                            "seconds": seconds, "models_per_s": len(rows) / seconds,
                            "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip
-    alone = next(row["seconds"] for row in result if "1 process" in row["what"])
+    alone = [row["seconds"] for row in result if "1 process" in row["what"]][-1]
     result += [{"what": f"inside the stage, 1 process: {name[:-2]}", "seconds": value, "share": value / alone}
                for name, value in inside(config, clouds, rows).items()]  # fmt: skip
     path = given.out.with_name("echo_stage.csv")
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, ["what", "seconds", "models_per_s", "paper_minutes", "share", "hardware"],
-                                lineterminator="\n")  # fmt: skip
-        writer.writeheader()
-        writer.writerows(row | {"hardware": cost.hardware()} for row in result)
+    columns = ("what", "seconds", "models_per_s", "paper_minutes", "share", "hardware")
+    write(path, columns, [row | {"hardware": cost.hardware()} for row in result])
     print(path.read_text(), end="")
 
 

@@ -10,7 +10,6 @@ counted, not judged.
 
 import argparse
 import csv
-import platform
 import sys
 import time
 from pathlib import Path
@@ -18,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.echo import Rigid, echo_signal
+from lowalt.echo.cost import hardware
 from lowalt.echo.peers import judge
 from lowalt.errors import InputError
 from lowalt.files import replacing
@@ -142,7 +142,7 @@ def main() -> None:
                 "median_error": float(np.median([row["error"] for row in seen])) if seen else 0.0,
                 "wrong_cells": sum(row["wrong_cells"] for row in seen),
                 "near_ties": sum(row["near_ties"] for row in seen), "failures": len(failures(mine)),
-                "seconds": round(time.time() - start, 1), "hardware": platform.processor() or platform.machine(),
+                "seconds": round(time.time() - start, 1), "hardware": hardware(),
             })  # fmt: skip
     print(given.out.read_text(), end="")
     bad = failures(rows)

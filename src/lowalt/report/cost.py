@@ -108,6 +108,8 @@ def saved(measured: Iterable[dict[str, str]], row: dict) -> float | str:
 
 def _time_panel(panel, measured: list[dict[str, str]], methods: list[str], distances: list[float]) -> None:
     """Time a sample over its error for one category: colour says the method, marker the distance."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     for distance in distances:
         curve = [line for line in measured if line["method"] == "engine" and float(line["range_m"]) == distance]
         steps = sorted((float(line["relative_error"]), 1e3 * float(line["seconds"])) for line in curve)
@@ -121,6 +123,8 @@ def _time_panel(panel, measured: list[dict[str, str]], methods: list[str], dista
             fillstyle="none" if engine and line["tolerance"] != "exact" else "full", linestyle="none",
         )  # fmt: skip
     panel.set(xscale="log", yscale="log", xlabel="measured error / largest value")
+    panel.xaxis.set_major_locator(LogLocator(numticks=6))
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.grid(alpha=0.3)
 
 
