@@ -2,11 +2,15 @@
 
 import io
 import json
+import re
+from pathlib import Path
 
+import jinja2
 import numpy as np
 import pytest
 from PIL import Image
 
+import lowalt.report
 from lowalt.config import load, merge
 from lowalt.effects.catalogue import PLACES, called
 from lowalt.effects.chain import Scene
@@ -14,6 +18,7 @@ from lowalt.errors import InputError
 from lowalt.motion import write_table
 from lowalt.network import Network
 from lowalt.noise.__main__ import noisy_signals
+from lowalt.report.__main__ import EFFECT_COLUMNS
 from lowalt.report.effect_calls import asked_snrs, calls
 from lowalt.report.effect_samples import (
     held_out,
@@ -304,6 +309,22 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
     with pytest.raises(InputError, match="images of 16 pixels"):
         small = {"views": views[..., ::2, ::2], "label": label}
         recognised(tmp_path / "model.pt", [({"name": "none"}, small)], settings)
+
+
+def test_the_page_shows_every_row_where_there_is_a_table_and_no_word_otherwise(tmp_path):
+    write(tmp_path / "effects.csv", list(table().values()))
+    page = Path(lowalt.report.__file__).with_name("page.html").read_text()
+    start = page.index("{% if effects %}")
+    section = jinja2.Environment(autoescape=True, undefined=jinja2.StrictUndefined).from_string(
+        page[start : page.index("<h2>", page.index("<figure>", start))]
+    )
+    lines = read_csv(tmp_path / "effects.csv", *EFFECT_COLUMNS)
+    text = section.render(effects=lines, images={"effects": "data:here"})
+    cells = [re.findall(r"<td>(.*?)</td>", line) for line in text.splitlines() if line.startswith("<tr><td>")]
+    assert [line[0] for line in cells] == ["none", "gusts", "adc", "windy"]
+    assert cells[3][1:4] == ["4.50", "5.00", "0.25"] and cells[1][2] == ""
+    assert 'src="data:here"' in text
+    assert not section.render(effects=[], images={}).strip()
 
 
 @pytest.mark.workflow
