@@ -125,6 +125,7 @@ def following(first: str) -> set[str]:
     [
         ({"motion": {"tilt_deg": 10.0}}, "motion"),
         ({"network": {"guard_subcarriers": 20}}, "echo"),
+        ({"effects": {"adc": {}}}, "echo"),
         ({"noise": {"snr_db": [9, float("inf")]}}, "noise"),
         ({"images": {"colour_map": "magma"}}, "tiles"),
         ({"split": {"val": 2, "train": 7}}, "shard"),
@@ -164,6 +165,8 @@ def test_edited_code_re_runs_its_stage_and_what_follows(finished, file, first):
         ({"network": {"symbols": 256}}, "256"),
         ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
         ({"recogniton": {}}, "unknown key(s) ['recogniton']"),
+        ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
+        ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
     ],
 )
 def test_a_wrong_configuration_starts_no_job(tmp_path, finished, overlay, words):
@@ -172,6 +175,26 @@ def test_a_wrong_configuration_starts_no_job(tmp_path, finished, overlay, words)
     text = snakemake(finished, "--configfile", "overlay.yaml", str(path), "--", "data", good=False)
     assert words in text
     assert "rule " not in text
+
+
+def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(finished, tmp_path):
+    folder = workplace(tmp_path)
+    # Copies keep their times, so that only what the effect touches is made again.
+    shutil.copytree(finished / "results", folder / "results")
+    shutil.copytree(finished / ".snakemake", folder / ".snakemake")
+    for name in ("src", "workflow", "config"):
+        shutil.copytree(finished / name, folder / name, dirs_exist_ok=True)
+    path = tmp_path / "scene.yaml"
+    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}}))
+    snakemake(folder, "--configfile", "overlay.yaml", str(path), "--", "signals")
+    changed = 0
+    for noisy in sorted((finished / "results/test/noisy").glob("*.npy")):
+        rows = read_table(finished / "results/test/motion" / f"{noisy.stem}.csv")
+        before, after = np.load(noisy), np.load(folder / "results/test/noisy" / noisy.name)
+        for row, one, other in zip(rows, before, after, strict=True):
+            assert (one.tobytes() != other.tobytes()) == (row["category"] == "UAV")
+            changed += row["category"] == "UAV"
+    assert changed == 40
 
 
 def declared(rule: str) -> set[str]:
