@@ -8,7 +8,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost accuracy effects tables estimate reference pictures pins help
+.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate reference pictures pins help
 
 all: default
 
@@ -63,6 +63,12 @@ accuracy: $(SETUP)  ## what recognition accuracy costs in time: results/default/
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
 	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
 	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy
+
+# The paper's scene first: its model is what the other scenes' samples are tried on, beside a model of their own.
+scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained without effects, and of their own
+	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- models
+	for scene in urban worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
+		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
 
 effects: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
 	$(SNAKEMAKE) -- effects

@@ -6,7 +6,6 @@ from lowalt.effects.view import View
 
 SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 (phase-steered arrays over a bandwidth)"
 DEFAULTS: dict[str, float] = {}
-FACTOR = {"squint": True}
 
 
 def idle(settings: dict) -> bool:

@@ -7,7 +7,6 @@ from lowalt.network import SPEED_OF_LIGHT
 
 SOURCE = "Balanis, Antenna Theory, 4th ed., 2016, section 4.4.1 (phase error of the far-field approximation)"
 DEFAULTS: dict[str, float] = {}
-FACTOR = {"wavefront": True}
 
 
 def idle(settings: dict) -> bool:
