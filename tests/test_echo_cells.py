@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import echo_signal
+from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.cells import PLACES, SIDE, cells
 from lowalt.echo.certify import far_limit, far_moments
 from test_echo import cloud_in_motion, network, relative
@@ -75,3 +75,22 @@ def test_ranges_by_roots_and_by_polynomials_agree():
     arguments = (net, net.stations[0], close, 1.0, close.translation[0, 0])
     exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-7)
     assert not loose.choice.near and relative(loose.signal, exact.signal) <= loose.bound <= 1e-7
+
+
+def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
+    net = network(symbols=30)
+    rng = np.random.default_rng(3)
+    nodes = np.array([120.0, -30.0, 40.0]) + rng.normal(scale=0.4, size=(30, 7, 3))
+    part = np.sort(rng.integers(0, 7, 50))
+    points = rng.normal(size=(50, 3))
+    still = Rigid(np.zeros((30, 7, 3, 3)), nodes, points, part)
+    together = echo_signal(net, net.stations[0], still, 1.0, nodes[0, 0])
+    plain = echo_signal(net, net.stations[0], nodes[:, part], 1.0, nodes[0, 0])
+    assert relative(together.signal, plain.signal) < 1e-12 and (together.cell == plain.cell).all()
+    # A matrix with one entry is no longer still.
+    turned = np.zeros((30, 7, 3, 3))
+    turned[:, 3, 2, 1] = 0.5
+    moved = echo_signal(net, net.stations[0], Rigid(turned, nodes, points, part), 1.0, nodes[0, 0])
+    places = nodes[:, part] + np.einsum("nlij,lj->nli", turned[:, part], points)
+    truth = echo_signal(net, net.stations[0], places, 1.0, nodes[0, 0], paths=[Path()])
+    assert relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3

@@ -82,6 +82,17 @@ def place_part(px, py, pz, low, size, m, eps, ey, ez, at):
 
 
 @VECTOR
+def place_still(m, size, eps, ey, ez, at):
+    """As `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
+    a, b, c = m[9], m[10], m[11]
+    e = a * (m[12] + a) + b * (m[13] + b) + c * (m[14] + c)
+    y, z = b * m[15] + m[16], c * m[17] + m[18]
+    at = np.uint64(at)
+    for i in range(np.uint64(-(-size // LANES) * LANES)):
+        eps[at + i], ey[at + i], ez[at + i] = e, y, z
+
+
+@VECTOR
 def place_nodes(translation, n, q, low, size, cosine, sine, scale, m, eps, ey, ez):
     """As `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
     hx, hy, hz, ys, y0, zs, z0 = m[12], m[13], m[14], m[15], m[16], m[17], m[18]

@@ -70,8 +70,10 @@ def fill_tile(rotation, translation, lx, ly, lz, parts, starts, q, sine, cosine,
             if low < first or low >= end:
                 continue
             p = parts[run]
+            still = True
             for j in range(3):
                 x, y = rotation[n, p, 0, j], rotation[n, p, 1, j]
+                still = still and x == 0.0 and y == 0.0 and rotation[n, p, 2, j] == 0.0
                 m[j] = (cosine * x + sine * y) * scale
                 m[3 + j] = (cosine * y - sine * x) * scale
                 m[6 + j] = rotation[n, p, 2, j] * scale
@@ -79,6 +81,9 @@ def fill_tile(rotation, translation, lx, ly, lz, parts, starts, q, sine, cosine,
             m[9] = (cosine * x + sine * y) * scale
             m[10] = (cosine * y - sine * x) * scale
             m[11] = (translation[n, p, 2] - z0) * scale
-            lanes.place_part(lx, ly, lz, low, high - low, m, eps, ey, ez, low - first)
+            if still:
+                lanes.place_still(m, high - low, eps, ey, ez, low - first)
+            else:
+                lanes.place_part(lx, ly, lz, low, high - low, m, eps, ey, ez, low - first)
     for i in range(end - first, size):
         eps[i], ey[i], ez[i] = 0.0, 0.0, 0.0

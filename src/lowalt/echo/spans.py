@@ -39,7 +39,8 @@ def spans(rotation, translation, first, parts, centres, radii, refs, sine, cosin
                 x += rotation[n, p, 0, 0] * a + rotation[n, p, 0, 1] * b + rotation[n, p, 0, 2] * c
                 y += rotation[n, p, 1, 0] * a + rotation[n, p, 1, 1] * b + rotation[n, p, 1, 2] * c
                 z += rotation[n, p, 2, 0] * a + rotation[n, p, 2, 1] * b + rotation[n, p, 2, 2] * c
-                size = max(size, math.sqrt(x * x + y * y + z * z) + norm(rotation, n, p) * radii[run])
+                reach = norm(rotation, n, p) * radii[run] if radii[run] > 0.0 else 0.0
+                size = max(size, math.sqrt(x * x + y * y + z * z) + reach)
         size *= 1.0 + 1e-12
         out[n, PSI] = (cosine * refs[n, 1] - sine * refs[n, 0]) / r if r > 0.0 else 0.0
         out[n, OMEGA] = refs[n, 2] / r if r > 0.0 else 0.0
