@@ -29,7 +29,7 @@ from lowalt.report.effect_samples import (
     signal_change,
     takes,
 )
-from lowalt.report.effects import COLUMNS, correct, difference, recognised, rows, typical_ms, write
+from lowalt.report.effects import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
 from lowalt.report.effects_figure import figure, most_changed
 from lowalt.report.tables import read_csv
 from lowalt.splits import fold
@@ -205,6 +205,19 @@ def test_parts_of_a_scene_add_up_and_are_left_out_where_one_is_missing():
     assert [found[name]["added_ms"] for name in found] == [0.0, 1.0, 4.0, 4.5]
     assert [found[name]["parts_ms"] for name in found] == ["", "", "", 5.0]
     assert table([call for call in CALLS if call[0]["name"] != "adc"])["windy"]["parts_ms"] == ""
+
+
+def test_files_of_a_call_are_gathered_in_their_order_and_calls_in_the_chains():
+    more = fake("gusts", ["gusts"], 3.0, [13.0, INFINITY], motion=2)
+    found = gathered([CALLS[3], CALLS[2], CALLS[0], CALLS[1], more])
+    assert [header["name"] for header, _ in found] == ["none", "gusts", "adc", "windy"]
+    header, arrays = found[1]
+    assert header == CALLS[0][0] and arrays["model"].tolist() == [0, 1, 2, 3, 4, 5, 0, 1]
+    assert arrays["total_ms"].shape == (8, 2) and arrays["total_ms"][5:7, 0].tolist() == [3.0, 5.0]
+    np.testing.assert_array_equal(arrays["example"], CALLS[0][1]["example"])
+    assert arrays["snr_db"].tolist() == [13.0, INFINITY]
+    with pytest.raises(InputError, match="gusts: files of other effects or SNRs"):
+        gathered([CALLS[0], fake("gusts", ["gusts"], 3.0, [INFINITY])])
 
 
 def test_time_is_the_mean_of_subtypes_medians_so_that_one_interruption_moves_nothing():

@@ -130,7 +130,7 @@ def effect_calls():
 def effect_call(wildcards):
     found = effect_calls()
     if wildcards.call not in found:
-        raise WorkflowError(f"results/{RUN}/effects/{wildcards.call}.npz: no such call, expected one of {list(found)}")
+        raise WorkflowError(f"results/{RUN}/effects: no call {wildcards.call!r}, expected one of {list(found)}")
     return found[wildcards.call]
 
 
@@ -141,9 +141,9 @@ def call_code(wildcards):
 
 
 def call_occluders(wildcards):
-    """Surface files of all subtypes where the call hides points behind surfaces, none elsewhere."""
-    needed = SLUGS if "occlusion" in effect_call(wildcards)["effects"] else []
-    return [f"results/{wildcards.run}/occluders/{subtype}.npz" for subtype in needed]
+    """Surface files of a group's subtypes where the call hides points behind surfaces, none elsewhere."""
+    needed = PLAN.groups[wildcards.group] if "occlusion" in effect_call(wildcards)["effects"] else []
+    return [f"results/{wildcards.run}/occluders/{slug(name)}.npz" for name in needed]
 
 
 def call_settings(wildcards):
@@ -153,7 +153,9 @@ def call_settings(wildcards):
 
 
 def call_files(wildcards):
-    return [f"results/{wildcards.run}/effects/{name}.npz" for name in effect_calls()]
+    """A file a group and call, scenes first: they take longest."""
+    names = reversed(effect_calls())
+    return [f"results/{wildcards.run}/effects/{group}-{name}.npz" for name in names for group in PLAN.groups]
 
 
 def asked_scheme():

@@ -1,20 +1,20 @@
 # Effects priced: what each effect costs and does, alone and together, on test samples of a run without effects.
 # REQUIRED INPUTS: results/{run}/clouds/*.npz, results/{run}/motion/{group}-00000.csv, a model trained on the run
-# OUTPUTS: results/{run}/effects/{call}.npz, results/{run}/effects.csv, results/{run}/effects.png
+# OUTPUTS: results/{run}/effects/{group}-{call}.npz, results/{run}/effects.csv, results/{run}/effects.png
 
 
 rule effect_samples:
     input:
         code=call_code,
-        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=PLAN.groups),
-        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        motion="results/{run}/motion/{group}-00000.csv",
+        clouds=group_clouds,
         occluders=call_occluders,
     output:
-        "results/{run}/effects/{call}.npz",
+        "results/{run}/effects/{group}-{call}.npz",
     log:
-        "results/{run}/logs/effects/{call}.log",
+        "results/{run}/logs/effects/{group}-{call}.log",
     benchmark:
-        "results/{run}/benchmarks/effects/{call}.jsonl"
+        "results/{run}/benchmarks/effects/{group}-{call}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:

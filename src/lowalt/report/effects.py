@@ -1,10 +1,11 @@
 """What each effect costs and does, alone and together: the table and the figure of a run.
 
-    python -m lowalt.report.effects --settings JSON --samples none.npz adc.npz ... --model model.pt
+    python -m lowalt.report.effects --settings JSON --samples seen-none.npz unseen-none.npz ... --model model.pt
         --table effects.csv --figure effects.png
 
 Settings: seed, and evaluation of the configuration's recognition block. The files are those of
-`lowalt.report.effect_samples`; the one without effects gives the accuracies that all others are held against.
+`lowalt.report.effect_samples`, any number a call; the call without effects gives the accuracies that all others are
+held against.
 """
 
 import sys
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.command import parser, pick, run
+from lowalt.effects.catalogue import PLACES
 from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.report.effect_samples import read_samples
@@ -35,6 +37,28 @@ its 95 % interval, which resamples whole motion models.
 """
 NONE = "none"
 """Name of the call for no effects."""
+
+
+def gathered(files: list[tuple[dict, dict]]) -> list[tuple[dict, dict]]:
+    """Return one (header, arrays) a call from those of its files, one after the other; in the chain's order, scenes last.
+
+    Raises: InputError naming the call whose files differ in effects or SNRs.
+    """
+    parts: dict[str, list[tuple[dict, dict]]] = {}
+    for header, arrays in files:
+        parts.setdefault(header["name"], []).append((header, arrays))
+    result = []
+    for name, mine in parts.items():
+        header, first = mine[0]
+        if any(h["effects"] != header["effects"] or a["snr_db"].tolist() != first["snr_db"].tolist() for h, a in mine):
+            raise InputError(f"{name}: files of other effects or SNRs than the first's, expected the same")
+        once = ("snr_db", "example", "example_subtype")
+        result.append((header, {
+            key: value if key in once else np.concatenate([arrays[key] for _, arrays in mine])
+            for key, value in first.items()
+        }))  # fmt: skip
+    order = [NONE, *PLACES]
+    return sorted(result, key=lambda call: order.index(call[0]["name"]) if call[0]["name"] in order else len(order))
 
 
 def correct(probabilities: np.ndarray, labels: np.ndarray) -> np.ndarray:
@@ -78,7 +102,7 @@ def same_samples(base: dict[str, np.ndarray], other: dict[str, np.ndarray], name
 
 
 def rows(calls: list[tuple[dict, dict]], right: dict[str, np.ndarray], network: dict, seed: int) -> list[dict]:
-    """Return a row (keys COLUMNS) for every call, none first, then in the order given.
+    """Return a row (keys COLUMNS) for every call, none first, then in the order given (that of `gathered`).
 
     calls: (header, arrays) of each; right: (K, S) bool of each by name; network: {scheme, protocol} of the network.
     Raises: InputError where there is no call without effects, or the samples differ.
@@ -173,7 +197,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
     given = options.parse_args(arguments)
     seed, evaluation = pick(given.settings, "seed", "evaluation")
-    calls = [read_samples(path) for path in given.samples]
+    calls = gathered([read_samples(path) for path in given.samples])
     right, network = recognised(given.model, calls, evaluation)
     table = rows(calls, right, network, seed)
     write(given.table, table)
