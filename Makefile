@@ -6,9 +6,10 @@ BIN := .venv/bin
 SETUP := .venv/set-up
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
+TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate reference pictures pins help
+.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -79,6 +80,14 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.report.estimate results/reference/default-stages.csv \
 		workflow/schemas/config.schema.yaml results/reference/scale.csv config/default.yaml config/workstation.yaml config/paper.yaml
+
+reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
+	for table in $(TABLES); do cp results/default/$$table.csv results/reference/tables-$$table.csv; done
+	$(BIN)/python -m lowalt.report.documents design/recognition.md schemes=results/reference/tables-
+
+reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy` and write it into the documents
+	cp results/default/accuracy_cost.csv results/reference/default-accuracy_cost.csv
+	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
 
 reference:  ## keep the small tables of the finished default and real runs
 	for run in default real; do for table in $(REFERENCE); do cp results/$$run/$$table results/reference/$$run-$$table; done; done
