@@ -40,7 +40,7 @@ NONE = "none"
 
 
 def gathered(files: list[tuple[dict, dict]]) -> list[tuple[dict, dict]]:
-    """Return one (header, arrays) a call from those of its files, one after the other; in the chain's order, scenes last.
+    """Return one (header, arrays) a call from those of its files, joined; in the chain's order, scenes last.
 
     Raises: InputError naming the call whose files differ in effects or SNRs.
     """
