@@ -62,6 +62,10 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     if not placed(scene.effects, "channel", "receiver", "detection"):
         return Heard(own.signal, own.cell, power, [])
     chain = _Chain(scene, view, power)
+    if share is not None:
+        # Interpolation may take a fiftieth of the tolerance; it is bounded against the sum of peak amplitudes.
+        peaks = float(need.part_amplitudes(view).sum(axis=1).max())
+        chain.error = max(0.02 * share * float(abs(own.signal).max()) / peaks, chain.error)
     if len(asked) < len(placed(scene.effects, "channel", "receiver", "detection")):
         trial = None
         if asked and share is not None and math.isfinite(chain.amplification):
@@ -121,6 +125,7 @@ class _Chain:
 
     def __init__(self, scene: Scene, view: View, power: float):
         self.scene, self.view, self.power = scene, view, power
+        self.error = 1e-13
         self.channel = [e for e in placed(scene.effects, "channel") if e.name not in BY_NEED]
         self.by_need = [e for e in scene.effects if e.name in BY_NEED]
         self.receiver = placed(scene.effects, "receiver")
@@ -170,7 +175,7 @@ class _Chain:
         self._routes = max(self._routes, 1.0 + sum(float(np.max(abs(way.coefficient))) for way in ways))
         return response(
             view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, ways=ways, factor=factor,
-            squint="squint" in on, wavefront="wavefront" in on,
+            squint="squint" in on, wavefront="wavefront" in on, error=self.error,
         )  # fmt: skip
 
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None) -> _Outcome:
@@ -225,7 +230,7 @@ class _Chain:
         from lowalt.effects.waveform import demodulate, transmit
 
         sent = self.sent()[rows]
-        delays, weights = instants(view)
+        delays, weights = instants(view, self.error)
         samples = 0.0
         for delay, weight in zip(delays, weights, strict=True):
             samples = samples + weight * transmit(self.echo(view.at(view.times_s + delay), on, factor), sent)

@@ -42,12 +42,14 @@ def response(
     factor: np.ndarray | float = 1.0,
     squint: bool = False,
     wavefront: bool = False,
+    error: float = 1e-14,
 ) -> np.ndarray:
     """Return the subcarriers Y (N, M) complex128 of points at `places` (N, L, 3) m, the known symbol removed.
 
     rcs_m2: (L,) m2; aim_m: (3,) m, where both beams point; ways: routes beside the direct one: waves go out by any and
     come back by any; factor: real factor on every point's two-way amplitude, (N, L); squint: the arrays' phases
-    follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves.
+    follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves; error:
+    of the arrays' interpolation over frequencies, relative to the sum of peak amplitudes.
     Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion.
     """
     radio = radar(network, station)
@@ -60,7 +62,7 @@ def response(
     result = np.zeros((len(places), radio.subcarriers), np.complex128)
     own = np.exp(-2j * np.pi * refs[:, 4])
     reach = 0.0
-    for kappa, weight in _frequencies(network, radio, squint):
+    for kappa, weight in _frequencies(network, radio, squint, error):
         out = [route.one_way(network.transmit, kappa, wavefront) for route in chosen]
         back = out if symmetric else [route.one_way(network.receive, kappa, wavefront) for route in chosen]
         if reach == 0.0:
@@ -143,7 +145,7 @@ def _whole_cells(base: np.ndarray, count: int) -> np.ndarray:
     return np.exp(-1j * np.pi * np.arange(2 * count) / count)[index]
 
 
-def _frequencies(network: Network, radio: Radar, squint: bool) -> list[tuple[float, np.ndarray]]:
+def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> list[tuple[float, np.ndarray]]:
     """Frequencies (relative to the carrier) at which the arrays are evaluated, and their Lagrange weights (M,)."""
     count = radio.subcarriers
     if not squint or count == 1:
@@ -151,8 +153,9 @@ def _frequencies(network: Network, radio: Radar, squint: bool) -> list[tuple[flo
     half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     elements = sum(network.transmit) + sum(network.receive) - 4
     band = np.pi * half * elements
-    nodes = int(band) + 4
-    while abs(jv(nodes, band)) > 1e-14:
+    # Interpolation of exp(j B x) errs by at most 4 sum over p >= nodes of |J_p(B)|, and J_p falls faster than by half.
+    nodes = int(band) + 2
+    while 8.0 * abs(jv(nodes, band)) > error:
         nodes += 1
     angle = np.pi * (np.arange(nodes) + 0.5) / nodes
     x = np.cos(angle)
