@@ -80,7 +80,8 @@ class DeviceRenderer:
             re = torch.cat([a_re + b_re, a_re - b_re], dim=-2)
             im = torch.cat([a_im + b_im, a_im - b_im], dim=-2)
             stride, rows = stride // 2, 2 * rows
-        return torch.sqrt(re * re + im * im)
+        # torch's float32 square root is not correctly rounded on every processor (AVX2); a double's, rounded once, is.
+        return torch.sqrt((re * re + im * im).double()).float()
 
     def _transfer(self, re: Tensor, im: Tensor, window: int, starts: int) -> Tensor:
         """The velocity-transfer spectrum, (B, stations, speeds, starts)."""
