@@ -2,7 +2,10 @@
 
 import io
 import json
+import re
+from pathlib import Path
 
+import jinja2
 import numpy as np
 import pytest
 from PIL import Image
@@ -81,3 +84,12 @@ def test_an_estimate_scales_samples_and_bytes():
     assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
     with pytest.raises(InputError, match="index"):
         estimate(stages[:-1], config, "paper")
+
+
+def test_the_page_does_without_any_picture_that_a_run_may_lack():
+    text = (Path(figures.__file__).parent / "page.html").read_text()
+    conditions = [found for found in re.findall(r"{% if (.*?) %}", text) if "images" in found]
+    assert len(conditions) >= 2
+    strict = jinja2.Environment(undefined=jinja2.StrictUndefined)
+    for condition in conditions:
+        assert strict.from_string("{% if " + condition + " %}there{% endif %}").render(images={}) == ""
