@@ -56,6 +56,7 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/echo.py --clouds results/default/clouds/*.npz
 	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
+	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
 
 cost: $(SETUP)  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
 	$(SNAKEMAKE) -- cost
