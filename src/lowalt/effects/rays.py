@@ -1,6 +1,6 @@
 """The loops of the frequency response: one symbol's points at a time, in short passes the compiler turns into vectors.
 
-Sines and cosines are Taylor polynomials of the turn on [-1/2, 1/2]. Only a few work arrays a call are allocated.
+Sines, cosines and polynomials are those of `lowalt.echo`. Only a few work arrays a call are allocated.
 """
 
 import math
@@ -8,58 +8,36 @@ import math
 import numpy as np
 
 from lowalt.echo.compile import kernel
+from lowalt.echo.fits import smooth
+from lowalt.echo.lanes import horner
+from lowalt.echo.terms import dirichlet
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-TERMS = 16
-"""pi^(2 TERMS) / (2 TERMS)! is below 1e-19: the series' rest at half a turn."""
-COSINE = np.array([(-1) ** k * (2 * math.pi) ** (2 * k) / math.factorial(2 * k) for k in range(TERMS)])
-SINE = np.array([(-1) ** k * (2 * math.pi) ** (2 * k + 1) / math.factorial(2 * k + 1) for k in range(TERMS)])
-"""cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns."""
+DEGREE = 11
+WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
+"""Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
+COSINE, SINE = 0, 1
 
 
 @LOOPS
-def polynomial(x, c, out, size):
-    """out[:size] = sum of c[k] x^k."""
-    top = len(c) - 1
-    for i in range(size):
-        out[i] = c[top]
-    k = top
-    while k > 1:
-        c0, c1 = c[k - 1], c[k - 2]
-        for i in range(size):
-            out[i] = (out[i] * x[i] + c0) * x[i] + c1
-        k -= 2
-    if k == 1:
-        for i in range(size):
-            out[i] = out[i] * x[i] + c[0]
-
-
-@LOOPS
-def array_sum(x, count, cosine, square, c, out, size):
+def array_sum(x, count, square, c, out, size):
     """out = sin(pi count x) / sin(pi x) with its limits; powers of two are products of cosines of doubled angles."""
-    if count & (count - 1) == 0:
+    if count & (count - 1):
         for i in range(size):
-            k = np.rint(x[i])
-            out[i] = 1.0 - 2.0 * (k - 2.0 * np.floor(0.5 * k)) if count > 1 else 1.0
-            half = 0.5 * (x[i] - k)
-            square[i] = half * half
-        if count == 1:
-            return
-        polynomial(square, cosine, c, size)
-        doubled = 1
-        while doubled < count:
-            for i in range(size):
-                out[i] *= 2.0 * c[i]
-                c[i] = 2.0 * c[i] * c[i] - 1.0
-            doubled *= 2
+            out[i] = dirichlet(x[i], count)
         return
     for i in range(size):
         k = np.rint(x[i])
-        f = x[i] - k
-        sign = 1.0 - 2.0 * ((count - 1) & 1) * (k - 2.0 * np.floor(0.5 * k))
-        below = math.sin(math.pi * f)
-        whole = count * f
-        out[i] = sign * (count if below == 0.0 else math.sin(math.pi * (whole - 2.0 * np.rint(0.5 * whole))) / below)
+        out[i] = 1.0 - 2.0 * (k - 2.0 * np.floor(0.5 * k)) if count > 1 else 1.0
+        half = 0.5 * (x[i] - k)
+        square[i] = half * half
+    horner(square, WAVE, COSINE, DEGREE, c, size)
+    doubled = 1
+    while doubled < count:
+        for i in range(size):
+            out[i] *= 2.0 * c[i]
+            c[i] = 2.0 * c[i] * c[i] - 1.0
+        doubled *= 2
 
 
 @LOOPS
@@ -103,11 +81,11 @@ def routes(places, station, axes, refs, origin, half_turns, aims, kappas, shape,
             square[i] = turn[i] * turn[i]
         if least == 0.0:
             return n * count + 1
-        polynomial(square, COSINE, ct, count)
-        polynomial(square, SINE, st, count)
+        horner(square, WAVE, COSINE, DEGREE, ct, count)
+        horner(square, WAVE, SINE, DEGREE, st, count)
         if plane:
-            array_sum(h, shape[0], COSINE, square, c, gain_h, count)
-            array_sum(v, shape[1], COSINE, square, c, gain_v, count)
+            array_sum(h, shape[0], square, c, gain_h, count)
+            array_sum(v, shape[1], square, c, gain_v, count)
             for i in range(count):
                 weight[i] *= gain_h[i] * gain_v[i]
         row = n % coefficient.shape[0]
@@ -148,8 +126,8 @@ def near_field(places, station, axes, spacing, wave, weight, aims, shape, out):
                 turn[e] = t - np.rint(t)
                 square[e] = turn[e] * turn[e]
                 share[e] = r / own
-            polynomial(square, COSINE, ct, count)
-            polynomial(square, SINE, st, count)
+            horner(square, WAVE, COSINE, DEGREE, ct, count)
+            horner(square, WAVE, SINE, DEGREE, st, count)
             re, im = 0.0, 0.0
             for e in range(count):
                 re += share[e] * ct[e]
