@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from lowalt.errors import InputError
 from lowalt.recognition import freeze, order, orderings, predictions, protocols, samples, schemes, tables
+from lowalt.recognition.__main__ import main
 from lowalt.recognition.augment import KEYS, augment
 from lowalt.streams import stream
 
@@ -232,7 +233,7 @@ def run_files(folder, protocol, scheme, accuracy, seed=0, models=40):
     probabilities[np.arange(len(found)), guess] = 0.7
     path = folder / f"{schemes.slug(scheme)}-{protocol}-{seed}.csv"
     predictions.write(path, predictions.from_facts(found, (0, 2), probabilities))
-    about = {"protocol": protocol, "scheme": scheme, "seed": seed, "hardware": "test bench"}
+    about = {"protocol": protocol, "scheme": scheme, "seed": seed, "hardware": "test bench", "train_s": 12.5}
     path.with_suffix(".json").write_text(json.dumps(about))
     return path, found, guess
 
@@ -324,12 +325,30 @@ def test_several_seeds_are_averaged(tmp_path):
     names = list(schemes.read("config/schemes.csv"))
     paths = [run_files(tmp_path, "seen", "A:VT", 0.9, seed=seed)[0] for seed in (0, 1, 2)]
     tables.write([tables.Run(path) for path in paths], names, {}, tmp_path, 1)
-    seeds = [float(row["accuracy_percent"]) for row in read_rows(tmp_path / "seeds.csv")]
+    trainings = read_rows(tmp_path / "seeds.csv")
+    assert [(row["seed"], row["train_s"], row["hardware"]) for row in trainings[1:]] == [
+        ("1", "12.5", "test bench"), ("2", "12.5", "test bench"),
+    ]  # fmt: skip
+    seeds = [float(row["accuracy_percent"]) for row in trainings]
     average = next(row for row in read_rows(tmp_path / "accuracy.csv") if row["snr_db"] == "avg")
     assert len(seeds) == 3 and len(set(seeds)) > 1
     assert float(average["accuracy_percent"]) == pytest.approx(np.mean(seeds), abs=1e-3)
     assert average["seeds"] == "3"
     assert float(average["spread_points"]) == pytest.approx(np.std(seeds, ddof=1), abs=1e-3)
+    (calibrated,) = read_rows(tmp_path / "calibration.csv")
+    each = []
+    for seed in (0, 1, 2):
+        tables.write([tables.Run(paths[seed])], names, {}, tmp_path / str(seed), 1)
+        each += read_rows(tmp_path / str(seed) / "calibration.csv")
+    assert float(calibrated["brier"]) == pytest.approx(np.mean([float(row["brier"]) for row in each]), abs=1e-5)
+    assert len({row["brier"] for row in each}) > 1
+
+
+def test_tables_do_without_published_accuracies(tmp_path):
+    paths = [run_files(tmp_path, "seen", scheme, 0.9)[0] for scheme in ("A:VRP+TRP+VT", "ABC:VRP+TRP+VT")]
+    main(["tables", "--settings", '{"seed": 1}', "--predictions", *map(str, paths), "--out", str(tmp_path / "out")])
+    (ordering,) = read_rows(tmp_path / "out/orderings.csv")
+    assert ordering["paper_points"] == "" and ordering["difference_points"]
 
 
 @pytest.mark.parametrize(

@@ -197,6 +197,15 @@ def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(view
     assert not (tmp_path / "model.pt").exists()
 
 
+def test_weights_that_a_finite_loss_steps_beyond_the_largest_number_are_never_written(views, tmp_path):
+    beyond = with_training(rate=1e39, warmup=0.0, steps=2, validate_every=1, checkpoint_s=0, ema=0.0)
+    with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
+        train(views, tmp_path / "validated", beyond)
+    with pytest.raises(InputError, match=r"weights .* are not finite after step 1;"):
+        train(views, tmp_path / "saved", {**beyond, "training": {**beyond["training"], "validate_every": 2}})
+    assert not list(tmp_path.rglob("*.pt"))
+
+
 def test_a_gradient_that_overflows_is_left_out_and_ten_in_a_row_stop_the_run(views, tmp_path, monkeypatch, capsys):
     clip, calls = torch.nn.utils.clip_grad_norm_, []
 
@@ -333,6 +342,17 @@ def test_tensorboard_asked_for_and_absent_is_named(views, tmp_path, monkeypatch)
     monkeypatch.setitem(sys.modules, "torch.utils.tensorboard", None)
     with pytest.raises(InputError, match=r"tensorboard is not installed.*lowalt\[tensorboard\]"):
         runs.train(sources(views), SCHEME, "seen", with_training(steps=4), tmp_path, events=True)
+
+
+@pytest.mark.slow
+def test_a_compiled_network_trains_to_the_same_history(views, tmp_path):
+    settings = with_training(steps=6, validate_every=3)
+    settings["network"] = {**SETTINGS["network"], "dropout": 0.0}
+    plain = train(views, tmp_path / "plain", settings)
+    compiled = train(views, tmp_path / "compiled", {**settings, "training": {**settings["training"], "compile": True}})
+    assert compiled[0].keys() == plain[0].keys()
+    one, other = (np.loadtxt(text.splitlines()[1:], delimiter=",") for _, text in (plain, compiled))
+    np.testing.assert_allclose(other, one, rtol=1e-3)
 
 
 @pytest.mark.slow

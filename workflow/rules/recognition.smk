@@ -125,7 +125,7 @@ rule tables:
         schemes=config["recognition"]["table"],
         published=config["report"]["published"],
     output:
-        multiext("results/{run}/", *RESULT_TABLES),
+        multiext("results/{run}/", *RESULT_TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
     log:
         "results/{run}/logs/tables.log",
     benchmark:

@@ -117,12 +117,13 @@ def _tables(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
     line.add_argument("--predictions", nargs="+", required=True, help="prediction files (.csv), records beside them")
-    line.add_argument("--published", required=True, help="the paper's accuracies (.csv)")
+    line.add_argument("--published", help="the paper's accuracies (.csv), where there are any to stand beside")
     line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
     line.add_argument("--out", required=True, help="folder for the tables")
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
-    runs, published = [tables.Run(path) for path in given.predictions], read_published(given.published)
+    published = read_published(given.published) if given.published else {}
+    runs = [tables.Run(path) for path in given.predictions]
     tables.write(runs, list(read(given.schemes)), published, given.out, seed)
 
 

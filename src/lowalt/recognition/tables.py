@@ -4,15 +4,17 @@ Files written, each with the columns `protocol, scheme` first:
     accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged,
                      seeds says how many and spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
-    seeds.csv        seed, accuracy_percent on average over the SNRs
+    seeds.csv        one row a training: accuracy_percent on average over the SNRs, and what it took, where and how
     confusion.csv    category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
-    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test
-    calibration.csv  calibration error, Brier score, cross entropy on test
+    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test;
+                     each model at its own threshold, means over the seeds
+    calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
     reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
-    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit, McNemar's test
+    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit, mean over the seeds;
+                     McNemar's test, of the first seed's models
     orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval by
                      motion model lies above zero), is reversed (below) or is undecided (zero inside)
 """
@@ -44,6 +46,9 @@ from lowalt.streams import stream
 from lowalt.targets.cloud import CATEGORIES
 
 DETECTIONS = (0.9, 0.95, 0.99)
+TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
+            "samples_per_s", "precision", "ranks")  # fmt: skip
+"""What seeds.csv repeats from a training's record."""
 
 
 class Run:
@@ -94,10 +99,12 @@ def accuracy_rows(runs: list[Run], part: str) -> Iterable[list]:
 
 
 def seed_rows(runs: list[Run]) -> Iterable[list]:
-    """Yield rows [seed, accuracy_percent] on average over the SNRs."""
+    """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the SNRs."""
     for run in runs:
         shares = [share for share, _ in accuracy_by(run.test.snr_db, run.test.correct).values()]
-        yield [run.seed, _percent(np.mean(shares))]
+        known = [run.about.get(name, "") for name in TRAINING]
+        took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
+        yield [run.seed, _percent(np.mean(shares)), *took, run.hardware]
 
 
 def confusion_rows(runs: list[Run]) -> Iterable[list]:
@@ -130,18 +137,21 @@ def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], widt
 
 def alarm_rows(runs: list[Run]) -> Iterable[list]:
     """Yield rows [asked, threshold, detected, bird, vehicle, pedestrian] in percent; thresholds from validation."""
-    for run in runs[:1]:
-        validation = run.part("validation")
-        for asked in DETECTIONS if (validation.label == 0).any() else ():
-            level = threshold(validation.probabilities[:, 0], validation.label, asked)
+    validations = [run.part("validation") for run in runs]
+    for asked in DETECTIONS if all((found.label == 0).any() for found in validations) else ():
+        rows = []
+        for run, found in zip(runs, validations, strict=True):
+            level = threshold(found.probabilities[:, 0], found.label, asked)
             detected, alarms = alarm_rates(run.test.probabilities[:, 0], run.test.label, level)
-            yield [_percent(asked), repr(level), _percent(detected), *map(_percent, alarms)]
+            rows.append([level, detected, *alarms])
+        level, *rates = np.mean(rows, axis=0).tolist()
+        yield [_percent(asked), repr(level), *map(_percent, rates)]
 
 
 def calibration_rows(runs: list[Run]) -> Iterable[list]:
     """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
-    for run in runs[:1]:
-        yield [f"{value:.6f}" for value in calibration(run.test.probabilities, run.test.label).values()]
+    found = [list(calibration(run.test.probabilities, run.test.label).values()) for run in runs]
+    yield [f"{value:.6f}" for value in np.mean(found, axis=0)]
 
 
 def reliability_rows(runs: list[Run]) -> Iterable[list]:
@@ -155,7 +165,8 @@ def reliability_rows(runs: list[Run]) -> Iterable[list]:
 def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[list]:
     """Yield rows [unit, difference, low, high, only_first, only_second, p] of two schemes on the same samples.
 
-    Differences in percentage points. Raises: InputError where the schemes were tested on different samples.
+    Differences in percentage points, mean over the seeds; the last three are of the first seed's models, since
+    McNemar's test is of two classifiers. Raises: InputError where the schemes were tested on different samples.
     """
     one, other = first[0].test, second[0].test
     if not np.array_equal(one.key, other.key):
@@ -196,7 +207,7 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
     alarm = ["asked_percent", "threshold", "detected_percent", "bird_percent", "vehicle_percent", "pedestrian_percent"]
     tables = {
         "accuracy": (measured, lambda group: accuracy_rows(group, "test")),
-        "seeds": (["seed", "accuracy_percent"], seed_rows),
+        "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "subtypes": (["category", "subtype", *share], subtype_rows),
         "ranges": (bands, lambda group: band_rows(group, lambda found: found.range_m, 50)),

@@ -123,6 +123,7 @@ class Trainer:
     def save(self) -> None:
         """Write the checkpoint; refuses to write weights that are not finite."""
         self._finite()
+        self._finite_weights()
         if self.machine.rank == 0:
             checkpoint.save(self.folder / "checkpoint.pt", self.name, self._state())
 
@@ -152,6 +153,15 @@ class Trainer:
                 f"training: loss is {self.at.loss_sum} in epoch {self.at.epoch} at step {self.at.steps}; "
                 f"no checkpoint was written since. Try a lower training.rate than {self.block['rate']}"
             )
+
+    def _finite_weights(self) -> None:
+        # A finite loss and gradient can step to weights beyond the largest number; the next loss tells too late.
+        for name, value in self.model.state_dict().items():
+            if value.is_floating_point() and not bool(value.isfinite().all()):
+                raise InputError(
+                    f"training: weights {name} are not finite after step {self.at.steps}; no checkpoint was written "
+                    f"since. Try a lower training.rate than {self.block['rate']}"
+                )
 
     def _loader(self, parts: list[np.ndarray]) -> DataLoader:
         """Batches of the rest of an epoch, read ahead by the workers; what they hold depends on the step alone."""
@@ -194,6 +204,7 @@ class Trainer:
             self.ema.set(self.model)
 
     def _validate(self) -> None:
+        self._finite_weights()
         facts = self.validation.facts
         everything = np.arange(len(facts))
         found = probabilities(self.ema.module, self.validation, everything, self.machine, self.block["batch"])
