@@ -64,8 +64,8 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
 
     settings: {seed, size, colour_map, network, training, augmentation}, as for a training; limit_s: seconds spent on
     one figure. A batch that one call cannot do within the limit is left out (None); the training step takes the largest
-    power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at least. Where
-    the settings compile, the training step is that of the compiled network; nothing else is compiled in a training.
+    power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at least.
+    Where the settings compile, the training step is that of the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")

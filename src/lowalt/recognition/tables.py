@@ -13,8 +13,8 @@ Files written, each with the columns `protocol, scheme` first:
                      each model at its own threshold, means over the seeds
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
     reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
-    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit, mean over the seeds;
-                     McNemar's test, of the first seed's models
+    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit over all seeds,
+                     and McNemar's test of the first seed's models
     orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval by
                      motion model lies above zero), is reversed (below) or is undecided (zero inside)
 """
