@@ -80,7 +80,7 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.report.estimate results/reference/default-stages.csv \
-		workflow/schemas/config.schema.yaml results/reference/scale.csv config/default.yaml config/workstation.yaml config/paper.yaml
+		results/reference/default-accuracy_cost.csv workflow/schemas/config.schema.yaml results/reference/scale.csv config/default.yaml config/workstation.yaml config/paper.yaml
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/default/$$table.csv results/reference/tables-$$table.csv; done

@@ -89,6 +89,7 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert -30 < float(small["low"]) < -15 < float(small["high"]) < 0
     assert (small["stations"], small["spectra"], small["network_bytes"]) == ("A", "VT", str(24**2))
     assert (small["steps"], small["train_samples"], float(small["core_s_training"])) == ("30", "77", 12.5)
+    assert [float(row["train_ms"]) for row in (base, small, large)] == [3.0] * 3
     assert (base["front"], small["front"]) == ("yes", "yes")
     # A thousand steps of eight samples, three milliseconds each; no accuracy for what was not trained.
     assert float(large["core_s_training"]) == pytest.approx(24.0)

@@ -12,9 +12,15 @@ from PIL import Image
 
 from lowalt.config import load
 from lowalt.errors import InputError
-from lowalt.report import figures
-from lowalt.report.estimate import estimate
-from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, stage_times
+from lowalt.report import figures, recognition
+from lowalt.report.estimate import estimate, training_hours
+from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
+
+BANDS = [
+    {"protocol": protocol, "scheme": "A", "from": low, "to": high, "accuracy_percent": "90.0", "samples": count}
+    for protocol in ("seen", "unseen")
+    for low, high, count in (("0", "50", "40"), ("50", "100", "60"), ("100", "150", "2"))
+]
 
 
 def test_accuracy_is_pivoted_in_order(tmp_path):
@@ -22,6 +28,13 @@ def test_accuracy_is_pivoted_in_order(tmp_path):
     path.write_text("protocol,scheme,snr_db,accuracy_percent\nseen,A,3,91.5\nseen,A,avg,95\nunseen,B,inf,80\n")
     table = by_scheme(read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent"))
     assert table == {"seen": {"A": {"3": 91.5, "avg": 95.0}}, "unseen": {"B": {"inf": 80.0}}}
+
+
+def test_a_spread_is_said_where_there_are_several_seeds_and_nowhere_else():
+    row = {"protocol": "seen", "scheme": "A", "snr_db": "avg", "seeds": "3", "spread_points": "0.2531"}
+    alone = {**row, "scheme": "B", "seeds": "1", "spread_points": ""}
+    assert spreads([{**row, "snr_db": "3"}, row, alone]) == {"seen": {"A": "± 0.25 (3 seeds)"}}
+    assert spreads([alone]) == {}
 
 
 def test_a_table_without_a_column_is_refused(tmp_path):
@@ -61,6 +74,7 @@ def test_confusion_counts_add_up():
     [
         lambda: figures.accuracy_over_snr({"seen": {"A": {"3": 90.0, "inf": 99.0, "avg": 95.0}}}, {}),
         lambda: figures.confusion_matrices({("seen", "A"): {("UAV", "UAV"): 5, ("Bird", "UAV"): 1}}, ("UAV", "Bird")),
+        lambda: recognition.band_figure({"range (m)": BANDS, "aspect (°)": BANDS[1:]}),
         lambda: figures.stage_bars([{"rule": "echo", "jobs": 2, "wall_s": 5.0}]),
     ],
 )
@@ -77,13 +91,26 @@ def test_an_estimate_scales_samples_and_bytes():
         {"rule": rule, "wall_s": "100", "samples": "1000", "sample_bytes": "250000", "hardware": "x"}
         for rule in ("motion", "echo", "noise", "tiles", "shard", "index")
     ]
-    row = estimate(stages, config, "paper")
+    row = estimate(stages, [], config, "paper")
+    assert (row["trainings"], row["training_core_hours"]) == (17, "")
     assert (row["motion_models"], row["samples"]) == (240_000, 1_440_000)
     assert row["core_hours"] == pytest.approx(600 / 1000 * 1_440_000 / 3600)
     assert row["shards_gb"] == pytest.approx(360.0)
     assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
     with pytest.raises(InputError, match="index"):
-        estimate(stages[:-1], config, "paper")
+        estimate(stages[:-1], [], config, "paper")
+
+
+def test_training_scales_with_images_and_no_network_is_guessed_at():
+    config = load(["config/default.yaml", "config/workstation.yaml"], "workflow/schemas/config.schema.yaml")
+    timed = {"backbone": "swin_tiny_patch4_window7_224", "pixels": "224", "stations": "ABC", "spectra": "VRP+TRP+VT",
+             "snr_db": "avg", "train_ms": "900", "hardware": "x"}  # fmt: skip
+    # Both protocols: three schemes of one image, three of three, one of nine; mean fusion in one protocol only.
+    images = 2 * (3 * 1 + 3 * 3 + 9) + 9
+    trainings, hours, hardware = training_hours([timed], config)
+    assert (trainings, hardware) == (15, "x")
+    assert hours == pytest.approx(images / 9 * 30000 * 64 * 0.9 / 3600)
+    assert training_hours([{**timed, "pixels": "64"}, {**timed, "stations": "A"}], config) == (15, None, "")
 
 
 def test_the_page_does_without_any_picture_that_a_run_may_lack():

@@ -9,7 +9,7 @@ rule report:
         code=code("lowalt.report"),
         page="src/lowalt/report/page.html",
         published=config["report"]["published"],
-        tables=multiext("results/{run}/", *RESULT_TABLES),
+        tables=multiext("results/{run}/", *RESULT_TABLES, "seeds.csv", "ranges.csv", "aspects.csv"),
         index="results/{run}/shards/index.json",
         configuration="results/{run}/config.yaml",
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
@@ -38,5 +38,6 @@ rule report:
         " --published {input.published:q} --confusion results/{wildcards.run}/confusion.csv"
         " --subtypes results/{wildcards.run}/subtypes.csv --comparisons results/{wildcards.run}/comparisons.csv"
         " --index {input.index:q} --clouds {input.clouds:q} --gallery {input.gallery:q} --motion {input.motion:q}"
-        " {params.tables}"
+        " --seeds results/{wildcards.run}/seeds.csv --ranges results/{wildcards.run}/ranges.csv"
+        " --aspects results/{wildcards.run}/aspects.csv {params.tables}"
         " --benchmarks {input.benchmarks:q} {params.cost} {params.effects} --stages {output.stages:q} --out {output.page:q} 2> {log:q}"

@@ -9,6 +9,7 @@ accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
     difference_points    unseen less that of the first scheme (fidelity: of training on exact echoes), paired
     low, high            its 95 % interval, which resamples whole motion models
     inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in memory
+    train_ms             of one sample of a training step on one core, images in memory
     core_s_training      processor time of the whole training, validation included
     network_bytes        index images a sample that the network takes in; shard_bytes: bytes a sample in the shards
     front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
@@ -31,7 +32,7 @@ from lowalt.streams import stream
 COLUMNS = (
     "scheme", "kind", "backbone", "pixels", "stations", "spectra", "steps", "train_samples", "parameters", "snr_db",
     "seen_percent", "unseen_percent", "difference_points", "low", "high", "inference_ms_1", "inference_ms_64",
-    "core_s_training", "network_bytes", "shard_bytes", "front", "hardware",
+    "train_ms", "core_s_training", "network_bytes", "shard_bytes", "front", "hardware",
 )  # fmt: skip
 
 
@@ -58,8 +59,9 @@ def _what(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
         "scheme": scheme.name, "backbone": speed["backbone"], "pixels": speed["size"], "spectra": spectra,
         "stations": "".join(STATIONS[number] for number in scheme.stations), "steps": speed["steps"],
         "parameters": speed["parameters"], "inference_ms_1": speed["inference_ms_1"],
-        "inference_ms_64": speed["inference_ms_64"], "network_bytes": len(scheme.columns) * speed["size"] ** 2,
-        "shard_bytes": shard_bytes, "hardware": speed["hardware"],
+        "inference_ms_64": speed["inference_ms_64"], "train_ms": speed["train_ms"],
+        "network_bytes": len(scheme.columns) * speed["size"] ** 2, "shard_bytes": shard_bytes,
+        "hardware": speed["hardware"],
     }  # fmt: skip
 
 

@@ -17,11 +17,12 @@ from lowalt.report import figures, recognition
 from lowalt.report.cost_table import read_summary
 from lowalt.report.made_with import versions
 from lowalt.report.strip import motion_strip
-from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, stage_times
+from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
 from lowalt.report.tiles import example_tiles
 from lowalt.shards import ShardSet
 from lowalt.targets.cloud import CATEGORIES, read
 
+ACCURACY_COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
 STAGE_COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
 
 
@@ -102,7 +103,7 @@ def main(arguments: list[str]) -> None:
     """Write the page, and the stages' times as a table."""
     options = parser("lowalt.report", __doc__)
     options.add_argument("--accuracy", required=True, help="accuracy by scheme and SNR (.csv)")
-    options.add_argument("--published", required=True, help="the paper's accuracies (.csv)")
+    options.add_argument("--published", help="the paper's accuracies (.csv), where there are any to stand beside")
     options.add_argument("--confusion", required=True, help="confusion counts (.csv)")
     options.add_argument("--subtypes", required=True, help="accuracy by subtype (.csv)")
     options.add_argument("--comparisons", required=True, help="paired comparisons of schemes (.csv)")
@@ -124,8 +125,9 @@ def main(arguments: list[str]) -> None:
     times = stage_times(given.benchmarks)
     size = sum(shard["bytes"] for shard in shards.shards) / len(shards)
     write_stages(given.stages, times, len(shards), size)
-    ours = by_scheme(read_csv(given.accuracy, "protocol", "scheme", "snr_db", "accuracy_percent"))
-    paper = by_scheme(read_csv(given.published, "protocol", "scheme", "snr_db", "accuracy_percent"))
+    measured = read_csv(given.accuracy, *ACCURACY_COLUMNS, "seeds", "spread_points")
+    paper = by_scheme(read_csv(given.published, *ACCURACY_COLUMNS)) if given.published else {}
+    ours = by_scheme(measured)
     counts = confusion(read_csv(given.confusion, "protocol", "scheme", "category", "predicted", "samples"))
     columns, subtypes = subtype_table(read_csv(given.subtypes, "protocol", "scheme", "subtype", "accuracy_percent"))
     clouds = cloud_rows(given.clouds, published, cloud_seconds(given.benchmarks))
@@ -153,7 +155,7 @@ def main(arguments: list[str]) -> None:
         run=config["run"], seed=config["seed"], stations=list(config["network"]["stations"]), snrs=labels,
         models=len(shards) // len(labels), subtypes=len(clouds), samples=len(shards),
         sample_bytes=size, kind=shards.kind, hardware=describe(),
-        ours=ours, published=paper, network=network_words(config["recognition"]),
+        ours=ours, published=paper, spreads=spreads(measured), network=network_words(config["recognition"]),
         comparisons=read_csv(given.comparisons, *COMPARISON_COLUMNS), subtype_columns=columns,
         subtype_rows=subtypes, tiles=[{"caption": text, "data": picture(data)} for text, data in example_tiles(shards)],
         clouds=clouds, more=more, times=times, cost=cost, effects=priced, versions=versions(),

@@ -1,10 +1,13 @@
 """What a configuration would cost in time and disk, from the measured stages of a finished run.
 
 Data stages scale with samples: core-seconds a sample of the measured run, times the samples planned. Training scales
-with sample visits of the same scheme and backbone only; another backbone or device is not extrapolated.
+with images through the backbone: milliseconds a training sample of the same backbone at the same size on one core, as
+accuracy_cost.csv has it, times all steps of all schemes; early stopping and validation are left out, and a network
+that was never timed is not guessed at. A processor's price: no GPU is extrapolated to.
 """
 
 import csv
+import math
 import sys
 from pathlib import Path
 
@@ -12,11 +15,16 @@ from lowalt.config import load
 from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.plan import Plan
+from lowalt.recognition.schemes import SPECTRA, STATIONS, read
 from lowalt.report.tables import read_csv
 from lowalt.targets.records import load_table
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
-COLUMNS = ("configuration", "motion_models", "samples", "core_hours", "shards_gb", "noisy_gb", "measured_on")
+COLUMNS = (
+    "configuration", "motion_models", "samples", "core_hours", "shards_gb", "noisy_gb", "measured_on",
+    "trainings", "training_core_hours", "training_measured_on",
+)  # fmt: skip
+COST_COLUMNS = ("backbone", "pixels", "stations", "spectra", "snr_db", "train_ms", "hardware")
 
 
 def samples_of(config: dict) -> tuple[int, int]:
@@ -29,8 +37,37 @@ def samples_of(config: dict) -> tuple[int, int]:
     return models, models * len(plan.snrs)
 
 
-def estimate(stages: list[dict[str, str]], config: dict, name: str) -> dict[str, object]:
-    """Return one row of COLUMNS for `config`, scaled from measured `stages` (rows of stages.csv).
+def training_hours(costs: list[dict[str, str]], config: dict) -> tuple[int, float | None, str]:
+    """Return (trainings, core-hours of them all, hardware) of a configuration; None and "" if a network was not timed.
+
+    costs: rows of accuracy_cost.csv; those of all nine images a sample count, and schemes of fewer take their share.
+    """
+    block, views = config["recognition"], len(STATIONS) * len(SPECTRA)
+    known = {
+        (row["backbone"], int(row["pixels"])): row
+        for row in costs
+        if row["train_ms"] and len(row["stations"]) * (row["spectra"].count("+") + 1) == views
+    }
+    table = read(block["table"])
+    number, hours, hardware = 0, 0.0, ""
+    for scheme in (table[name] for name in block["schemes"]):
+        settings = scheme.settled(block)
+        repeats = len(set(block["protocols"]) & set(scheme.protocols)) * len(block["seeds"])
+        number += repeats
+        measured = known.get((scheme.backbone or block["network"]["backbone"], settings["size"]))
+        if measured is None:
+            hours = math.nan
+            continue
+        visits = repeats * settings["training"]["steps"] * settings["training"]["batch"]
+        hours += visits * float(measured["train_ms"]) * len(scheme.columns) / views / 3.6e6
+        hardware = measured["hardware"]
+    return (number, None, "") if math.isnan(hours) else (number, hours, hardware)
+
+
+def estimate(
+    stages: list[dict[str, str]], costs: list[dict[str, str]], config: dict, name: str
+) -> dict[str, object]:  # fmt: skip
+    """Return one row of COLUMNS for `config`, scaled from rows of stages.csv and accuracy_cost.csv.
 
     Raises: InputError where a data stage was not measured.
     """
@@ -43,22 +80,20 @@ def estimate(stages: list[dict[str, str]], config: dict, name: str) -> dict[str,
     core_hours = sum(seconds[rule] for rule in DATA_RULES) / measured * samples / 3600
     signal = 8 * config["network"]["symbols"] * len(config["network"]["stations"])
     disk = float(stages[0]["sample_bytes"]) if config["shards"]["kind"] == "image" else signal
+    trainings, hours, hardware = training_hours(costs, config)
     row = (
-        name,
-        models,
-        samples,
-        round(core_hours, 2),
-        round(disk * samples / 1e9, 1),
-        round(signal * samples / 1e9, 1),
-    )
-    return dict(zip(COLUMNS, (*row, stages[0]["hardware"]), strict=True))
+        name, models, samples, round(core_hours, 2), round(disk * samples / 1e9, 1), round(signal * samples / 1e9, 1),
+        stages[0]["hardware"], trainings, "" if hours is None else round(hours, 1), hardware,
+    )  # fmt: skip
+    return dict(zip(COLUMNS, row, strict=True))
 
 
 def main(arguments: list[str]) -> None:
-    """Write the estimate of every overlay: estimate.py STAGES SCHEMA OUT BASE OVERLAY..."""
-    stages, schema, out, base, *overlays = arguments
+    """Write the estimate of every overlay: estimate.py STAGES COSTS SCHEMA OUT BASE OVERLAY..."""
+    stages, costs, schema, out, base, *overlays = arguments
     rows = read_csv(stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
-    found = [estimate(rows, load([base, overlay], schema), Path(overlay).stem) for overlay in overlays]
+    timed = read_csv(costs, *COST_COLUMNS)
+    found = [estimate(rows, timed, load([base, overlay], schema), Path(overlay).stem) for overlay in overlays]
     with replacing(out) as temporary, temporary.open("w", newline="") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()

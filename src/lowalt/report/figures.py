@@ -38,7 +38,7 @@ def accuracy_over_snr(ours: dict, published: dict) -> bytes:
         ticks = [label for label in next(iter(schemes.values())) if label != "avg"]
         panel.set_xticks(range(len(ticks)), [SNR_LABELS.get(label, label) for label in ticks])
         panel.grid(alpha=0.3)
-        panel.legend(title="solid: this run, dashed: paper", fontsize=8)
+        panel.legend(title="solid: this run, dashed: paper" if published else None, fontsize=8)
     return png(figure)
 
 

@@ -1,4 +1,5 @@
-"""What the page says of recognition beyond accuracy: orderings, false alarms, calibration, how apart subtypes lie."""
+"""What the page says of recognition beyond accuracy: orderings, false alarms, calibration, accuracy over range and
+aspect, what trainings took, how apart subtypes lie."""
 
 import argparse
 
@@ -14,10 +15,16 @@ TABLES = {
                "pedestrian_percent"),
     "calibration": ("protocol", "scheme", "calibration_error", "brier", "cross_entropy"),
     "reliability": ("protocol", "scheme", "confidence_percent", "accuracy_percent", "samples"),
+    "ranges": ("protocol", "scheme", "from", "to", "accuracy_percent", "samples"),
+    "aspects": ("protocol", "scheme", "from", "to", "accuracy_percent", "samples"),
+    "seeds": ("protocol", "scheme", "seed", "accuracy_percent", "backbone", "weights", "parameters", "steps", "train_s",
+              "train_processor_s", "samples_per_s", "precision", "ranks", "hardware"),
     "distances": ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio"),
 }  # fmt: skip
 TRANSFER = ("protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low",
             "high")  # fmt: skip
+FEWEST = 30
+"""Samples a band must have to be drawn: with fewer, one sample moves it by more than three points."""
 
 
 def add_options(options: argparse.ArgumentParser) -> None:
@@ -45,6 +52,30 @@ def reliability_figure(rows: list[dict[str, str]]) -> bytes:
     return png(figure)
 
 
+def band_figure(bands: dict[str, list[dict[str, str]]]) -> bytes:
+    """Draw accuracy over bands of a quantity, a row a protocol, a column a quantity, a line a scheme.
+
+    bands: rows {protocol, scheme, from, to, accuracy_percent, samples} by the quantity's name with its unit.
+    """
+    protocols = list(dict.fromkeys(row["protocol"] for rows in bands.values() for row in rows))
+    size = (5.2 * len(bands), 3.4 * len(protocols))
+    figure, panels = plt.subplots(len(protocols), len(bands), figsize=size, squeeze=False, sharey="row")
+    for line, protocol in zip(panels, protocols, strict=True):
+        for panel, (quantity, rows) in zip(line, bands.items(), strict=True):
+            mine = [row for row in rows if row["protocol"] == protocol and int(row["samples"]) >= FEWEST]
+            for scheme in dict.fromkeys(row["scheme"] for row in mine):
+                found = [row for row in mine if row["scheme"] == scheme]
+                middles = [(float(row["from"]) + float(row["to"])) / 2 for row in found]
+                panel.plot(middles, [float(row["accuracy_percent"]) for row in found], "o-", ms=4, label=scheme)
+            panel.set(title=f"{protocol} subtypes", xlabel=quantity)
+            panel.grid(alpha=0.3)
+        line[0].set_ylabel("accuracy (%)")
+        if line[0].lines:
+            line[0].legend(fontsize=8)
+    figure.tight_layout()
+    return png(figure)
+
+
 def ordering_words(rows: list[dict[str, str]]) -> str:
     """Return in one sentence how many of the paper's orderings hold, and which do not."""
     holding = [row for row in rows if row["ordering"] == "holds"]
@@ -65,9 +96,13 @@ def section(given: argparse.Namespace) -> dict:
     found: dict = {name: read_csv(getattr(given, name), *columns) for name, columns in TABLES.items()}
     found["words"] = ordering_words(found["orderings"]) if found["orderings"] else ""
     found["distances"] = {row["subtype"]: row for row in found["distances"]}
+    found["fewest"] = FEWEST
     moved = read_csv(given.transfer, *TRANSFER) if given.transfer else []
     found["transfer"] = [row for row in moved if row["snr_db"] == "avg"]
     found["pictures"] = {"reliability": reliability_figure(found["reliability"])} if found["reliability"] else {}
+    bands = {"distance to the nearest station used (m)": found["ranges"], "aspect seen from it (°)": found["aspects"]}
+    if any(int(row["samples"]) >= FEWEST for rows in bands.values() for row in rows):
+        found["pictures"]["bands"] = band_figure(bands)
     if given.accuracy_cost:
         rows = read_csv(given.accuracy_cost, *accuracy.NEEDED, *accuracy.FIDELITY)
         found["pictures"]["accuracy_cost"] = accuracy.draw(rows)

@@ -31,6 +31,16 @@ def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, f
     return {protocol: dict(schemes) for protocol, schemes in result.items()}
 
 
+def spreads(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
+    """Return what an average over SNRs is a mean of, protocol -> scheme -> words, where there are several seeds."""
+    result: dict = defaultdict(dict)
+    for row in rows:
+        if row["snr_db"] == "avg" and int(row["seeds"]) > 1:
+            words = f"± {float(row['spread_points']):.2f} ({row['seeds']} seeds)"
+            result[row["protocol"]][row["scheme"]] = words
+    return dict(result)
+
+
 def measurement(path: str | Path) -> dict:
     """Return one job's measurement from Snakemake's benchmark file (JSON lines, extended; the last run counts).
 
