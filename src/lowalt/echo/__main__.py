@@ -11,7 +11,7 @@ from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.motion import poses, read_table
 from lowalt.network import Network
-from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.cloud import Cloud, cloud_of, read
 
 
 def signals(
@@ -31,9 +31,7 @@ def signals(
     result = np.empty((len(stations), len(rows), network.symbols), np.complex64)
     for index, row in enumerate(rows):
         sample = f"{row['subtype']}, model {row['model']}"
-        cloud = clouds.get(row["subtype"])
-        if cloud is None:
-            raise InputError(f"{sample}: no cloud of this subtype among {sorted(clouds)}")
+        cloud = cloud_of(clouds, row)
         motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
         for place, station in enumerate(stations):

@@ -128,6 +128,16 @@ def check(cloud: Cloud, where: str) -> Cloud:
     return cloud
 
 
+def cloud_of(clouds: dict[str, Cloud], row: dict) -> Cloud:
+    """Return the cloud of a motion table's row among `clouds`, by subtype.
+
+    Raises: InputError naming the sample where there is none.
+    """
+    if row["subtype"] not in clouds:
+        raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}")
+    return clouds[row["subtype"]]
+
+
 def write(path: str | Path, cloud: Cloud) -> None:
     """Write a checked cloud; equal clouds give equal bytes.
 

@@ -6,12 +6,15 @@ meshes are simplified, and the file says how far each point then lies off.
 """
 
 import json
+import os
 import zipfile
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.command import parser, pick, run
+from lowalt.environment import INPUTS
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing
 from lowalt.targets.assemble import Part, turn
@@ -149,10 +152,17 @@ def read(path: str | Path) -> dict:
         raise InputError(f"{path}: not a file of occluders ({error})") from error
 
 
+def read_all(paths: Iterable[str | Path]) -> dict[str, dict]:
+    """Return the surfaces of several files by their subtype; errors as `read`."""
+    return {surfaces["subtype"]: surfaces for surfaces in map(read, paths)}
+
+
 def main(arguments: list[str]) -> None:
     """Write one target's occluders."""
     line = parser("lowalt.targets.occluders", "One subtype's record to its opaque surfaces, for self-occlusion.")
-    line.add_argument("--inputs", type=Path, help="folder of the meshes the record names")
+    folder = os.environ.get(INPUTS)
+    help_text = f"folder of the meshes the record names (default: ${INPUTS})"
+    line.add_argument("--inputs", type=Path, default=folder and Path(folder), help=help_text)
     line.add_argument("--out", required=True, type=Path, help="file to write (.npz)")
     given = line.parse_args(arguments)
     seed, record = pick(given.settings, "seed", "record")
