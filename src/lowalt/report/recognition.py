@@ -6,7 +6,7 @@ import argparse
 from matplotlib import pyplot as plt
 
 from lowalt.report import accuracy
-from lowalt.report.figures import png
+from lowalt.report.figures import legend_below, png, scheme_colours
 from lowalt.report.tables import read_csv
 
 TABLES = {
@@ -39,16 +39,18 @@ def reliability_figure(rows: list[dict[str, str]]) -> bytes:
     """Draw accuracy over confidence, a panel a protocol, a line a scheme; on the diagonal a probability is true."""
     protocols = list(dict.fromkeys(row["protocol"] for row in rows))
     figure, panels = plt.subplots(1, len(protocols), figsize=(4.6 * len(protocols), 4.2), squeeze=False)
+    colours = scheme_colours(row["scheme"] for row in rows)
     for panel, protocol in zip(panels[0], protocols, strict=True):
         panel.plot([25, 100], [25, 100], color="0.7", lw=1)
         for scheme in dict.fromkeys(row["scheme"] for row in rows if row["protocol"] == protocol):
             mine = [row for row in rows if (row["protocol"], row["scheme"]) == (protocol, scheme)]
+            mine = [row for row in mine if int(row["samples"]) >= FEWEST]
             x, y = ([float(row[name]) for row in mine] for name in ("confidence_percent", "accuracy_percent"))
-            panel.plot(x, y, "o-", ms=4, label=scheme)
+            panel.plot(x, y, "o-", ms=4, color=colours[scheme], label=scheme)
         panel.set(title=f"{protocol} subtypes", xlabel="confidence (%)", ylabel="accuracy (%)", xlim=(25, 101))
         panel.grid(alpha=0.3)
-        panel.legend(fontsize=8)
     figure.tight_layout()
+    legend_below(figure)
     return png(figure)
 
 
@@ -60,19 +62,20 @@ def band_figure(bands: dict[str, list[dict[str, str]]]) -> bytes:
     protocols = list(dict.fromkeys(row["protocol"] for rows in bands.values() for row in rows))
     size = (5.2 * len(bands), 3.4 * len(protocols))
     figure, panels = plt.subplots(len(protocols), len(bands), figsize=size, squeeze=False, sharey="row")
+    colours = scheme_colours(row["scheme"] for rows in bands.values() for row in rows)
     for line, protocol in zip(panels, protocols, strict=True):
         for panel, (quantity, rows) in zip(line, bands.items(), strict=True):
             mine = [row for row in rows if row["protocol"] == protocol and int(row["samples"]) >= FEWEST]
             for scheme in dict.fromkeys(row["scheme"] for row in mine):
                 found = [row for row in mine if row["scheme"] == scheme]
                 middles = [(float(row["from"]) + float(row["to"])) / 2 for row in found]
-                panel.plot(middles, [float(row["accuracy_percent"]) for row in found], "o-", ms=4, label=scheme)
+                shares = [float(row["accuracy_percent"]) for row in found]
+                panel.plot(middles, shares, "o-", ms=4, color=colours[scheme], label=scheme)
             panel.set(title=f"{protocol} subtypes", xlabel=quantity)
             panel.grid(alpha=0.3)
         line[0].set_ylabel("accuracy (%)")
-        if line[0].lines:
-            line[0].legend(fontsize=8)
     figure.tight_layout()
+    legend_below(figure)
     return png(figure)
 
 

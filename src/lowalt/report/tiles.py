@@ -17,7 +17,8 @@ def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
         if len(numbers):
             best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
             record = shards.record(int(best))
-            caption = f"{category}: {record['subtype']}, motion model {record['model']}, SNR {record['snr_db']} dB"
+            noise = "no noise" if record["snr_db"] == "inf" else f"SNR {record['snr_db']} dB"
+            caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
             chosen.append((caption, _picture(shards, int(best))))
     return chosen
 
