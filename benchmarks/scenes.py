@@ -19,7 +19,7 @@ from lowalt.config import load_yaml
 from lowalt.echo.__main__ import signals as echo_signals
 from lowalt.effects.__main__ import signals as scene_signals
 from lowalt.effects.catalogue import called
-from lowalt.effects.chain import Scene
+from lowalt.effects.hear import Scene
 from lowalt.files import replacing
 from lowalt.hardware import describe
 from lowalt.motion import read_table

@@ -13,7 +13,7 @@ from PIL import Image
 import lowalt.report
 from lowalt.config import load, merge
 from lowalt.effects.catalogue import PLACES, called
-from lowalt.effects.chain import Scene
+from lowalt.effects.hear import Scene
 from lowalt.errors import InputError
 from lowalt.motion import write_table
 from lowalt.network import Network

@@ -19,7 +19,7 @@ rule speed:
     # All cores, so that nothing else runs beside what is timed.
     threads: workflow.cores or 1
     params:
-        settings=speed_settings,
+        settings=training_settings,
     shell:
         "python -m lowalt.recognition speed --settings {params.settings:q} --scheme {wildcards.scheme}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"

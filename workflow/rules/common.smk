@@ -38,7 +38,7 @@ def prepared(config):
         if config["effects"]:
             from lowalt.effects.facts import check as check_effects
 
-            check_effects(config, tuple({record["published"]["category"] for record in chosen.values()}))
+            check_effects(config)
         lacking = missing_inputs(chosen, INPUTS)
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
@@ -280,15 +280,11 @@ def source_option(wildcards, input):
 
 
 def training_settings(wildcards):
+    """How a network is trained: by its own seed, or by the run's where no training is named."""
     block = config["recognition"]
     kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
-    return canonical({"seed": int(wildcards.train_seed), "colour_map": config["images"]["colour_map"], **kept})
-
-
-def speed_settings(wildcards):
-    block = config["recognition"]
-    kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
-    return canonical({"seed": config["seed"], "colour_map": config["images"]["colour_map"], **kept})
+    seed = int(wildcards.get("train_seed", config["seed"]))
+    return canonical({"seed": seed, "colour_map": config["images"]["colour_map"], **kept})
 
 
 def benchmark_files(wildcards):

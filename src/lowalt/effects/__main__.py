@@ -6,12 +6,11 @@ import numpy as np
 
 from lowalt.command import parser, pick, run
 from lowalt.effects.catalogue import called
-from lowalt.effects.chain import Scene, hear
-from lowalt.errors import InputError
+from lowalt.effects.hear import Scene, hear
 from lowalt.files import replacing
 from lowalt.motion import read_table
 from lowalt.network import Network
-from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.cloud import Cloud, cloud_of, read
 
 
 def signals(
@@ -22,14 +21,11 @@ def signals(
     occluders: each subtype's surfaces, where the scene hides points behind them.
     Raises: InputError naming the sample where a subtype has no cloud or cannot be computed with.
     """
-    station = scene.network.station(name)
+    station, occluders = scene.network.station(name), occluders or {}
     result = np.empty((len(rows), scene.network.symbols), np.complex64)
     power = np.empty(len(rows))
     for index, row in enumerate(rows):
-        cloud = clouds.get(row["subtype"])
-        if cloud is None:
-            raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}")
-        heard = hear(scene, station, cloud, row, None if occluders is None else occluders.get(row["subtype"]))
+        heard = hear(scene, station, cloud_of(clouds, row), row, occluders.get(row["subtype"]))
         result[index], power[index] = heard.signal, heard.power
     return result, power
 
@@ -47,13 +43,11 @@ def main(arguments: list[str]) -> None:
     seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
-    occluders = None
+    occluders = {}
     if given.occluders:
-        from lowalt.targets.occluders import read as read_occluders
+        from lowalt.targets.occluders import read_all
 
-        occluders = {
-            cloud.subtype: read_occluders(path) for cloud, path in zip(clouds.values(), given.occluders, strict=True)
-        }
+        occluders = read_all(given.occluders)
     found, power = signals(scene, given.station, clouds, read_table(given.motion), occluders)
     for path, values in ((given.out, found), (given.power, power)):
         with replacing(path) as temporary:

@@ -15,8 +15,8 @@ from lowalt.config import load
 from lowalt.echo import echo_signal
 from lowalt.echo import explain as explain_echo
 from lowalt.effects.catalogue import BY_NEED, PLACES, Effect, called
-from lowalt.effects.chain import Scene, hear, observe
 from lowalt.effects.facts import check
+from lowalt.effects.hear import Scene, hear, observe
 from lowalt.errors import InputError
 from lowalt.hardware import describe
 from lowalt.motion.sample import draw, region_polygon

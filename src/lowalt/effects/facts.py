@@ -10,18 +10,15 @@ from lowalt.network import Network
 class Facts(NamedTuple):
     """What an effect's `check` may look at.
 
-    effects: every named effect's complete parameters, by name; snr_db: the set SNRs; categories: of the targets;
-    region_m: corners ((x, y), ...) that targets start in, None for the stations' hull; tolerance: of the echo.
+    effects: every named effect's complete parameters, by name; snr_db: the set SNRs.
     """
 
     network: Network
     effects: dict[str, dict]
     snr_db: tuple[float, ...]
-    categories: tuple[str, ...]
-    tolerance: float | None
 
 
-def check(config: dict, categories: tuple[str, ...] = ()) -> Facts:
+def check(config: dict) -> Facts:
     """Return the facts of a configuration whose effects fit together.
 
     Raises: InputError naming the effect, the value and what was expected, before any job starts.
@@ -31,8 +28,6 @@ def check(config: dict, categories: tuple[str, ...] = ()) -> Facts:
         Network.from_settings(config["network"]),
         {effect.name: effect.settings for effect in effects},
         tuple(float(snr) for snr in config["noise"]["snr_db"]),
-        categories,
-        config["echo"]["tolerance"],
     )
     noisy = [snr for snr in facts.snr_db if snr != float("inf")]
     if "receiver_noise" in facts.effects and noisy:
@@ -46,3 +41,13 @@ def check(config: dict, categories: tuple[str, ...] = ()) -> Facts:
         if hasattr(effect.module, "check"):
             effect.module.check(effect.settings, facts)
     return facts
+
+
+def above_ground(effect: str, network: Network) -> None:
+    """Raise InputError naming `effect` for a station in or below the ground z = 0."""
+    for station in network.stations:
+        if station.position_m[2] <= 0:
+            raise InputError(
+                f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
+                "ground z = 0"
+            )

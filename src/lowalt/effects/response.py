@@ -15,7 +15,7 @@ from scipy.special import jv
 from lowalt.echo.precise import reference
 from lowalt.echo.radar import Radar, radar
 from lowalt.echo.terms import aim_cosines
-from lowalt.effects import rays
+from lowalt.effects import interpolation, rays
 from lowalt.errors import InputError
 from lowalt.network import SPEED_OF_LIGHT, Network, Station
 
@@ -157,9 +157,5 @@ def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> 
     nodes = int(band) + 2
     while 8.0 * abs(jv(nodes, band)) > error:
         nodes += 1
-    angle = np.pi * (np.arange(nodes) + 0.5) / nodes
-    x = np.cos(angle)
-    at = np.linspace(-1.0, 1.0, count)
-    chebyshev = np.cos(np.arange(nodes)[:, None] * angle) * np.where(np.arange(nodes) == 0, 1.0, 2.0)[:, None] / nodes
-    weights = np.cos(np.arange(nodes)[:, None] * np.arccos(at)).T @ chebyshev
+    x, weights = interpolation.points(nodes), interpolation.weights(nodes, np.linspace(-1.0, 1.0, count))
     return [(radio.kappa + half + half * x[q], np.ascontiguousarray(weights[:, q])) for q in range(nodes)]

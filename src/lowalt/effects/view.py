@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from lowalt.echo import Rigid
-from lowalt.motion.poses import Perturbation, poses
+from lowalt.motion.poses import Perturbation, placed, poses, rotated
 from lowalt.network import Network, Station
 from lowalt.targets.cloud import Cloud
 
@@ -24,7 +24,6 @@ class View:
     cloud: Cloud
     row: dict
     times_s: np.ndarray
-    tolerance: float | None = None
     grid_s: np.ndarray | None = None
     perturbations: tuple[Perturbation, ...] = ()
     occluders: dict | None = field(default=None, repr=False)
@@ -40,17 +39,14 @@ class View:
     @cached_property
     def places(self) -> np.ndarray:
         """Every point's place (N, L, 3) in metres, global frame."""
-        rotation, translation, points, part = self.motion
-        if self.nodes:
-            return translation
-        return _turned(rotation, points, part) + translation[:, part]
+        return placed(self.cloud, self.motion.rotation, self.motion.translation)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
         if self.nodes:
             return np.full(self.places.shape, np.nan)
-        return _turned(self.motion.rotation, self.cloud.normals, self.motion.part)
+        return rotated(self.motion.rotation, self.cloud.normals, self.cloud.part)
 
     @property
     def nodes(self) -> bool:
@@ -101,15 +97,6 @@ class View:
         """Return a lower bound (N, P) of the range of any point of each part (m)."""
         centre = np.linalg.norm(self.middles - np.asarray(self.station.position_m), axis=2)
         return np.maximum(centre - self.radii, 0.0)
-
-
-def _turned(rotation: np.ndarray, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """rotation[n, part[l]] @ vectors[l] for all n and l, part by part: (N, L, 3)."""
-    result = np.empty((len(rotation), len(vectors), 3))
-    for index in np.unique(part):
-        mine = part == index
-        result[:, mine] = vectors[mine] @ rotation[:, index].swapaxes(1, 2)
-    return result
 
 
 def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturbation:

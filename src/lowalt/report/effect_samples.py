@@ -17,7 +17,7 @@ import numpy as np
 
 from lowalt.command import parser, pick, run
 from lowalt.effects.catalogue import called
-from lowalt.effects.chain import Scene, hear
+from lowalt.effects.hear import Scene, hear
 from lowalt.errors import InputError
 from lowalt.files import existing, replacing
 from lowalt.hardware import describe
@@ -25,7 +25,7 @@ from lowalt.motion import read_table
 from lowalt.network import Network
 from lowalt.noise.__main__ import noisy_signals
 from lowalt.splits import fold
-from lowalt.targets.cloud import CATEGORIES, Cloud, read
+from lowalt.targets.cloud import CATEGORIES, Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
 from lowalt.tiles.__main__ import renderer
 
@@ -87,9 +87,7 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
         for _ in scenes
     ]  # fmt: skip
     for index, row in enumerate(rows):
-        if row["subtype"] not in clouds:
-            raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of it among {sorted(clouds)}")
-        given = (clouds[row["subtype"]], row, occluders.get(row["subtype"]))
+        given = (cloud_of(clouds, row), row, occluders.get(row["subtype"]))
         for place, station in enumerate(network.stations):
             pairs = list(zip(scenes, found, strict=True))
             # In turns, since whoever comes second finds the target's data in the processor's caches.
@@ -187,9 +185,9 @@ def main(arguments: list[str]) -> None:
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
     occluders = {}
     if given.occluders:
-        from lowalt.targets.occluders import read as read_occluders
+        from lowalt.targets.occluders import read_all
 
-        occluders = {surfaces["subtype"]: surfaces for surfaces in map(read_occluders, given.occluders)}
+        occluders = read_all(given.occluders)
     base = Scene(network, block["seed"], block["tolerance"], ())
     scene = Scene(network, block["seed"], block["tolerance"], tuple(called(block["effects"])))
     snrs = [float(snr) for snr in block["snr_db"]]

@@ -13,7 +13,7 @@ from scipy.special import gamma, gammaincinv
 
 from lowalt.echo.radar import radar
 from lowalt.echo.terms import aim_cosines
-from lowalt.effects.facts import Facts
+from lowalt.effects.facts import Facts, above_ground
 from lowalt.effects.view import View
 from lowalt.errors import InputError
 from lowalt.network import SPEED_OF_LIGHT, Network, Station
@@ -40,12 +40,7 @@ def idle(settings: dict) -> bool:
 
 def check(settings: dict, facts: Facts) -> None:
     """Raise InputError for a station in or below the ground, or an amplitude law without that shape."""
-    for station in facts.network.stations:
-        if station.position_m[2] <= 0:
-            raise InputError(
-                f"effects.clutter: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
-                "ground z = 0"
-            )
+    above_ground("clutter", facts.network)
     if settings["law"] == "weibull" and not settings["shape"] <= 2:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
 

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import i0e
 
 from lowalt.echo.radar import radar
-from lowalt.effects.facts import Facts
+from lowalt.effects.facts import Facts, above_ground
 from lowalt.effects.response import Way
 from lowalt.effects.view import View
 from lowalt.errors import InputError
@@ -32,12 +32,7 @@ def idle(settings: dict) -> bool:
 
 def check(settings: dict, facts: Facts) -> None:
     """Raise InputError for a station in or below the ground, or a ground that no matter is made of."""
-    for station in facts.network.stations:
-        if station.position_m[2] <= 0:
-            raise InputError(
-                f"effects.ground_reflection: station {station.name} stands at z = {station.position_m[2]} m, expected "
-                "above the ground z = 0"
-            )
+    above_ground("ground_reflection", facts.network)
     for key, low in (("permittivity", 1), ("conductivity_s_m", 0), ("roughness_m", 0)):
         if not low <= settings[key] < np.inf:
             raise InputError(f"effects.ground_reflection: {key} is {settings[key]}, expected at least {low}")

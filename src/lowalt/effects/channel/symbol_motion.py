@@ -3,6 +3,7 @@
 import numpy as np
 
 from lowalt.echo.radar import radar
+from lowalt.effects import interpolation
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -67,10 +68,6 @@ def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
     while 8.0 * term > error or count < band + 2:
         count += 1
         term *= 0.5 * band / count
-    angle = np.pi * (np.arange(count) + 0.5) / count
-    order = np.arange(count)
-    transform = np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count
-    length, samples = duration_s(view), view.network.subcarriers
-    at = 2.0 * np.arange(samples) / samples - 1.0
-    weights = (np.cos(order[:, None] * np.arccos(at)).T @ transform).T
-    return 0.5 * length * (np.cos(angle) + 1.0), weights
+    samples = view.network.subcarriers
+    weights = interpolation.weights(count, 2.0 * np.arange(samples) / samples - 1.0)
+    return 0.5 * duration_s(view) * (interpolation.points(count) + 1.0), weights.T

@@ -1,0 +1,112 @@
+"""What one station hears of one sample of a scene: the target's own echo, and physics by need decided on.
+
+Without effects beyond motion the echo engine answers alone. Only what is called for is computed: no waveform without
+a receiver effect, no frequency response where physics by need can all be left out.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo import echo_signal
+from lowalt.effects import need
+from lowalt.effects.catalogue import BY_NEED, Effect, placed
+from lowalt.effects.chain import Chain, Outcome
+from lowalt.effects.need import Decision
+from lowalt.effects.view import View
+from lowalt.network import Network, Station
+from lowalt.power import rms
+from lowalt.streams import stream
+from lowalt.targets.cloud import Cloud
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What a scene asks of every sample: `effects` in the chain's order (`catalogue.called`)."""
+
+    network: Network
+    seed: int
+    tolerance: float | None
+    effects: tuple[Effect, ...]
+
+    def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
+        """Return the stream of an effect for the motion model `row`, from its start at every call."""
+        return stream(self.seed, "effect", name, row["subtype"], row["model"], *more)
+
+
+class Heard(NamedTuple):
+    """What one station hears of one target.
+
+    signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells; power: mean |Y_bin|^2 of the target's echo alone,
+    before any channel effect (W), which set SNRs refer to; decisions: what physics by need was computed, and why.
+    """
+
+    signal: np.ndarray
+    cell: np.ndarray
+    power: float
+    decisions: list[Decision]
+
+
+def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> Heard:
+    """Return what `station` hears of the motion model `row` (motion table) under the scene's effects.
+
+    occluders: the target's surfaces, for self-occlusion.
+    Raises: InputError naming the sample where something cannot be computed with.
+    """
+    sample = f"{row['subtype']}, model {row['model']}, station {station.name}"
+    beyond = placed(scene.effects, "channel", "receiver", "detection")
+    asked = [effect.name for effect in beyond if effect.name in BY_NEED]
+    # What is left out and what the engine approximates share the tolerance.
+    share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
+    view = observe(scene, station, cloud, row, occluders)
+    own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
+    # Of the signal as it is stored, so that noise set against it is what it would be without this chain.
+    power = rms(own.signal.astype(np.complex64)) ** 2
+    if not beyond:
+        return Heard(own.signal, own.cell, power, [])
+    error = 1e-13
+    if share is not None:
+        # Interpolation may take a fiftieth of the tolerance; it is bounded against the sum of peak amplitudes.
+        peaks = float(need.part_amplitudes(view).sum(axis=1).max())
+        error = max(0.02 * share * float(abs(own.signal).max()) / peaks, error)
+    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power, error)
+    if share is None or not asked or math.isinf(chain.amplification):
+        outcome = chain.run(frozenset(asked))
+        notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
+    else:
+        # Where nothing else is asked for, the engine's echo is the outcome without any of it.
+        alone = len(asked) == len(beyond)
+        trial = Outcome(own.signal, own.cell, own.gap) if alone else chain.run(frozenset())
+        outcome, notes = settle(chain, asked, share, trial)
+    return Heard(outcome.signal, outcome.cell, power, notes)
+
+
+def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:
+    """Return the view of a sample with the scene's motion effects drawn; their draws know no station."""
+    times_s = scene.network.times_s
+    grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
+    moved = tuple(
+        effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))
+        for effect in placed(scene.effects, "motion")
+    )
+    reflected = any(hasattr(effect.module, "ways") for effect in scene.effects)
+    return View(scene.network, station, cloud, row, times_s, grid_s, moved, occluders, reflected)
+
+
+def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tuple[Outcome, list[Decision]]:
+    """Return the outcome and what was decided: physics `asked` for computed by need, given the outcome without any.
+
+    share: what may be left out, relative to the sample's largest value. Where what was left out could change which
+    cell is strongest, everything is computed.
+    """
+    everything = frozenset(asked)
+    largest = float(abs(trial.signal).max())
+    bounds = chain.bounds(everything)
+    left, spent = need.leave_out(bounds, share, largest)
+    outcome = trial if len(left) == len(asked) else chain.run(everything - set(left))
+    contested = outcome.gap <= 2.0 * spent
+    if left and contested.any():
+        outcome = chain.patched(outcome, contested, everything)
+    return outcome, need.decisions(asked, bounds, left, share, largest)

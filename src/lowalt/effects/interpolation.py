@@ -1,0 +1,19 @@
+"""Interpolation of smooth functions on [-1, 1] from their values at Chebyshev points."""
+
+import numpy as np
+
+
+def points(count: int) -> np.ndarray:
+    """Return the Chebyshev points (count,) of the first kind on [-1, 1], from 1 downwards."""
+    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def weights(count: int, at: np.ndarray) -> np.ndarray:
+    """Return the Lagrange weights (len(at), count) that turn values at `points(count)` into those at `at` (K,).
+
+    Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
+    """
+    order = np.arange(count)
+    angle = np.pi * (order + 0.5) / count
+    transform = np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count
+    return np.cos(order[:, None] * np.arccos(at)).T @ transform
