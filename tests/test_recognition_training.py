@@ -137,27 +137,34 @@ def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp
     assert equal(whole[0], parts[0]) and whole[1] == parts[1]
 
 
-def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys):
-    table = tmp_path / "schemes.csv"
+def killed_at(moments, views, folder, settings):
+    """Kill one training at each of the moments, s after its first new checkpoint; what is left of it, as a command."""
+    table = folder / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    settings = with_training(steps=20, validate_every=10, checkpoint_s=0)
     line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
-            "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(tmp_path / "killed")]  # fmt: skip
-    module = [sys.executable, "-m", "lowalt.recognition"]
-    process = subprocess.Popen([*module, *line], stderr=subprocess.DEVNULL)
-    kept = tmp_path / "killed" / "checkpoint.pt"
-    for _ in range(600):
-        if kept.exists() or process.poll() is not None:
-            break
-        time.sleep(0.1)
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    resumed = kept.exists()
+            "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(folder / "killed")]  # fmt: skip
+    kept = folder / "killed" / "checkpoint.pt"
+    for moment in moments:
+        before = kept.stat().st_mtime_ns if kept.exists() else None
+        process = subprocess.Popen([sys.executable, "-m", "lowalt.recognition", *line], stderr=subprocess.DEVNULL)
+        while process.poll() is None and (not kept.exists() or kept.stat().st_mtime_ns == before):
+            time.sleep(0.01)
+        time.sleep(moment)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    return line
+
+
+@pytest.mark.parametrize(
+    ("kills", "steps"), [(1, 60), pytest.param(20, 600, marks=pytest.mark.slow)], ids=["once", "twenty times"]
+)
+def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys, kills, steps):
+    settings = with_training(steps=steps, validate_every=10, checkpoint_s=0)
+    line = killed_at(stream(2, "kill").uniform(0, 0.3, kills), views, tmp_path, settings)
     main(line)
-    assert ("resumed at step" in capsys.readouterr().err) == resumed
+    assert "resumed at step" in capsys.readouterr().err
     name, state = checkpoint.load(tmp_path / "killed" / "model.pt")
-    whole = with_training(steps=20, validate_every=10)
-    weights, history = train(views, tmp_path / "whole", whole)
+    weights, history = train(views, tmp_path / "whole", with_training(steps=steps, validate_every=10))
     assert equal(state["weights"], weights)
     assert (tmp_path / "killed" / "history.csv").read_text() == history
     assert json.loads(name)["protocol"] == "seen"
