@@ -66,8 +66,9 @@ def speed_of(folder, name, fast):
 def table(tmp_path):
     (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
     (tmp_path / "transfer.csv").write_text(
-        "protocol,scheme,trained_on,snr_db,accuracy_percent,own_percent,difference_points,low,high,samples,hardware\n"
-        "seen,ABC,rough,avg,50,60,-10,-12,-8,80,here\nunseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here\n"
+        "protocol,scheme,trained_on,snr_db,accuracy_percent,own_percent,difference_points,low,high,samples,hardware,"
+        "seeds,spread_points\nseen,ABC,rough,avg,50,60,-10,-12,-8,80,here,2,0.4\n"
+        "unseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here,2,0.3\n"
     )
     runs = [run_of(tmp_path, "small", 10), run_of(tmp_path, "base", 4)]
     speeds = price.read_speeds(
@@ -95,6 +96,7 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert float(large["core_s_training"]) == pytest.approx(24.0)
     assert large["unseen_percent"] == large["seen_percent"] == large["front"] == ""
     assert (rough["scheme"], float(rough["high"])) == ("ABC trained on rough", 0.5)
+    assert (rough["seeds"], rough["spread_points"], base["spread_points"]) == ("2", "0.3", "")
     assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
 
 

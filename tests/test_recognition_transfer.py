@@ -52,6 +52,23 @@ def test_differences_are_paired_and_every_snr_stands_apart(tmp_path):
     low, high = float(rows[0]["low"]), float(rows[0]["high"])
     assert -40 < low < -25 < high < -10
     assert (float(rows[1]["low"]), float(rows[1]["high"])) == (0.0, 0.0)
+    assert {(row["seeds"], row["spread_points"]) for row in rows} == {("1", "")}
+
+
+def test_the_spread_between_seeds_is_that_of_both_models_pooled(tmp_path):
+    shares = {"": (40, 44), "elsewhere": (60, 60)}
+    runs = {
+        name: [
+            predicted(tmp_path / f"{name}{seed}.csv", np.arange(80) < right, name, seed=seed)
+            for seed, right in enumerate(rights)
+        ]
+        for name, rights in shares.items()
+    }
+    transfer.write(runs[""], runs["elsewhere"], ["A:VT"], tmp_path / "transfer.csv", 1)
+    average = table(tmp_path / "transfer.csv")[-1]
+    assert (average["seeds"], float(average["difference_points"])) == ("2", 22.5)
+    # 50 and 55 % of one model, 75 % twice of the other: variances 12.5 and 0.
+    assert float(average["spread_points"]) == pytest.approx(2.5)
 
 
 def test_a_model_compared_with_itself_differs_nowhere(tmp_path):

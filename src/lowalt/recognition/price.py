@@ -12,6 +12,7 @@ accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
     train_ms             of one sample of a training step on one core, images in memory
     core_s_training      processor time of the whole training, validation included
     network_bytes        index images a sample that the network takes in; shard_bytes: bytes a sample in the shards
+    seeds, spread_points fidelity: training seeds, and the standard deviation of accuracy between a model's seeds
     front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
 """
 
@@ -32,7 +33,8 @@ from lowalt.streams import stream
 COLUMNS = (
     "scheme", "kind", "backbone", "pixels", "stations", "spectra", "steps", "train_samples", "parameters", "snr_db",
     "seen_percent", "unseen_percent", "difference_points", "low", "high", "inference_ms_1", "inference_ms_64",
-    "train_ms", "core_s_training", "network_bytes", "shard_bytes", "front", "hardware",
+    "train_ms", "core_s_training", "network_bytes", "shard_bytes", "front", "hardware", "seeds",
+    "spread_points",
 )  # fmt: skip
 
 
@@ -106,6 +108,7 @@ def fidelity_rows(path: str | Path) -> list[dict]:
     return [
         {"scheme": f"{row['scheme']} trained on {row['trained_on']}", "kind": "fidelity", "snr_db": row["snr_db"],
          "unseen_percent": float(row["accuracy_percent"]), "hardware": row["hardware"],
+         "seeds": row["seeds"], "spread_points": row["spread_points"],
          **{name: float(row[name]) for name in ("difference_points", "low", "high")}}
         for row in rows
     ]  # fmt: skip

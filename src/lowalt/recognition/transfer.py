@@ -8,6 +8,9 @@ transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over th
     own_percent                  of this run's own model
     difference_points, low, high other less own, with the 95 % interval that resamples whole motion models
     samples, hardware            of this run's test part
+    seeds, spread_points         training seeds of the other's model, and the standard deviation of accuracy between the
+                                 seeds of a model, pooled over both models (empty for one seed): what another training
+                                 moves, which the interval does not hold
 """
 
 import csv
@@ -24,7 +27,7 @@ from lowalt.streams import stream
 
 COLUMNS = (
     "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",
-    "samples", "hardware",
+    "samples", "hardware", "seeds", "spread_points",
 )  # fmt: skip
 
 
@@ -43,7 +46,7 @@ def check_folds(own: dict, other: dict) -> None:
 
 
 def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy, own, difference, low, high, samples, hardware], percent and points, of one scheme.
+    """Yield the columns from snr_db on, in percent and points, of one scheme.
 
     own, other: runs (seeds) of the two models; name: the other run, which keys the bootstrap's stream with `seed`.
     Raises: InputError where they were tested on different samples.
@@ -60,8 +63,17 @@ def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterab
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
         interval = bootstrap(test.motion[rows], (theirs - mine)[rows], generator)
-        numbers = (theirs[rows].mean(), mine[rows].mean(), *interval)
-        yield [word, *(f"{100 * value:.4f}" for value in numbers), len(mine[rows]), own[0].hardware]
+        numbers = [f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)]
+        accuracies = [[run.test.correct[rows].mean() for run in runs] for runs in (own, other)]
+        yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), _spread(accuracies)]
+
+
+def _spread(groups: list[list[float]]) -> str:
+    several = [100 * np.array(group) for group in groups if len(group) > 1]
+    if not several:
+        return ""
+    freedom = sum(len(group) - 1 for group in several)
+    return f"{np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom):.4f}"
 
 
 def write(own: list[Run], other: list[Run], order: list[str], out: str | Path, seed: int) -> None:

@@ -74,7 +74,9 @@ def draw(rows: list[dict[str, str]]) -> bytes:
         names = [row["scheme"].rpartition(" ")[2].removeprefix("fidelity-") for row in fidelity]
         panels[3].set_xticks(range(len(names)), names)
         panels[3].set(xlabel="tolerance of the echoes trained on", ylabel="unseen accuracy less exact (points)")
-        panels[3].set_title("tested on exact echoes; bars: 95 % intervals", fontsize=9)
+        spreads = [float(row["spread_points"]) for row in fidelity if row.get("spread_points")]
+        words = f"; another training seed: ±{max(spreads):.1f}" if spreads else ""
+        panels[3].set_title(f"tested on exact echoes; bars: 95 % intervals{words}", fontsize=9)
         panels[3].grid(alpha=0.3)
     names, handles = {}, panels[0].get_legend_handles_labels()
     names.update(zip(handles[1], handles[0], strict=True))

@@ -22,7 +22,7 @@ TABLES = {
     "distances": ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio"),
 }  # fmt: skip
 TRANSFER = ("protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low",
-            "high")  # fmt: skip
+            "high", "seeds", "spread_points")  # fmt: skip
 FEWEST = 30
 """Samples a band must have to be drawn: with fewer, one sample moves it by more than three points."""
 
