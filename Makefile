@@ -6,7 +6,7 @@ BIN := .venv/bin
 SETUP := .venv/set-up
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds
+TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
 .PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate reference reference-tables reference-accuracy pictures pins help
@@ -87,7 +87,7 @@ reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and w
 	$(BIN)/python -m lowalt.report.documents design/recognition.md schemes=results/reference/tables-
 
 reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy` and write it into the documents
-	cp results/default/accuracy_cost.csv results/reference/default-accuracy_cost.csv
+	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end; done
 	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
 
 reference:  ## keep the small tables of the finished default and real runs
