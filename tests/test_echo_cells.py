@@ -64,7 +64,7 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 
-def test_ranges_by_roots_and_by_polynomials_agree():
+def test_ranges_by_roots_and_by_polynomials_agree(cheap_at_any_price):
     net = network(symbols=60)
     motion = cloud_in_motion(np.random.default_rng(2), 60, 300, (400.0, 30.0, 60.0), 0.3)
     arguments = (net, net.stations[0], motion, 1.0, motion.translation[0, 0])

@@ -32,7 +32,7 @@ def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tol
         assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
 
 
-def test_a_looser_tolerance_takes_shorter_polynomials():
+def test_a_looser_tolerance_takes_shorter_polynomials(cheap_at_any_price):
     net = network()
     motion = cloud_in_motion(np.random.default_rng(2), 400, 100, (200.0, 30.0, 60.0), 0.3)
     orders = []

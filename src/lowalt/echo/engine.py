@@ -112,6 +112,7 @@ def explain(result: EchoResult) -> str:
         f"sine {choice.orders[1]}, cell kernel {choice.orders[2]}",
         f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, "
         f"{choice.general} by the general kernel",
+        f"points interpolated in slow time: {choice.slow[0]}, from {choice.slow[1]} nodes",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip
 

@@ -64,7 +64,7 @@ def layout(scene: Scene, peak: float) -> Layout:
         points, part, root = scene.points[order], scene.part[order], scene.root_rcs[order]
     else:
         points, part, root = scene.points, scene.part, scene.root_rcs
-    amplitude = np.zeros(-(-count // LANES) * LANES)
+    amplitude = np.zeros(max(-(-count // LANES), 1) * LANES)
     amplitude[:count] = root * peak
     empty = np.zeros(0)
     if not rigid:
