@@ -10,6 +10,7 @@ from pathlib import Path
 
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.runtime import rtsys
 
 
 def _digest() -> str:
@@ -24,8 +25,19 @@ DIGEST = _digest()
 
 
 class _SourceCache(FunctionCache):
+    counted = True
+    """Whether the function may use counted references, and so allocate."""
+
     def _index_key(self, sig, codegen):
         return (*super()._index_key(sig, codegen), DIGEST)
+
+    def load_overload(self, sig, target_context):
+        # numba's own would first load everything that a compilation may need, scipy.linalg included: a third of a
+        # job's start. Finished machine code needs the counted references' runtime at most; compilation loads the rest.
+        if self.counted:
+            rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 def kernel(**options) -> Callable:
@@ -34,6 +46,7 @@ def kernel(**options) -> Callable:
     def wrap(function: Callable) -> Callable:
         compiled = njit(**options)(function)
         compiled._cache = _SourceCache(function)
+        compiled._cache.counted = options.get("_nrt", True)
         return compiled
 
     return wrap
@@ -42,6 +55,6 @@ def kernel(**options) -> Callable:
 PLAIN = kernel()
 """Every operation as written."""
 LEAN = kernel(error_model="numpy", _nrt=False)
-"""Without counted references (they took a quarter of the time), so without allocation."""
+"""Without counted references (they took a quarter of the time, and their runtime loads slowly), so no allocation."""
 VECTOR = kernel(error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
 """Lean, and sums may be reordered and products fused: the loops become vector instructions."""

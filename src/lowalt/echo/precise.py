@@ -8,17 +8,17 @@ import math
 
 import numpy as np
 
-from lowalt.echo.compile import PLAIN
+from lowalt.echo.compile import LEAN
 
 
-@PLAIN
+@LEAN
 def _two_sum(a, b):
     s = a + b
     t = s - a
     return s, (a - (s - t)) + (b - t)
 
 
-@PLAIN
+@LEAN
 def _two_product(a, b):
     p = a * b
     x = 134217729.0 * a
@@ -30,7 +30,7 @@ def _two_product(a, b):
     return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-@PLAIN
+@LEAN
 def _fraction(r, r_lo, k, k_lo):
     """Whole part and fraction, within about [-1/2, 1/2], of (r + r_lo) (k + k_lo)."""
     p, q = _two_product(r, k)
@@ -38,16 +38,9 @@ def _fraction(r, r_lo, k, k_lo):
     return whole, (p - whole) + (q + (r * k_lo + r_lo * k))
 
 
-@PLAIN
-def reference(place, station, turns, turns_lo, cells, cells_lo):
-    """Reference geometry of every symbol: array (N, 7).
-
-    place: (N, 3) m, a point near the target; station: (3,) m. Columns: vector from the station (m, 3), range (m),
-    fraction of a turn of its phase, nearest whole range cell, and the rest of the range in cells.
-    """
-    count = len(place)
-    out = np.empty((count, 7))
-    for n in range(count):
+@LEAN
+def _fill(place, station, turns, turns_lo, cells, cells_lo, out):
+    for n in range(len(place)):
         h2, h2_lo = 0.0, 0.0
         for i in range(3):
             d, d_lo = _two_sum(place[n, i], -station[i])
@@ -63,4 +56,14 @@ def reference(place, station, turns, turns_lo, cells, cells_lo):
         out[n, 3] = r
         _, out[n, 4] = _fraction(r, r_lo, turns, turns_lo)
         out[n, 5], out[n, 6] = _fraction(r, r_lo, cells, cells_lo)
+
+
+def reference(place, station, turns, turns_lo, cells, cells_lo) -> np.ndarray:
+    """Return the reference geometry of every symbol, (N, 7).
+
+    place: (N, 3) m, a point near the target; station: (3,) m. Columns: vector from the station (m, 3), range (m),
+    fraction of a turn of its phase, nearest whole range cell, and the rest of the range in cells.
+    """
+    out = np.empty((len(place), 7))
+    _fill(place, station, turns, turns_lo, cells, cells_lo, out)
     return out
