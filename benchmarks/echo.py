@@ -13,6 +13,7 @@ import argparse
 import csv
 import dataclasses
 import functools
+import os
 import subprocess
 import sys
 import tempfile
@@ -79,7 +80,11 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
 
 
 def stage(config: dict, paths: list[str], rows: list[dict], names: list[str], processes: int, folder: Path) -> float:
-    """Seconds that the echo command takes for all rows: a job a chunk, the stations `names`, `processes` at a time."""
+    """Seconds that the echo command takes for all rows: a job a chunk, the stations `names`, `processes` at a time.
+
+    A job has one thread, as Snakemake gives it: jobs side by side would otherwise fight for cores.
+    """
+    alone = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
     jobs = []
     for part in range(0, len(rows), CHUNK):
@@ -96,7 +101,7 @@ def stage(config: dict, paths: list[str], rows: list[dict], names: list[str], pr
             if any(process.returncode for process in ended):
                 raise SystemExit("the echo command failed")
             running = [process for process in running if process not in ended]
-        running.append(subprocess.Popen(job, stderr=subprocess.DEVNULL))
+        running.append(subprocess.Popen(job, env=alone, stderr=subprocess.DEVNULL))
     if any(process.wait() for process in running):
         raise SystemExit("the echo command failed")
     return time.perf_counter() - start

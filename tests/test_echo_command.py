@@ -2,6 +2,8 @@
 
 import json
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -9,8 +11,9 @@ import pytest
 from lowalt.echo import echo_signal
 from lowalt.echo.__main__ import main
 from lowalt.echo.cost import COLUMNS, rows_of, sample
+from lowalt.echo.motion import Rigid, target
 from lowalt.errors import InputError
-from lowalt.motion import positions, write_table
+from lowalt.motion import poses, positions, write_table
 from lowalt.motion.table import NUMBERS
 from lowalt.network import Network
 from lowalt.targets.cloud import Cloud, write
@@ -82,6 +85,29 @@ def test_stations_heard_together_are_those_heard_alone(folder):
     assert (folder / "both-B.npy").read_bytes() == alone != (folder / "both-A.npy").read_bytes()
     with pytest.raises(InputError, match="--out: 1 files, expected one for each of the stations"):
         main(command(folder, **{"--station": "A|B"}))
+
+
+def test_a_target_checked_once_serves_every_station():
+    network = Network.from_settings(NETWORK)
+    motion = Rigid(*poses(craft(), row(0), network.times_s), craft().points, craft().part)
+    aim = [row(0)[name] for name in ("x_m", "y_m", "z_m")]
+    seen = target(motion, 1.0)
+    for station in network.stations:
+        alone = echo_signal(network, station, motion, 1.0, aim).signal
+        assert (echo_signal(network, station, seen, None, aim).signal == alone).all()
+    with pytest.raises(InputError, match=r"model 0: rcs_m2 is 1\.0, expected None: a Target holds its cross sections"):
+        echo_signal(network, network.stations[0], seen, 1.0, aim, sample="model 0")
+    with pytest.raises(InputError, match=r"model 0: motion.translation\[3, 0, 1\] is nan"):
+        motion.translation[3, 0, 1] = np.nan
+        target(motion, 1.0, "model 0")
+
+
+def test_a_job_whose_kernels_are_compiled_loads_no_compiler(folder):
+    main(command(folder))
+    code = "import sys; from lowalt.echo.__main__ import main; main(sys.argv[1:]); print(*sys.modules)"
+    again = subprocess.run([sys.executable, "-c", code, *command(folder)], capture_output=True, text=True, check=True)
+    loaded = again.stdout.split()
+    assert "numba" in loaded and not {"numba.np.linalg", "numba.np.random.generator_core", "scipy.linalg"} & set(loaded)
 
 
 def test_faults_are_named_and_leave_nothing_behind(folder):

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.command import parser, pick, run
 from lowalt.echo.engine import echo_signal, explain
-from lowalt.echo.motion import Rigid
+from lowalt.echo.motion import Rigid, target
 from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.motion import poses, read_table
@@ -32,11 +32,11 @@ def signals(
     for index, row in enumerate(rows):
         sample = f"{row['subtype']}, model {row['model']}"
         cloud = cloud_of(clouds, row)
-        motion = Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part)
+        seen = target(Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample)
         aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
         for place, station in enumerate(stations):
             where = f"{sample}, station {station.name}"
-            found = echo_signal(network, station, motion, cloud.rcs_m2, aim, tolerance, sample=where)
+            found = echo_signal(network, station, seen, None, aim, tolerance, sample=where)
             result[place, index] = found.signal
             if notes is not None:
                 notes.append(f"{where}\n{explain(found)}\n")
