@@ -65,23 +65,25 @@ def fill_tile(rotation, translation, lx, ly, lz, parts, starts, q, sine, cosine,
         lanes.place_nodes(translation, n, q, first, end - first, cosine, sine, scale, m, eps, ey, ez)
     else:
         end = min(first + size, starts[len(parts)])
+        # Unsigned places, as in `lanes`: a signed one costs a test for counting from the end at every access.
+        at, none, one, two = np.uint64(n), np.uint64(0), np.uint64(1), np.uint64(2)
         for run in range(len(parts)):
             low, high = starts[run], starts[run + 1]
             if low < first or low >= end:
                 continue
-            p = parts[run]
-            still = True
-            for j in range(3):
-                x, y = rotation[n, p, 0, j], rotation[n, p, 1, j]
-                still = still and x == 0.0 and y == 0.0 and rotation[n, p, 2, j] == 0.0
+            p = np.uint64(parts[run])
+            still = 0.0
+            for j in range(np.uint64(3)):
+                x, y, z = rotation[at, p, none, j], rotation[at, p, one, j], rotation[at, p, two, j]
+                still += abs(x) + abs(y) + abs(z)
                 m[j] = (cosine * x + sine * y) * scale
-                m[3 + j] = (cosine * y - sine * x) * scale
-                m[6 + j] = rotation[n, p, 2, j] * scale
-            x, y = translation[n, p, 0] - x0, translation[n, p, 1] - y0
+                m[np.uint64(3) + j] = (cosine * y - sine * x) * scale
+                m[np.uint64(6) + j] = z * scale
+            x, y = translation[at, p, none] - x0, translation[at, p, one] - y0
             m[9] = (cosine * x + sine * y) * scale
             m[10] = (cosine * y - sine * x) * scale
-            m[11] = (translation[n, p, 2] - z0) * scale
-            if still:
+            m[11] = (translation[at, p, two] - z0) * scale
+            if still == 0.0:
                 lanes.place_still(m, high - low, eps, ey, ez, low - first)
             else:
                 lanes.place_part(lx, ly, lz, low, high - low, m, eps, ey, ez, low - first)
