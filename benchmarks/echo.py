@@ -134,14 +134,21 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
 
 
 def scaling(config: dict, cloud: Cloud) -> list[dict]:
-    """Seconds a signal over points and symbols, for one cloud resampled."""
+    """Seconds a signal over points, symbols and tolerances, for one cloud resampled."""
     network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
     rows = []
-    for symbols, points in ((400, 31), (400, 100), (400, 400), (400, 1600), (100, 400), (1600, 400)):
+    sizes = [(400, 31, None), (400, 100, None), (100, 400, None), (1600, 400, None)]
+    sizes += [(400, points, tolerance) for points in (400, 1600, 5000) for tolerance in (None, 1e-9, 1e-6, 1e-4, 1e-2)]
+    for symbols, points, tolerance in sizes:
         longer = dataclasses.replace(network, symbols=symbols)
         given = cost.sample(cloud, published[cloud.subtype], longer, config["motion"], 1, 200.0, points)
-        seconds, _ = cost.timed(lambda longer=longer, given=given: echo_signal(longer, longer.stations[0], *given), 9)
-        rows.append({"what": f"one signal, {symbols} symbols x {points} points", "seconds": seconds})
+        call = functools.partial(echo_signal, longer, longer.stations[0], *given, tolerance)
+        seconds, _ = cost.timed(call, 21)
+        named = "exact" if tolerance is None else f"{tolerance:g}"
+        rows.append({
+            "what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {named}",
+            "seconds": seconds,
+        })  # fmt: skip
     return rows
 
 
@@ -159,7 +166,8 @@ def main() -> None:
     write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
     everyone = list(config["network"]["stations"])
-    result = scaling(config, clouds[0])
+    first = {cloud.category: cloud for cloud in reversed(clouds)}
+    result = scaling(config, first["UAV"]) + scaling(config, first["Vehicle"])
     with tempfile.TemporaryDirectory() as folder:
         for processes, names in ((1, everyone[:1]), (1, everyone), (2, everyone)):
             seconds = stage(config, given.clouds, rows, names, processes, Path(folder))
