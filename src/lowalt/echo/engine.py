@@ -33,7 +33,8 @@ class EchoResult(NamedTuple):
     many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding); bound: proved
     bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why;
     gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
-    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included.
+    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included; where points were interpolated
+    in slow time, a little above it.
     """
 
     signal: np.ndarray
