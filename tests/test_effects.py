@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import reference_effects
 from lowalt.echo import echo_signal, subcarrier_matrix
+from lowalt.echo.radar import radar
 from lowalt.effects import need, waveform
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.facts import check
@@ -80,6 +81,22 @@ def test_response_is_the_sum_over_every_element_route_and_subcarrier(rng, shapes
         radio, station, places, rcs, aim, [(image, coefficient)], factor, squint, wavefront
     )
     assert relative(ours, truth) < 2e-12
+
+
+@pytest.mark.parametrize("error", [1e-2, 1e-4, 1e-7])
+@pytest.mark.parametrize("squint, wavefront", [(False, False), (True, False), (False, True), (True, True)])
+def test_a_coarser_response_errs_by_no_more_than_it_may(rng, squint, wavefront, error):
+    radio = network(subcarriers=40, subcarrier_spacing_hz=3e6, symbols=2, transmit=(16, 4), receive=(9, 3))
+    station, aim = radio.stations[0], np.array([25.0, 30.0, 14.0])
+    places, rcs = aim + rng.normal(size=(2, 40, 3)), rng.uniform(0.1, 2, 40)
+    image = Way(places * [1, 1, -1], 0.7j)
+    given = (radio, station, places, rcs, aim)
+    ours = response(*given, ways=[image], squint=squint, wavefront=wavefront, error=error)
+    exact = response(*given, ways=[image], squint=squint, wavefront=wavefront)
+    near = np.linalg.norm(places - station.position_m, axis=2).min()
+    elements = np.prod(radio.transmit) * np.prod(radio.receive)
+    peaks = radar(radio, station).scale * elements * np.sqrt(rcs).sum() / near**2 * (1 + 0.7) ** 2
+    assert 1e-15 * peaks < abs(ours - exact).max() <= error * peaks
 
 
 @settings(max_examples=20, deadline=None)

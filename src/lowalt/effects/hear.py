@@ -68,7 +68,7 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
         return Heard(own.signal, own.cell, power, [])
     error = 1e-13
     if share is not None:
-        # Interpolation may take a fiftieth of the tolerance; it is bounded against the sum of peak amplitudes.
+        # Over frequencies and over instants: a fiftieth each of the tolerance, against the sum of peak amplitudes.
         peaks = float(need.part_amplitudes(view).sum(axis=1).max())
         error = max(0.02 * share * float(abs(own.signal).max()) / peaks, error)
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power, error)

@@ -4,6 +4,7 @@ Sines, cosines and polynomials are those of `lowalt.echo`. Only a few work array
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,6 +18,16 @@ DEGREE = 11
 WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
 """Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
 COSINE, SINE = 0, 1
+
+
+@lru_cache(maxsize=16)
+def waves(error: float) -> np.ndarray:
+    """Return rows as WAVE of the smallest degree that keeps both the cosine and the sine to `error`."""
+    for degree in range(1, DEGREE):
+        (cosine, off), (sine, slope) = smooth("cosine", 0.25, degree), smooth("sine", 0.25, degree)
+        if off + 0.5 * slope <= error:
+            return np.stack([cosine, sine])
+    return WAVE
 
 
 @LOOPS
@@ -41,22 +52,40 @@ def array_sum(x, count, square, c, out, size):
 
 
 @LOOPS
-def routes(places, station, axes, refs, origin, half_turns, aims, kappas, shape, coefficient, gains, out, excess):
-    """Fill out (N, L), one array's complex factor over one route, and excess (N, L), range beyond the reference's (m).
+def beyond(across, up, side, z, r, spherical):
+    """Path (m) to the element `across` and `up` (m) from the array's corner less r, by a plane or spherical wave.
+
+    side, z: the point's coordinates along the array (m). No cancellation: a difference of squares over a sum.
+    """
+    if not spherical:
+        return -(across * side + up * z) / r
+    step = across * (across - 2.0 * side) + up * (up - 2.0 * z)
+    return step / (math.sqrt(r * r + step) + r)
+
+
+@LOOPS
+def routes(
+    places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, squint, shape, coefficient, gains,
+    out, excess,
+):  # fmt: skip
+    """Fill out (Q, N, L), one array's complex factors over one route at Q frequencies, and excess (N, L) (m).
 
     places: (N, L, 3) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
-    kappas: frequency over the carrier now and of the beams' weights; shape: the array; coefficient: (N or 1, L or 1);
-    gains: (N, L) array sums to use instead of the plane wave's, or (0, 0). Returns 0, or n L + l + 1 where r = 0.
+    beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; shape: the array;
+    coefficient: (N or 1, L or 1); gains: (Q, N, L) sums of `near_field` to use instead of the plane wave's, or empty.
+    excess: range beyond the reference's; with squint that of the array's middle, else of its corner.
+    Returns 0, or n L + l + 1 where r = 0.
     """
     count = places.shape[1]
     sine, cosine = axes
-    psi0, omega0 = aims
     h, v, turn, weight = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     square, c, gain_h, gain_v, ct, st = (
         np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     )  # fmt: skip
-    plane = gains.shape[0] == 0
-    phase_h, phase_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
+    spherical = gains.shape[0] > 0
+    middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
+    fixed = 0.5 * beam * (middle_h * aims[0] + middle_v * aims[1])
+    wave = half_turns if squint else 0.5 * kappas[0] / spacing
     for n in range(places.shape[0]):
         rx, ry, rz, r_ref = refs[n, 0], refs[n, 1], refs[n, 2], refs[n, 3]
         ox, oy, oz = origin[n, 0], origin[n, 1], origin[n, 2]
@@ -69,97 +98,129 @@ def routes(places, station, axes, refs, origin, half_turns, aims, kappas, shape,
             inverse = 1.0 / r
             # r^2 - r_ref^2 over r + r_ref: a difference of ranges without cancellation.
             more = (a * (2.0 * rx + a) + b * (2.0 * ry + b) + d * (2.0 * rz + d)) / (r + r_ref)
-            excess[n, i] = more
-            weight[i] = inverse
-            p = 0.5 * (kappas[0] * ((cosine * y - sine * x) * inverse) - kappas[1] * psi0)
-            o = 0.5 * (kappas[0] * (z * inverse) - kappas[1] * omega0)
-            h[i], v[i] = p, o
-            t = -half_turns * more
-            if plane:
-                t += phase_h * p + phase_v * o
+            side = cosine * y - sine * x
+            middle = beyond(middle_h * spacing, middle_v * spacing, side, z, r, spherical)
+            excess[n, i] = more + middle if squint else more
+            weight[i], h[i], v[i] = inverse, side * inverse, z * inverse
+            t = -half_turns * more - wave * middle - fixed
             turn[i] = t - np.rint(t)
             square[i] = turn[i] * turn[i]
         if least == 0.0:
             return n * count + 1
         horner(square, WAVE, COSINE, DEGREE, ct, count)
         horner(square, WAVE, SINE, DEGREE, st, count)
-        if plane:
-            array_sum(h, shape[0], square, c, gain_h, count)
-            array_sum(v, shape[1], square, c, gain_v, count)
-            for i in range(count):
-                weight[i] *= gain_h[i] * gain_v[i]
         row = n % coefficient.shape[0]
         for i in range(count):
-            out[n, i] = coefficient[row, i % coefficient.shape[1]] * complex(
+            out[0, n, i] = coefficient[row, i % coefficient.shape[1]] * complex(
                 weight[i] * ct[i], weight[i] * (st[i] * turn[i])
             )
-        if not plane:
+        # The first frequency last, which holds what all share.
+        for q in range(len(kappas) - 1, -1, -1):
+            if spherical:
+                for i in range(count):
+                    out[q, n, i] = out[0, n, i] * gains[q, n, i]
+                continue
             for i in range(count):
-                out[n, i] *= gains[n, i]
+                turn[i] = 0.5 * (kappas[q] * h[i] - beam * aims[0])
+            array_sum(turn, shape[0], square, c, gain_h, count)
+            for i in range(count):
+                turn[i] = 0.5 * (kappas[q] * v[i] - beam * aims[1])
+            array_sum(turn, shape[1], square, c, gain_v, count)
+            for i in range(count):
+                out[q, n, i] = out[0, n, i] * (gain_h[i] * gain_v[i])
     return 0
 
 
 @LOOPS
-def near_field(places, station, axes, spacing, wave, weight, aims, shape, out):
-    """Array sums (N, L) of spherical waves: element (i, j) at i d y' + j d z, its range minus r without cancellation.
+def near_field(places, station, axes, spacing, wave, beam, aims, shape, series, rows, out):
+    """Fill out (Q, N, L) with array sums of spherical waves at Q frequencies, phases as seen from the array's middle.
 
-    wave: turns a metre at the arrays' frequency; weight: turns an element and direction cosine of the beams.
+    wave: turns a metre at the frequency in the middle; beam: the weights' frequency over the carrier; series: (Q, K)
+    complex, factor of the sum over elements of s^k at each frequency, s in metres: how much longer an element's path
+    is than the middle's; rows: `waves`. Element (i, j) stands at i d y' + j d z.
     """
     sine, cosine = axes
     wide, high = shape
-    count = wide * high
+    count, orders = wide * high, series.shape[1]
     across, up, fixed = np.empty(count), np.empty(count), np.empty(count)
+    middle_h, middle_v = 0.5 * (wide - 1), 0.5 * (high - 1)
     for i in range(wide):
         for j in range(high):
             across[i * high + j], up[i * high + j] = i * spacing, j * spacing
-            fixed[i * high + j] = weight * (i * aims[0] + j * aims[1])
-    turn, square, ct, st, share = np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+            fixed[i * high + j] = 0.5 * beam * ((i - middle_h) * aims[0] + (j - middle_v) * aims[1])
+    turn, square, ct, st = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+    longer, real, imag, sums = np.empty(count), np.empty(count), np.empty(count), np.empty(orders + 1, np.complex128)
     for n in range(places.shape[0]):
         for l in range(places.shape[1]):  # noqa: E741
             x, y, z = places[n, l, 0] - station[0], places[n, l, 1] - station[1], places[n, l, 2] - station[2]
             r = math.sqrt(x * x + y * y + z * z)
             side = cosine * y - sine * x
+            middle = beyond(middle_h * spacing, middle_v * spacing, side, z, r, True)
             for e in range(count):
                 step = across[e] * (across[e] - 2.0 * side) + up[e] * (up[e] - 2.0 * z)
                 own = math.sqrt(r * r + step)
-                t = -wave * step / (own + r) - fixed[e]
+                # One quotient for both the path and the amplitude.
+                whole = own + r
+                inverse = 1.0 / (own * whole)
+                s = step * own * inverse - middle
+                t = -wave * s - fixed[e]
+                longer[e], real[e] = s, r * whole * inverse
                 turn[e] = t - np.rint(t)
                 square[e] = turn[e] * turn[e]
-                share[e] = r / own
-            horner(square, WAVE, COSINE, DEGREE, ct, count)
-            horner(square, WAVE, SINE, DEGREE, st, count)
-            re, im = 0.0, 0.0
+            horner(square, rows, COSINE, rows.shape[1] - 1, ct, count)
+            horner(square, rows, SINE, rows.shape[1] - 1, st, count)
             for e in range(count):
-                re += share[e] * ct[e]
-                im += share[e] * (st[e] * turn[e])
-            out[n, l] = complex(re, im)
+                imag[e] = real[e] * (st[e] * turn[e])
+                real[e] *= ct[e]
+            # Two orders a pass over the elements.
+            for k in range(0, orders, 2):
+                re, im, more_re, more_im = 0.0, 0.0, 0.0, 0.0
+                for e in range(count):
+                    a, b = real[e] * longer[e], imag[e] * longer[e]
+                    re += real[e]
+                    im += imag[e]
+                    more_re += a
+                    more_im += b
+                    real[e] = a * longer[e]
+                    imag[e] = b * longer[e]
+                sums[k], sums[k + 1] = complex(re, im), complex(more_re, more_im)
+            for q in range(len(series)):
+                total = 0j
+                for k in range(orders):
+                    total += series[q, k] * sums[k]
+                out[q, n, l] = total
 
 
 @LOOPS
 def moments(strength, out, back, times, base, excess_a, excess_b, half_cells, reach, result):
-    """Add sum over points of z T_p(u) to result (N, P): z = times strength out back, u the two-way range in cells.
+    """Add sum over points of z T_p(u) to result (Q, N, P): z = times strength out back, u the two-way range in cells.
 
-    strength: (N or 1, L); base: (N,) the reference's range beyond its whole cell; u runs from -1 to 1 over reach cells.
+    out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L); base: (N,) the reference's range beyond its whole
+    cell; u runs from -1 to 1 over reach cells.
     """
-    count = out.shape[1]
+    nodes, symbols, count = out.shape
     x, before, last = np.empty(count), np.empty(count), np.empty(count)
-    real, imag = np.empty(count), np.empty(count)
-    for n in range(out.shape[0]):
+    real, imag = np.empty((nodes, count)), np.empty((nodes, count))
+    for n in range(symbols):
         row = n % strength.shape[0]
         for i in range(count):
             x[i] = (base[n] + half_cells * (excess_a[n, i] + excess_b[n, i])) / reach
-            z = times * strength[row, i] * (out[n, i] * back[n, i])
-            real[i], imag[i] = z.real, z.imag
             before[i], last[i] = x[i], 1.0
-        for p in range(result.shape[1]):
-            re, im = 0.0, 0.0
+        for q in range(nodes):
+            for i in range(count):
+                z = times * strength[row, i] * (out[q, n, i] * back[q, n, i])
+                real[q, i], imag[q, i] = z.real, z.imag
+        for p in range(result.shape[2]):
+            for q in range(nodes):
+                re, im = 0.0, 0.0
+                for i in range(count):
+                    re += last[i] * real[q, i]
+                    im += last[i] * imag[q, i]
+                result[q, n, p] += complex(re, im)
             for i in range(count):
                 t = last[i]
-                re += t * real[i]
-                im += t * imag[i]
                 last[i] = 2.0 * x[i] * t - before[i] if p else x[i]
                 before[i] = t
-            result[n, p] += complex(re, im)
 
 
 @LOOPS

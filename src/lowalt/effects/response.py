@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import jv
+from scipy.special import factorial, jv
 
 from lowalt.echo.precise import reference
 from lowalt.echo.radar import Radar, radar
@@ -49,7 +49,7 @@ def response(
     rcs_m2: (L,) m2; aim_m: (3,) m, where both beams point; ways: routes beside the direct one: waves go out by any and
     come back by any; factor: real factor on every point's two-way amplitude, (N, L); squint: the arrays' phases
     follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves; error:
-    of the arrays' interpolation over frequencies, relative to the sum of peak amplitudes.
+    of all that is interpolated or cut off here, relative to the sum of peak amplitudes.
     Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion.
     """
     radio = radar(network, station)
@@ -61,57 +61,81 @@ def response(
     pairs = _pairs(len(chosen), symmetric)
     result = np.zeros((len(places), radio.subcarriers), np.complex128)
     own = np.exp(-2j * np.pi * refs[:, 4])
-    reach = 0.0
-    for kappa, weight in _frequencies(network, radio, squint, error):
-        out = [route.one_way(network.transmit, kappa, wavefront) for route in chosen]
-        back = out if symmetric else [route.one_way(network.receive, kappa, wavefront) for route in chosen]
-        if reach == 0.0:
-            widest = max(float(abs(route.excess).max()) for route in chosen)
-            reach = _round_up(float(abs(refs[:, 6]).max()) + radio.cells * widest)
-        table = _table(reach, radio.subcarriers)
-        sums = np.zeros((len(places), len(table)), np.complex128)
-        for a, b, times in pairs:
-            rays.moments(
-                strength, out[a], back[b], times, refs[:, 6], chosen[a].excess, chosen[b].excess, 0.5 * radio.cells,
-                reach, sums,
-            )  # fmt: skip
-        rays.spread(sums, own, table, weight, result)
+    # Half for the frequencies, a tenth each for what is cheap: series and waves of both arrays, and the table. A power
+    # of ten, so that what is made for it serves many samples.
+    kappas, weights = _frequencies(network, radio, squint, error / 2)
+    rest = 10.0 ** np.floor(np.log10(error / 10))
+    out = [route.one_way(network.transmit, kappas, squint, wavefront, rest) for route in chosen]
+    back = out if symmetric else [route.one_way(network.receive, kappas, squint, wavefront, rest) for route in chosen]
+    widest = max(float(abs(excess).max()) for _, excess in (*out, *back))
+    reach = _round_up(float(abs(refs[:, 6]).max()) + radio.cells * widest)
+    table = _table(reach, radio.subcarriers, rest)
+    sums = np.zeros((len(kappas), len(places), len(table)), np.complex128)
+    for a, b, times in pairs:
+        (there, excess_a), (home, excess_b) = out[a], back[b]
+        rays.moments(
+            strength, there, home, times, refs[:, 6], excess_a, excess_b, 0.5 * radio.cells, reach, sums
+        )  # fmt: skip
+    for one, weight in zip(sums, weights, strict=True):
+        rays.spread(one, own, table, weight, result)
     return result * _whole_cells(refs[:, 5], radio.subcarriers)
 
 
 class _Route:
-    """One way, and the complex factors of an array over it; `excess` (N, L) m is known after the first factor."""
+    """One way, and the complex factors of an array over it."""
 
     def __init__(self, network: Network, name: str, radio: Radar, refs, origin, aims, way: Way):
         self.network, self.name, self.radio, self.refs, self.origin = network, name, radio, refs, origin
         self.aims, self.places = aims, np.ascontiguousarray(way.places, np.float64)
         self.coefficient = np.atleast_2d(np.asarray(way.coefficient, np.complex128))
-        self.excess = np.empty(self.places.shape[:2])
 
-    def one_way(self, shape: tuple[int, int], kappa: float, wavefront: bool) -> np.ndarray:
-        """Return (N, L): coefficient, array sum, 1/r and half the two-way phase.
+    def one_way(
+        self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, wavefront: bool, error: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return (Q, N, L), coefficient, array sum, 1/r and half the two-way phase, and the excess range (N, L) m.
 
-        kappa: the arrays' frequency over the carrier. Raises: InputError for a point in the station.
+        kappas: the arrays' frequencies (Q,) over the carrier. Raises: InputError for a point in the station.
         """
         radio, axes = self.radio, (self.radio.sine, self.radio.cosine)
-        out, gains = np.empty(self.excess.shape, np.complex128), np.empty((0, 0), np.complex128)
+        spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
+        count = self.places.shape[:2]
+        out, excess = np.empty((len(kappas), *count), np.complex128), np.empty(count)
+        gains = np.empty((0, 0, 0), np.complex128)
         if wavefront:
-            spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
             gains = np.empty_like(out)
+            centre = 0.5 * (kappas.min() + kappas.max())
+            series = _series(np.pi * (kappas - centre) / spacing, spacing * _half_diagonal(shape), error)
             rays.near_field(
-                self.places, radio.station, axes, spacing, 0.5 * kappa / spacing, 0.5 * radio.kappa, self.aims, shape,
-                gains,
+                self.places, radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape,
+                series, rays.waves(error), gains,
             )  # fmt: skip
         fault = rays.routes(
-            self.places, radio.station, axes, self.refs, self.origin, 0.5 * radio.turns, self.aims,
-            (kappa, radio.kappa), shape, self.coefficient, gains, out, self.excess,
+            self.places, radio.station, axes, self.refs, self.origin, 0.5 * radio.turns, spacing, self.aims,
+            radio.kappa, kappas, squint, shape, self.coefficient, gains, out, excess,
         )  # fmt: skip
         if fault:
             raise InputError(
-                f"position of a point at symbol {(fault - 1) // out.shape[1]} is that of station {self.name} (r = 0), "
+                f"position of a point at symbol {(fault - 1) // count[1]} is that of station {self.name} (r = 0), "
                 "expected r > 0"
             )
-        return out
+        return out, excess
+
+
+def _half_diagonal(shape: tuple[int, int]) -> float:
+    """Distance of an array's corner from its middle, in spacings: no path differs by more from the middle's."""
+    return 0.5 * float(np.hypot(shape[0] - 1, shape[1] - 1))
+
+
+def _series(rates: np.ndarray, longest: float, error: float) -> np.ndarray:
+    """Terms (Q, K) of exp(-j rate s) as a series in s, |s| <= `longest`, K so that the rest is below `error`."""
+    band = float(abs(rates).max()) * longest
+    count, term = 1, band
+    # The rest is at most e^band times its first term.
+    while term * np.exp(band) > error:
+        count += 1
+        term *= band / count
+    order = np.arange(count)
+    return (-1j * rates[:, None]) ** order / factorial(order)
 
 
 def _pairs(routes: int, symmetric: bool) -> list[tuple[int, int, float]]:
@@ -127,11 +151,12 @@ def _round_up(value: float) -> float:
 
 
 @lru_cache(maxsize=32)
-def _table(reach: float, count: int) -> np.ndarray:
-    """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), P from the fall of J_p."""
+def _table(reach: float, count: int, error: float) -> np.ndarray:
+    """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), P from the fall of J_p: the rest is below `error`."""
     band = np.pi * reach
-    order = int(band) + 8
-    while abs(jv(order, band)) > 1e-17:
+    order = int(band) + 1
+    # From there on J_p falls faster than by half.
+    while 4.0 * abs(jv(order + 1, band)) > error:
         order += 1
     p = np.arange(order + 1)
     x = 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count
@@ -145,17 +170,19 @@ def _whole_cells(base: np.ndarray, count: int) -> np.ndarray:
     return np.exp(-1j * np.pi * np.arange(2 * count) / count)[index]
 
 
-def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> list[tuple[float, np.ndarray]]:
-    """Frequencies (relative to the carrier) at which the arrays are evaluated, and their Lagrange weights (M,)."""
+def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (Q,) over the carrier at which the arrays are evaluated, and their Lagrange weights (Q, M).
+
+    What changes with frequency beside the middles' phases, which count as range, are paths against the middles'.
+    """
     count = radio.subcarriers
     if not squint or count == 1:
-        return [(radio.kappa, np.ones(count))]
+        return np.array([radio.kappa]), np.ones((1, count))
     half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
-    elements = sum(network.transmit) + sum(network.receive) - 4
-    band = np.pi * half * elements
+    band = np.pi * half * (_half_diagonal(network.transmit) + _half_diagonal(network.receive))
     # Interpolation of exp(j B x) errs by at most 4 sum over p >= nodes of |J_p(B)|, and J_p falls faster than by half.
     nodes = int(band) + 2
     while 8.0 * abs(jv(nodes, band)) > error:
         nodes += 1
     x, weights = interpolation.points(nodes), interpolation.weights(nodes, np.linspace(-1.0, 1.0, count))
-    return [(radio.kappa + half + half * x[q], np.ascontiguousarray(weights[:, q])) for q in range(nodes)]
+    return radio.kappa + half + half * x, np.ascontiguousarray(weights.T)
