@@ -51,14 +51,16 @@ def response(settings: dict, turns: np.ndarray) -> np.ndarray:
 
 
 def amplifies(settings: dict) -> float:
-    """Return a bound of the filter's 2-norm, start-up included."""
+    """Return how much larger an output symbol's error can be than the largest input symbol's, start-up included.
+
+    The sum of the filter's absolute weights. pulse: of binomials; exponential: a on the newest symbol and as much on
+    the older ones together, as they cancel what stands still; mean: 1 - 1/N twice, taken as 2.
+    """
     if settings["kind"] == "pulse":
         return 2 ** settings["order"] / gain(settings)
     if settings["kind"] == "exponential":
-        # Largest settled response, 2 a / (1 + a), and the first sample's share that dies away as a^n.
-        memory = settings["memory"]
-        return memory * (2 / (1 + memory) + 1 / math.sqrt(1 - memory**2)) / gain(settings)
-    return 1.0
+        return 2 * settings["memory"] / gain(settings)
+    return 2.0
 
 
 def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
