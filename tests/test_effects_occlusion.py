@@ -2,11 +2,12 @@
 
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from lowalt.config import load_yaml
+from lowalt.config import canonical, load_yaml
 from lowalt.effects.channel import occlusion
 from lowalt.effects.view import View
 from lowalt.errors import InputError
@@ -231,6 +232,28 @@ def test_strength_scales_and_a_target_without_its_surfaces_is_refused(tmp_path):
     path.write_bytes(first[:500])
     with pytest.raises(InputError, match="not a file of occluders"):
         occluders.read(path)
+
+
+def test_surfaces_are_known_by_their_own_subtype(tmp_path):
+    sphere = occluders.from_surfaces([ellipsoid((1, 1, 1))], np.zeros(1), np.ones(1, bool))
+    for name in ("b", "a"):
+        occluders.write(tmp_path / f"{name}.npz", sphere, f"subtype {name}")
+    found = occluders.read_all([tmp_path / "b.npz", tmp_path / "a.npz"])
+    assert list(found) == ["subtype b", "subtype a"] and found["subtype a"]["subtype"] == "subtype a"
+
+
+def test_the_command_takes_the_folder_of_inputs_from_the_environment(tmp_path, monkeypatch):
+    record = {"subtype": "DJI Mini 2", "source": "mesh"}
+    call = ["--settings", canonical({"seed": 1, "record": record}), "--out", str(tmp_path / "out.npz")]
+    seen = []
+    monkeypatch.setattr(occluders, "make", lambda record, inputs, seed: seen.append(inputs) or {})
+    monkeypatch.setattr(occluders, "write", lambda *given: None)
+    monkeypatch.delenv("LOWALT_INPUTS", raising=False)
+    occluders.main(call)
+    monkeypatch.setenv("LOWALT_INPUTS", "/meshes")
+    occluders.main(call)
+    occluders.main([*call, "--inputs", "/others"])
+    assert seen == [None, Path("/meshes"), Path("/others")]
 
 
 @needs_inputs
