@@ -41,8 +41,8 @@ COLUMNS = (
 )  # fmt: skip
 PAPER = 240_000
 """Motion models of the paper, each seen by three stations."""
-CHUNK = 500
-"""Models a job: the paper's chunks hold 600, the default's 400."""
+CHUNK = 1000
+"""Models a job: 50 of each of a protocol's 20 subtypes, in the default's chunks and in the paper's."""
 
 
 def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> list[dict]:
@@ -79,8 +79,8 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
     return rows
 
 
-def stage(config: dict, paths: list[str], rows: list[dict], names: list[str], processes: int, folder: Path) -> float:
-    """Seconds that the echo command takes for all rows: a job a chunk, the stations `names`, `processes` at a time.
+def stage(config: dict, paths: list[str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path) -> float:
+    """Seconds that the echo command takes for all rows, `processes` at a time: a job a chunk and list of stations.
 
     A job has one thread, as Snakemake gives it: jobs side by side would otherwise fight for cores.
     """
@@ -90,9 +90,10 @@ def stage(config: dict, paths: list[str], rows: list[dict], names: list[str], pr
     for part in range(0, len(rows), CHUNK):
         table = folder / f"{part}.csv"
         write_table(table, rows[part : part + CHUNK])
-        files = [str(folder / f"{part}-{name}.npy") for name in names]
-        jobs.append([sys.executable, "-m", "lowalt.echo", "--settings", block, "--motion", str(table), "--clouds",
-                     *paths, "--station", *names, "--out", *files])  # fmt: skip
+        for names in jobs_of:
+            files = [str(folder / f"{part}-{name}.npy") for name in names]
+            jobs.append([sys.executable, "-m", "lowalt.echo", "--settings", block, "--motion", str(table), "--clouds",
+                         *paths, "--station", *names, "--out", *files])  # fmt: skip
     start, running = time.perf_counter(), []
     for job in jobs:
         while len(running) == processes:
@@ -169,10 +170,13 @@ def main() -> None:
     first = {cloud.category: cloud for cloud in reversed(clouds)}
     result = scaling(config, first["UAV"]) + scaling(config, first["Vehicle"])
     with tempfile.TemporaryDirectory() as folder:
-        for processes, names in ((1, everyone[:1]), (1, everyone), (2, everyone)):
-            seconds = stage(config, given.clouds, rows, names, processes, Path(folder))
-            result.append({"what": f"echo stage, {len(rows)} models x {len(names)} stations, {processes} process(es)",
-                           "seconds": seconds, "models_per_s": len(rows) / seconds,
+        for processes, how, jobs_of in (
+            (1, "a job a chunk", [everyone]), (2, "a job a chunk", [everyone]),
+            (2, "a job a chunk and station, as in the workflow", [[name] for name in everyone]),
+        ):  # fmt: skip
+            seconds = stage(config, given.clouds, rows, jobs_of, processes, Path(folder))
+            result.append({"what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
+                           f"{processes} process(es)", "seconds": seconds, "models_per_s": len(rows) / seconds,
                            "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip
     alone = [row["seconds"] for row in result if "1 process" in row["what"]][-1]
     result += [{"what": f"inside the stage, 1 process: {name[:-2]}", "seconds": value, "share": value / alone}

@@ -33,8 +33,8 @@ class EchoResult(NamedTuple):
     many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding); bound: proved
     bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why;
     gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
-    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included; where points were interpolated
-    in slow time, a little above it.
+    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included; where points were
+    interpolated in slow time, a little above it.
     """
 
     signal: np.ndarray
@@ -58,9 +58,9 @@ def echo_signal(
 ) -> EchoResult:
     """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
 
-    motion: `Rigid`, or positions (N, L, 3) in metres; rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams
-    point; tolerance: largest error allowed, relative to the sample's max |Y_bin|, None for the exact closed form;
-    paths: all ways of the wave (default: the direct one alone); sample: a name for error messages.
+    motion: `Rigid`, positions (N, L, 3) in metres, or a `motion.Target` that was checked before, with rcs_m2 None;
+    rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
+    the sample's max |Y_bin|, None for the exact closed form; paths: all ways of the wave (default: the direct one alone); sample: a name for error messages.
     Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
     """
     _check_tolerance(tolerance, sample)

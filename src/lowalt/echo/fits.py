@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.echo.compile import PLAIN, VECTOR
+from lowalt.echo.compile import LEAN, VECTOR
 
 TOP = 40
 """Highest degree of any polynomial here; a stretch that would need more goes to the general kernel."""
@@ -18,7 +18,7 @@ EXTRA = 8
 """Taylor orders beyond the degree that are folded back into it (economisation)."""
 
 
-@PLAIN
+@LEAN
 def tail(band, degree):
     """Bound of the error of `economised` for a sum of cosines with weights of sum 1 and phases up to `band` (rad)."""
     half = 0.5 * band
@@ -35,7 +35,7 @@ def tail(band, degree):
     return term / (1.0 - ratio) + cut / (1.0 - other)
 
 
-@PLAIN
+@LEAN
 def degree_for(band, error):
     """Smallest degree whose `tail` is at most `error`; TOP + 1 where none is."""
     for degree in range(TOP + 1):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.echo.compile import LEAN, PLAIN
+from lowalt.echo.compile import LEAN
 
 PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
 """Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
@@ -62,7 +62,7 @@ def norm(rotation, n, p):
     return math.sqrt(max(a + d + e, b + d + f, c + e + f))
 
 
-@PLAIN
+@LEAN
 def segments(span, rate_h, rate_v, longest, out):
     """Cut the symbols into runs over which the array gains stay short polynomials.
 
@@ -72,28 +72,26 @@ def segments(span, rate_h, rate_v, longest, out):
     count = 0
     n = 0
     while n < len(span):
-        low = np.array([np.inf, np.inf])
-        high = np.array([-np.inf, -np.inf])
+        low_h, high_h, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
         end = n
         room_h, room_v = 0.0, 0.0
         while end < len(span) and end - n < longest:
             d = span[end, SPREAD]
             turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
             a, b = span[end, PSI], span[end, OMEGA]
-            l0, l1 = min(low[0], a - turn), min(low[1], b - turn)
-            h0, h1 = max(high[0], a + turn), max(high[1], b + turn)
+            l0, l1 = min(low_h, a - turn), min(low_v, b - turn)
+            h0, h1 = max(high_h, a + turn), max(high_v, b + turn)
             if end == n:
                 # Room for drift: long runs of common polynomials against polynomials of low degree.
                 room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
                 room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
             elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:
                 break
-            low[0], low[1], high[0], high[1] = l0, l1, h0, h1
+            low_h, low_v, high_h, high_v = l0, l1, h0, h1
             end += 1
         out[count, 0], out[count, 1] = n, end
-        for i in range(2):
-            out[count, 2 + 2 * i] = 0.5 * (low[i] + high[i])
-            out[count, 3 + 2 * i] = 0.5 * (high[i] - low[i]) * (1.0 + 1e-9) + 1e-9
+        out[count, 2], out[count, 3] = 0.5 * (low_h + high_h), 0.5 * (high_h - low_h) * (1.0 + 1e-9) + 1e-9
+        out[count, 4], out[count, 5] = 0.5 * (low_v + high_v), 0.5 * (high_v - low_v) * (1.0 + 1e-9) + 1e-9
         count += 1
         n = end
     return count

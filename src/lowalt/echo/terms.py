@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from lowalt.echo.compile import PLAIN
+from lowalt.echo.compile import LEAN, PLAIN
 
 
 @PLAIN
@@ -29,7 +29,7 @@ def dirichlet(x, count):
     return sign * sin_pi(count * f) / math.sin(math.pi * f)
 
 
-@PLAIN
+@LEAN
 def aim_cosines(aim, station, sine, cosine):
     """Direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and Omega)."""
     x, y, z = aim[0] - station[0], aim[1] - station[1], aim[2] - station[2]
