@@ -79,7 +79,9 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
     return rows
 
 
-def stage(config: dict, paths: list[str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path) -> float:
+def stage(
+    config: dict, paths: list[str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
+) -> float:  # fmt: skip
     """Seconds that the echo command takes for all rows, `processes` at a time: a job a chunk and list of stations.
 
     A job has one thread, as Snakemake gives it: jobs side by side would otherwise fight for cores.

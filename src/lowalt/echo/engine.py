@@ -60,7 +60,8 @@ def echo_signal(
 
     motion: `Rigid`, positions (N, L, 3) in metres, or a `motion.Target` that was checked before, with rcs_m2 None;
     rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
-    the sample's max |Y_bin|, None for the exact closed form; paths: all ways of the wave (default: the direct one alone); sample: a name for error messages.
+    the sample's max |Y_bin|, None for the exact closed form; paths: all ways of the wave (default: the direct one
+    alone); sample: a name for error messages.
     Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
     """
     _check_tolerance(tolerance, sample)
