@@ -129,7 +129,9 @@ def test_encoders_normalise_first_and_last():
         assert not encoder.enable_nested_tensor
 
 
-@pytest.mark.parametrize("name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"])
+@pytest.mark.parametrize(
+    "name", ["test_resnet", "test_vit", "test_convnext", "test_efficientnet", "mobilenetv3_small_050"]
+)
 def test_any_kind_of_backbone_trains_a_step(name):
     model = recogniser("AB", "VRP+VT", backbone=name, heads=1).train()
     model(images(2, 4)).square().sum().backward()
