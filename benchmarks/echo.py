@@ -70,9 +70,10 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
     network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
     masts = np.array([station.position_m[:2] for station in network.stations])
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
-    rows = []
+    rows, half = [], len(clouds) // 2
     for index in range(count):
-        cloud = clouds[index % len(clouds)]
+        # As in the workflow, a chunk holds half of the subtypes.
+        cloud = clouds[index // CHUNK % 2 * half + index % half]
         rng = stream(1, "benchmark", cloud.subtype, index)
         row = draw(rng, cloud, published[cloud.subtype], masts, corners, config["motion"])
         rows.append(row | {"group": "seen", "model": index})
@@ -80,22 +81,26 @@ def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
 
 
 def stage(
-    config: dict, paths: list[str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
+    config: dict, paths: dict[str, str], rows: list[dict], jobs_of: list[list[str]], processes: int, folder: Path
 ) -> float:  # fmt: skip
     """Seconds that the echo command takes for all rows, `processes` at a time: a job a chunk and list of stations.
 
-    A job has one thread, as Snakemake gives it: jobs side by side would otherwise fight for cores.
+    paths: the cloud file of each subtype; a job gets those of its chunk. A job has one thread, as Snakemake gives it:
+    jobs side by side would otherwise fight for cores. Python may keep its bytecode, as it does unless forbidden to.
     """
     alone = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    alone.pop("PYTHONDONTWRITEBYTECODE", None)
     block = canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]})
     jobs = []
     for part in range(0, len(rows), CHUNK):
         table = folder / f"{part}.csv"
-        write_table(table, rows[part : part + CHUNK])
+        chunk = rows[part : part + CHUNK]
+        write_table(table, chunk)
+        clouds = dict.fromkeys(paths[row["subtype"]] for row in chunk)
         for names in jobs_of:
             files = [str(folder / f"{part}-{name}.npy") for name in names]
             jobs.append([sys.executable, "-m", "lowalt.echo", "--settings", block, "--motion", str(table), "--clouds",
-                         *paths, "--station", *names, "--out", *files])  # fmt: skip
+                         *clouds, "--station", *names, "--out", *files])  # fmt: skip
     start, running = time.perf_counter(), []
     for job in jobs:
         while len(running) == processes:
@@ -163,20 +168,23 @@ def main() -> None:
     line.add_argument("--models", type=int, default=2000)
     line.add_argument("--repeats", type=int, default=5)
     line.add_argument("--no-direct", action="store_true", help="leave out the direct sum, seconds a call")
+    line.add_argument("--stage-only", action="store_true", help="write echo_stage.csv alone")
     line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo.csv"))
     given = line.parse_args()
     config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
-    write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
+    if not given.stage_only:
+        write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
     everyone = list(config["network"]["stations"])
     first = {cloud.category: cloud for cloud in reversed(clouds)}
     result = scaling(config, first["UAV"]) + scaling(config, first["Vehicle"])
+    paths = {cloud.subtype: path for cloud, path in zip(clouds, given.clouds, strict=True)}
     with tempfile.TemporaryDirectory() as folder:
         for processes, how, jobs_of in (
-            (1, "a job a chunk", [everyone]), (2, "a job a chunk", [everyone]),
-            (2, "a job a chunk and station, as in the workflow", [[name] for name in everyone]),
+            (1, "echo.job: chunk", [everyone]), (2, "echo.job: chunk", [everyone]),
+            (2, "echo.job: station", [[name] for name in everyone]),
         ):  # fmt: skip
-            seconds = stage(config, given.clouds, rows, jobs_of, processes, Path(folder))
+            seconds = stage(config, paths, rows, jobs_of, processes, Path(folder))
             result.append({"what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
                            f"{processes} process(es)", "seconds": seconds, "models_per_s": len(rows) / seconds,
                            "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip

@@ -38,6 +38,7 @@ def test_every_shipped_configuration_is_valid(overlay):
         ({"motion": {"region": {"polygn": 1}}}, r"motion.region: unknown key\(s\) \['polygn'\]"),
         ({"split": {"by": "model"}}, r"split.by: value 'model', expected one of"),
         ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
+        ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
         ({"run": "../x"}, r"run: value '../x', expected text like"),
     ],
 )

@@ -100,12 +100,17 @@ def finished(tmp_path_factory) -> Path:
     return folder
 
 
-def test_one_core_and_two_give_the_same_bytes(finished, tmp_path):
+def test_one_core_and_two_a_job_a_station_and_one_for_all_give_the_same_bytes(finished, tmp_path):
     alone = workplace(tmp_path)
+    (alone / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"echo": {"job": "chunk"}}))
     snakemake(alone, "--", "data", cores=1)
-    found = checksums(finished)
+    found, other = checksums(finished), checksums(alone)
+    # The card states the configuration, and with it how echoes were split into jobs.
+    assert found.pop("shards/README.md") != other.pop("shards/README.md")
     assert len(found) > 30
-    assert checksums(alone) == found
+    assert other == found
+    jobs = {path.name for path in (alone / "results/test/benchmarks/echo").iterdir()}
+    assert jobs == {f"{path.stem}.jsonl" for path in (alone / "results/test/motion").iterdir()}
 
 
 def test_a_finished_run_has_nothing_to_do(finished):
@@ -185,7 +190,7 @@ def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(fini
     for name in ("src", "workflow", "config"):
         shutil.copytree(finished / name, folder / name, dirs_exist_ok=True)
     path = tmp_path / "scene.yaml"
-    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}}))
+    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}, "echo": {"job": "chunk"}}))
     snakemake(folder, "--configfile", "overlay.yaml", str(path), "--", "signals")
     changed = 0
     for noisy in sorted((finished / "results/test/noisy").glob("*.npy")):

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from lowalt.errors import InputError
 from lowalt.files import existing
+from lowalt.memory import keep_freed_memory
 
 
 def parser(module: str, description: str) -> argparse.ArgumentParser:
@@ -62,6 +63,7 @@ def pick(block: dict, *keys: str) -> list:
 
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2."""
+    keep_freed_memory()
     try:
         main(sys.argv[1:])
     except InputError as error:

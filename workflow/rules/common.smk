@@ -51,6 +51,8 @@ INPUTS = prepare(Path(workflow.basedir) / "src", config["inputs"])
 RUN = config["run"]
 RECORDS, PLAN, SCHEMES = prepared(config)
 STATIONS = list(config["network"]["stations"])
+# An echo job's stations: the wildcard's, or all.
+HEARD, OF_STATION = (["{station}"], "-{station}") if config["echo"]["job"] == "station" else (STATIONS, "")
 BY_SLUG = {slug(name): name for name in RECORDS}
 SLUGS = list(BY_SLUG)
 BY_SCHEME = {scheme.slug: scheme for scheme in SCHEMES.values()}
@@ -226,6 +228,11 @@ def cost_products_option(wildcards, input):
     return "--cost {} {} {}".format(*input.cost) if input.cost else ""
 
 
+def heard_stations(wildcards):
+    """The stations whose echoes a job makes."""
+    return [wildcards.station] if OF_STATION else STATIONS
+
+
 def chunk_echoes(wildcards):
     """The stations' clean echoes of a chunk, in the order of the stations."""
     stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
@@ -296,7 +303,7 @@ def benchmark_files(wildcards):
     names = [
         *(f"cloud/{subtype}" for subtype in SLUGS),
         *(f"motion/{chunk}" for chunk in PLAN.chunks),
-        *(f"echo/{chunk}-{station}" for chunk in PLAN.chunks for station in STATIONS),
+        *expand(f"echo/{{chunk}}{OF_STATION}", chunk=PLAN.chunks, station=STATIONS),
         *(f"noise/{chunk}" for chunk in PLAN.chunks),
         *tiles,
         *(f"shard/{shard}" for shard in PLAN.shards),

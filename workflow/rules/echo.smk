@@ -1,4 +1,4 @@
-# Echo: the clean symbol-domain signals that one base station hears of a chunk's motion models.
+# Echo: the clean symbol-domain signals that one base station hears of a chunk's motion models, or all in one job.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols)
 
@@ -9,15 +9,16 @@ rule echo:
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=group_clouds,
     output:
-        "results/{run}/echo/{group}-{part}/{station}.npy",
+        expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
     log:
-        "results/{run}/logs/echo/{group}-{part}-{station}.log",
+        f"results/{{run}}/logs/echo/{{group}}-{{part}}{OF_STATION}.log",
     benchmark:
-        "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
+        f"results/{{run}}/benchmarks/echo/{{group}}-{{part}}{OF_STATION}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
         settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
+        stations=heard_stations,
     shell:
         "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " --station {wildcards.station} --out {output:q} 2> {log:q}"
+        " --station {params.stations:q} --out {output:q} 2> {log:q}"

@@ -1,4 +1,5 @@
-# Echo in a scene with effects: the signals one base station hears, and the powers of the targets' own echoes.
+# Echo in a scene with effects: the signals one base station hears, or all in one job, and the powers of the targets'
+# own echoes.
 # REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/clouds/*.npz; results/{run}/occluders/*.npz
 #                  where the scene hides points behind surfaces
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
@@ -11,12 +12,12 @@ rule echo:
         clouds=group_clouds,
         occluders=group_occluders,
     output:
-        signals="results/{run}/echo/{group}-{part}/{station}.npy",
-        power="results/{run}/echo/{group}-{part}/{station}.power.npy",
+        signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
+        power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=HEARD),
     log:
-        "results/{run}/logs/echo/{group}-{part}-{station}.log",
+        f"results/{{run}}/logs/echo/{{group}}-{{part}}{OF_STATION}.log",
     benchmark:
-        "results/{run}/benchmarks/echo/{group}-{part}-{station}.jsonl"
+        f"results/{{run}}/benchmarks/echo/{{group}}-{{part}}{OF_STATION}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
@@ -29,6 +30,7 @@ rule echo:
             }
         ),
         occluders=occluders_option,
+        stations=heard_stations,
     shell:
         "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " {params.occluders} --station {wildcards.station} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
+        " {params.occluders} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"

@@ -7,6 +7,7 @@ import numpy as np
 from lowalt.command import parser, pick, run
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene, hear
+from lowalt.errors import InputError
 from lowalt.files import replacing
 from lowalt.motion import read_table
 from lowalt.network import Network
@@ -31,15 +32,22 @@ def signals(
 
 
 def main(arguments: list[str]) -> None:
-    """Compute one chunk's signals at one station under the scene's effects."""
+    """Compute one chunk's signals under the scene's effects and write two array files a station."""
     options = parser("lowalt.effects", __doc__)
     options.add_argument("--motion", required=True, help="the chunk's motion table")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
     options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes")
-    options.add_argument("--station", required=True, help="name of the station that listens")
-    options.add_argument("--out", required=True, help="signals to write (.npy), complex64 (models, N)")
-    options.add_argument("--power", required=True, help="the echoes' own mean powers to write (.npy), (models,) W")
+    options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
+    options.add_argument(
+        "--out", nargs="+", required=True, help="signals to write (.npy), a file a station: complex64 (models, N)"
+    )
+    options.add_argument(
+        "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"
+    )
     given = options.parse_args(arguments)
+    for name, files in (("--out", given.out), ("--power", given.power)):
+        if len(files) != len(given.station):
+            raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {given.station}")
     seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
@@ -48,11 +56,13 @@ def main(arguments: list[str]) -> None:
         from lowalt.targets.occluders import read_all
 
         occluders = read_all(given.occluders)
-    found, power = signals(scene, given.station, clouds, read_table(given.motion), occluders)
-    for path, values in ((given.out, found), (given.power, power)):
-        with replacing(path) as temporary:
-            np.save(temporary, values)
-        print(f"{path}: {len(values)} models", file=sys.stderr)
+    rows = read_table(given.motion)
+    for station, out, reference in zip(given.station, given.out, given.power, strict=True):
+        found, power = signals(scene, station, clouds, rows, occluders)
+        for path, values in ((out, found), (reference, power)):
+            with replacing(path) as temporary:
+                np.save(temporary, values)
+            print(f"{path}: {len(values)} models", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -23,8 +23,6 @@ Settings of this module, the block `recognition.training`:
     workers          processes that read shards; 0 reads in the training process
 """
 
-import contextlib
-import ctypes
 import math
 import os
 
@@ -95,22 +93,8 @@ def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
     return torch.optim.AdamW(groups, lr=block["rate"], fused=True)
 
 
-def keep_freed_memory() -> None:
-    """Let the C library keep large freed blocks instead of returning each to the system.
-
-    Activations are allocated and freed every step; mapping them afresh costs 15 % of a small network's step in page
-    faults. Only where the C library is glibc; elsewhere nothing changes.
-    """
-    with contextlib.suppress(OSError, AttributeError):
-        mallopt = ctypes.CDLL(None).mallopt
-        mmap_threshold, trim_threshold = -3, -1
-        mallopt(mmap_threshold, 1 << 30)
-        mallopt(trim_threshold, (1 << 31) - 1)
-
-
 def seeded(seed: int, keys: tuple, threads: int) -> None:
     """Fix everything torch draws from or sums with: seed of the run, thread count, deterministic algorithms."""
-    keep_freed_memory()
     torch.manual_seed(int.from_bytes(digest(seed, "recognition-torch", *keys)[:8], "little") >> 1)
     torch.set_num_threads(threads)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
