@@ -12,6 +12,24 @@ from lowalt.report.tables import read_csv
 
 NEEDED = ("scheme", "kind", "snr_db", "seen_percent", "unseen_percent", "inference_ms_64", "core_s_training", "front")
 FIDELITY = ("difference_points", "low", "high")
+TOO_CLOSE = 1.6
+"""Ratio of two times under which their labels would overlap."""
+
+
+def _timed(panel, rows: list[dict], column: str, low: float) -> None:
+    """A line where each network without accuracy would stand; neighbours share one label, from the height `low` up."""
+    times = [(row[column] or row.get("inference_ms_1"), row["scheme"]) for row in rows]
+    found = sorted((float(time), name) for time, name in times if time)
+    labels: list[tuple[float, list[str]]] = []
+    for x, name in found:
+        panel.axvline(x, color="0.8", lw=1, zorder=0)
+        if labels and x < TOO_CLOSE * labels[-1][0]:
+            labels[-1][1].append(name)
+        else:
+            labels.append((x, [name]))
+    for x, names in labels:
+        text = "\n".join(names) + " (timed only)"
+        panel.text(x, low, text, rotation=90, fontsize=7, ha="right", va="bottom", linespacing=1.1)
 
 
 def _points(panel, rows: list[dict], across: str, label: str) -> None:
@@ -49,12 +67,8 @@ def draw(rows: list[dict[str, str]]) -> bytes:
     )
     timed = [row for row in average if row["kind"] == "timed"]
     low = min(float(row["unseen_percent"]) for row in trained)
-    for row in timed:
-        for panel, column in ((panels[0], "inference_ms_64"), (panels[1], "core_s_training")):
-            if row[column] or row.get("inference_ms_1"):
-                x = float(row[column] or row["inference_ms_1"])
-                panel.axvline(x, color="0.8", lw=1, zorder=0)
-                panel.text(x, low, f"{row['scheme']} (timed only)", rotation=90, fontsize=7, ha="right", va="bottom")
+    _timed(panels[0], timed, "inference_ms_64", low)
+    _timed(panels[1], timed, "core_s_training", low)
     panels[1].set_title("networks only timed: training extrapolated", fontsize=9)
     best = [row["scheme"] for row in trained if row["front"] == "yes"]
     for name in best:
