@@ -76,9 +76,6 @@ rule train:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
-    resources:
-        mem_mb=8000,
-        runtime=1440,
     params:
         settings=training_settings,
         source=source_option,
@@ -107,8 +104,6 @@ rule evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
-    resources:
-        mem_mb=8000,
     params:
         settings=canonical(config["recognition"]["evaluation"]),
         source=source_option,
@@ -157,8 +152,6 @@ rule transfer_evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
-    resources:
-        mem_mb=8000,
     params:
         settings=canonical(config["recognition"]["evaluation"]),
         source=source_option,

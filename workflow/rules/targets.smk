@@ -15,8 +15,6 @@ rule cloud:
         "results/{run}/benchmarks/cloud/{subtype}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=2000,
     params:
         settings=cloud_settings,
     shell:
