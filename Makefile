@@ -75,8 +75,8 @@ scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained w
 effects: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
 	$(SNAKEMAKE) -- effects
 
-tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data
-	$(SNAKEMAKE) --configfile config/tables.yaml
+tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data; three times: make tables OVERLAY=config/seeds.yaml
+	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.report.estimate results/reference/default-stages.csv \
