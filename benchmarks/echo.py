@@ -1,9 +1,10 @@
 """The echo engine beside its peers, and the echo stage as the workflow runs it, files included.
 
-    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 50] [--out results/benchmarks/echo.csv]
+    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out results/benchmarks/echo.csv]
 
-Writes echo.csv (columns COLUMNS; medians of five calls, forty of the engine; ratios to the peers of the same run,
-geometry and gains included on both sides): one cloud of each category, resampled to 31, 185 and 400 points at 200 m.
+Writes echo.csv (columns COLUMNS; medians of five calls, forty of the engine, all methods in turn; ratios to the peers
+of the same run, geometry and gains included on both sides): one cloud of each category, resampled to 31, 185 and 400
+points at 200 m.
 Writes echo_stage.csv beside it: the stage's rate on motion models of mixed subtypes by the real command, with one and
 two processes side by side, the shares of its time that poses, signals and kernels take, and how it scales with points,
 symbols, stations and cores. One thread a process; run it on a quiet machine.
@@ -144,20 +145,21 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
 def scaling(config: dict, cloud: Cloud) -> list[dict]:
     """Seconds a signal over points, symbols and tolerances, for one cloud resampled."""
     network, published = Network.from_settings(config["network"]), load_table("config/targets.csv")
-    rows = []
     sizes = [(400, 31, None), (400, 100, None), (100, 400, None), (1600, 400, None)]
     sizes += [(400, points, tolerance) for points in (400, 1600, 5000) for tolerance in (None, 1e-9, 1e-6, 1e-4, 1e-2)]
+    calls = []
     for symbols, points, tolerance in sizes:
         longer = dataclasses.replace(network, symbols=symbols)
         given = cost.sample(cloud, published[cloud.subtype], longer, config["motion"], 1, 200.0, points)
         call = functools.partial(echo_signal, longer, longer.stations[0], *given, tolerance)
-        seconds, _ = cost.timed(call, 21)
-        named = "exact" if tolerance is None else f"{tolerance:g}"
-        rows.append({
-            "what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {named}",
-            "seconds": seconds,
-        })  # fmt: skip
-    return rows
+        call()
+        calls.append((call, 7, 3))
+    named = ["exact" if tolerance is None else f"{tolerance:g}" for _, _, tolerance in sizes]
+    return [
+        {"what": f"one signal of {cloud.category} {cloud.subtype}, {symbols} symbols x {points} points, {name}",
+         "seconds": seconds}
+        for (symbols, points, _), name, (seconds, _) in zip(sizes, named, cost.in_turn(calls), strict=True)
+    ]  # fmt: skip
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ Settings: network, motion and cost blocks of the configuration, and its seed.
 """
 
 import csv
+import functools
 import os
 import platform
 import statistics
@@ -67,15 +68,20 @@ def sample(
     return moved, cloud.rcs_m2[order], np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
-def timed(call: Callable[[], np.ndarray], repeats: int, warm: bool = True) -> tuple[float, np.ndarray]:
-    """Median seconds of `repeats` calls, after a first one where `warm` says so, and the result."""
-    result = call() if warm else np.empty(0)
-    spent = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        result = call()
-        spent.append(time.perf_counter() - start)
-    return statistics.median(spent), result
+def in_turn(calls: list[tuple[Callable, int, int]]) -> list[tuple[float, object]]:
+    """Median seconds and last result of each call, given as (call, rounds, times a round).
+
+    Calls take turns, so that what slows the machine for a second slows all of them and not one method.
+    """
+    spent: list[list[float]] = [[] for _ in calls]
+    results: list[object] = [None] * len(calls)
+    for turn in range(max(rounds for _, rounds, _ in calls)):
+        for index, (call, rounds, times) in enumerate(calls):
+            for _ in range(times if turn < rounds else 0):
+                start = time.perf_counter()
+                results[index] = call()
+                spent[index].append(time.perf_counter() - start)
+    return [(statistics.median(own), result) for own, result in zip(spent, results, strict=True)]
 
 
 def truths(network: Network, station: Station, given: tuple, signal: np.ndarray, seed: int) -> dict[int, np.ndarray]:
@@ -94,7 +100,7 @@ def error(signal: np.ndarray, truth: dict[int, np.ndarray]) -> float:
 def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, seed: int, block: dict) -> list[dict]:
     """Measure all methods on one sample; seconds are medians, ratios come from the same run.
 
-    block: tolerances, repeats, and direct_repeats for the slow direct sum (0: leave it out), which needs no first call.
+    block: tolerances, repeats, and direct_repeats for the slow direct sum (0: leave it out).
     """
     station = network.stations[0]
     arguments = (network, station, *given)
@@ -105,25 +111,27 @@ def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, see
         "category": cloud.category, "subtype": cloud.subtype, "points": len(given[1]), "range_m": distance_m,
         "hardware": hardware(), "proved_bound": "",
     }  # fmt: skip
-    rows = []
-    slow = [("closed form, numpy", "", peers.closed), ("FINUFFT", 1e-9, peers.finufft)]
+    methods = [("closed form, numpy", "", lambda: peers.closed(*arguments), repeats, 1),
+               ("FINUFFT", 1e-9, lambda: peers.finufft(*arguments), repeats, 1)]  # fmt: skip
     if block["direct_repeats"]:
-        slow += [("direct sum, numpy", "", peers.direct), ("factored sum, numpy", "", peers.factored)]
-    for method, tolerance, function in slow:
-        few = block["direct_repeats"] if function is peers.direct else repeats
-        seconds, signal = timed(lambda function=function: function(*arguments), few, function is not peers.direct)
-        rows.append(base | {"method": method, "tolerance": tolerance, "seconds": seconds,
-                            "relative_error": error(signal, truth)})  # fmt: skip
+        methods.append(("direct sum, numpy", "", lambda: peers.direct(*arguments), block["direct_repeats"], 1))
+        methods.append(("factored sum, numpy", "", lambda: peers.factored(*arguments), repeats, 1))
     for tolerance in (None, *block["tolerances"]):
+        call = functools.partial(echo_signal, *arguments, tolerance)
         try:
-            # Calls of a millisecond: one interrupt would be a quarter of five of them.
-            seconds, result = timed(lambda tolerance=tolerance: echo_signal(*arguments, tolerance), 8 * repeats)
+            call()
         except InputError as refused:
             if "below the floor" not in str(refused):
                 raise
             continue
-        rows.append(base | {"method": "engine", "tolerance": tolerance or "exact", "seconds": seconds,
-                            "relative_error": error(result.signal, truth), "proved_bound": result.bound})  # fmt: skip
+        # Calls of a millisecond: one interrupt would be a quarter of five of them.
+        methods.append(("engine", tolerance or "exact", call, repeats, 8))
+    rows = []
+    found = in_turn([(call, rounds, calls) for _, _, call, rounds, calls in methods])
+    for (method, tolerance, *_), (seconds, result) in zip(methods, found, strict=True):
+        signal, bound = (result.signal, result.bound) if method == "engine" else (result, "")
+        rows.append(base | {"method": method, "tolerance": tolerance, "seconds": seconds,
+                            "relative_error": error(signal, truth), "proved_bound": bound})  # fmt: skip
     for row in rows:
         for column, method in (("ratio_to_finufft", "FINUFFT"), ("ratio_to_direct", "direct sum, numpy")):
             peer = [other["seconds"] for other in rows if other["method"] == method]
