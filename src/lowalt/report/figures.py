@@ -5,6 +5,7 @@ from collections.abc import Iterable
 
 import matplotlib
 import numpy as np
+from PIL import Image
 
 matplotlib.use("Agg")  # no screen on a cluster node
 from matplotlib import pyplot as plt
@@ -13,11 +14,18 @@ from matplotlib.figure import Figure
 SNR_LABELS = {"inf": "∞"}
 
 
-def png(figure: Figure) -> bytes:
-    """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal bytes."""
+def png(figure: Figure, colours: int = 0) -> bytes:
+    """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal bytes.
+
+    colours: so many at most, for figures full of spectra, which take half the bytes then (0: all).
+    """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)
+    if colours:
+        few = Image.open(buffer).convert("RGB").quantize(colours, dither=Image.Dither.NONE)
+        buffer = io.BytesIO()
+        few.save(buffer, format="png", optimize=True)
     return buffer.getvalue()
 
 
