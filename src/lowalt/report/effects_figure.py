@@ -91,4 +91,4 @@ def figure(table: list[dict], examples: dict[str, tuple[str, np.ndarray]], colou
         f"{row['motion_models']} test motion models; {row['scheme']}, {row['protocol']}, trained without effects, "
         f"{row['accuracy_without_percent']:.1f} % right without them; {row['hardware']}", fontsize=9,
     )  # fmt: skip
-    return png(result, 128)
+    return png(result, 256)
