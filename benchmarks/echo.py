@@ -174,6 +174,9 @@ def main() -> None:
     line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo.csv"))
     given = line.parse_args()
     config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
+    lacking = set(load_table("config/targets.csv")) - {cloud.subtype for cloud in clouds}
+    if lacking:
+        raise SystemExit(f"--clouds: no cloud of {sorted(lacking)}, expected all subtypes (`make data`)")
     if not given.stage_only:
         write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
