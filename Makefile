@@ -68,7 +68,7 @@ accuracy: $(SETUP)  ## what recognition accuracy costs in time: results/default/
 
 # The paper's scene first: its model is what the other scenes' samples are tried on, beside a model of their own.
 scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained without effects, and of their own
-	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- results/scene-paper/accuracy.csv
+	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- models results/scene-paper/accuracy.csv
 	for scene in urban worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
 		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
 
