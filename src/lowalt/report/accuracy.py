@@ -10,7 +10,10 @@ from lowalt.files import replacing
 from lowalt.report.figures import SNR_LABELS, png
 from lowalt.report.tables import read_csv
 
-NEEDED = ("scheme", "kind", "snr_db", "seen_percent", "unseen_percent", "inference_ms_64", "core_s_training", "front")
+NEEDED = (
+    "scheme", "kind", "snr_db", "seen_percent", "unseen_percent", "inference_ms_64", "core_s_training", "network_bytes",
+    "front",
+)  # fmt: skip
 FIDELITY = ("difference_points", "low", "high")
 TOO_CLOSE = 1.6
 """Ratio of two times under which their labels would overlap."""
@@ -46,55 +49,72 @@ def _points(panel, rows: list[dict], across: str, label: str) -> None:
     panel.grid(alpha=0.3, which="both")
 
 
+def _by_snr(panel, rows: list[dict], trained: list[dict]) -> None:
+    """Unseen accuracy over SNR of the rows on the front; rows: of every SNR, trained: their averages."""
+    for number, row in enumerate(trained):
+        if row["front"] != "yes":
+            continue
+        found = [other for other in rows if other["scheme"] == row["scheme"] and other["kind"] == "trained"]
+        found = [other for other in found if other["snr_db"] != "avg"]
+        labels = [SNR_LABELS.get(other["snr_db"], other["snr_db"]) for other in found]
+        panel.plot(labels, [float(other["unseen_percent"]) for other in found], "o-", color=plt.cm.tab20(number % 20))
+    panel.set(xlabel="SNR (dB)", ylabel="unseen accuracy (%)")
+    panel.set_title("by SNR, what nothing faster beats", fontsize=9)
+    panel.grid(alpha=0.3)
+
+
+def _fidelity(panel, rows: list[dict]) -> None:
+    """What training on echoes of a tolerance changes against training on exact ones, with its interval."""
+    values = [float(row["difference_points"]) for row in rows]
+    bars = [[value - float(row["low"]) for value, row in zip(values, rows, strict=True)],
+            [float(row["high"]) - value for value, row in zip(values, rows, strict=True)]]  # fmt: skip
+    panel.errorbar(range(len(values)), values, yerr=bars, fmt="o", capsize=4)
+    panel.axhline(0, color="0.6", lw=1)
+    names = [row["scheme"].rpartition(" ")[2].removeprefix("fidelity-") for row in rows]
+    panel.set_xticks(range(len(names)), names)
+    panel.set(xlabel="tolerance of the echoes trained on", ylabel="unseen accuracy less exact (points)")
+    spreads = [float(row["spread_points"]) for row in rows if row.get("spread_points")]
+    words = f"; another training seed: ±{max(spreads):.1f}" if spreads else ""
+    panel.set_title(f"tested on exact echoes; bars: 95 % intervals{words}", fontsize=9)
+    panel.grid(alpha=0.3)
+
+
 def draw(rows: list[dict[str, str]]) -> bytes:
     """Draw a table of accuracy and its cost; returns PNG bytes.
 
-    Left and middle: accuracy over inference and training time, averaged over SNRs, the front joined and times of
-    networks that were only timed as ticks below; right: unseen accuracy by SNR of the rows on the front, and what
-    training on echoes at a tolerance changes.
+    Above: accuracy over inference time, training time and bytes read, averaged over SNRs, the front joined and times of
+    networks that were only timed as lines; below: unseen accuracy by SNR of the rows on the front, and what training on
+    echoes at a tolerance changes.
     Raises: InputError where no row was trained.
     """
     average = [row for row in rows if row["snr_db"] == "avg"]
     trained = [row for row in average if row["kind"] == "trained"]
     if not trained:
         raise InputError("accuracy_cost: no trained row, expected at least one")
+    timed = [row for row in average if row["kind"] == "timed"]
     fidelity = [row for row in average if row["kind"] == "fidelity"]
-    figure, panels = plt.subplots(1, 4 if fidelity else 3, figsize=(21 if fidelity else 16, 5.2))
-    _points(panels[0], trained, "inference_ms_64", "inference, ms a sample on one core (batch of 64)")
-    _points(panels[1], trained, "core_s_training", "training, core-seconds")
-    panels[0].set_title(
+    figure, panels = plt.subplots(2, 3, figsize=(16, 9.6))
+    (inference, training, read), (snr, echoes, rest) = panels
+    _points(inference, trained, "inference_ms_64", "inference, ms a sample on one core (batch of 64)")
+    _points(training, trained, "core_s_training", "training, core-seconds")
+    _points(read, trained, "network_bytes", "bytes a sample that the network reads")
+    read.set_xscale("linear")
+    low = min(float(row["unseen_percent"]) for row in trained)
+    _timed(inference, timed, "inference_ms_64", low)
+    _timed(training, timed, "core_s_training", low)
+    inference.set_title(
         "filled: unseen subtypes, hollow: seen;\ngrey: unseen accuracy that nothing faster beats", fontsize=9
     )
-    timed = [row for row in average if row["kind"] == "timed"]
-    low = min(float(row["unseen_percent"]) for row in trained)
-    _timed(panels[0], timed, "inference_ms_64", low)
-    _timed(panels[1], timed, "core_s_training", low)
-    panels[1].set_title("networks only timed: training extrapolated", fontsize=9)
-    best = [row["scheme"] for row in trained if row["front"] == "yes"]
-    for name in best:
-        found = [row for row in rows if row["scheme"] == name and row["kind"] == "trained" and row["snr_db"] != "avg"]
-        labels = [SNR_LABELS.get(row["snr_db"], row["snr_db"]) for row in found]
-        colour = plt.cm.tab20([row["scheme"] for row in trained].index(name) % 20)
-        panels[2].plot(labels, [float(row["unseen_percent"]) for row in found], "o-", color=colour, label=name)
-    panels[2].set(xlabel="SNR (dB)", ylabel="unseen accuracy (%)")
-    panels[2].set_title("by SNR, what nothing faster beats", fontsize=9)
-    panels[2].grid(alpha=0.3)
+    training.set_title("networks only timed: training extrapolated", fontsize=9)
+    _by_snr(snr, rows, trained)
     if fidelity:
-        values = [float(row["difference_points"]) for row in fidelity]
-        bars = [[value - float(row["low"]) for value, row in zip(values, fidelity, strict=True)],
-                [float(row["high"]) - value for value, row in zip(values, fidelity, strict=True)]]  # fmt: skip
-        panels[3].errorbar(range(len(values)), values, yerr=bars, fmt="o", capsize=4)
-        panels[3].axhline(0, color="0.6", lw=1)
-        names = [row["scheme"].rpartition(" ")[2].removeprefix("fidelity-") for row in fidelity]
-        panels[3].set_xticks(range(len(names)), names)
-        panels[3].set(xlabel="tolerance of the echoes trained on", ylabel="unseen accuracy less exact (points)")
-        spreads = [float(row["spread_points"]) for row in fidelity if row.get("spread_points")]
-        words = f"; another training seed: ±{max(spreads):.1f}" if spreads else ""
-        panels[3].set_title(f"tested on exact echoes; bars: 95 % intervals{words}", fontsize=9)
-        panels[3].grid(alpha=0.3)
-    names, handles = {}, panels[0].get_legend_handles_labels()
+        _fidelity(echoes, fidelity)
+    else:
+        echoes.set_axis_off()
+    rest.set_axis_off()
+    names, handles = {}, inference.get_legend_handles_labels()
     names.update(zip(handles[1], handles[0], strict=True))
-    figure.legend(names.values(), names.keys(), loc="upper center", bbox_to_anchor=(0.5, 0), ncols=6, fontsize=8)
+    rest.legend(names.values(), names.keys(), loc="center", ncols=2, fontsize=8)
     hardware = next((row["hardware"] for row in trained if row.get("hardware")), "")
     figure.suptitle(f"What accuracy costs in time ({hardware})", fontsize=10)
     figure.tight_layout()
