@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from lowalt.echo import echo_signal
+from lowalt.echo import echo_signal, echo_signals
 from lowalt.echo.__main__ import main
 from lowalt.echo.cost import COLUMNS, rows_of, sample
 from lowalt.echo.motion import Rigid, target
@@ -92,9 +92,12 @@ def test_a_target_checked_once_serves_every_station():
     motion = Rigid(*poses(craft(), row(0), network.times_s), craft().points, craft().part)
     aim = [row(0)[name] for name in ("x_m", "y_m", "z_m")]
     seen = target(motion, 1.0)
-    for station in network.stations:
+    together = echo_signals(network, motion, 1.0, aim)
+    assert together.shape == (len(network.stations), network.symbols)
+    for station, signal in zip(network.stations, together, strict=True):
         alone = echo_signal(network, station, motion, 1.0, aim).signal
         assert (echo_signal(network, station, seen, None, aim).signal == alone).all()
+        assert (signal == alone).all()
     with pytest.raises(InputError, match=r"model 0: rcs_m2 is 1\.0, expected None: a Target holds its cross sections"):
         echo_signal(network, network.stations[0], seen, 1.0, aim, sample="model 0")
     with pytest.raises(InputError, match=r"model 0: motion.translation\[3, 0, 1\] is nan"):

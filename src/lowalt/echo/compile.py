@@ -32,6 +32,7 @@ class _SourceCache(FunctionCache):
         return (*super()._index_key(sig, codegen), DIGEST)
 
     def load_overload(self, sig, target_context):
+        """Return finished machine code for a signature, or None; as numba's own, but for what it loads first."""
         # numba's own would first load everything that a compilation may need, scipy.linalg included: a third of a
         # job's start. Finished machine code needs the counted references' runtime at most; compilation loads the rest.
         if self.counted:

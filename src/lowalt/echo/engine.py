@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.echo import answers, ladder
 from lowalt.echo.ladder import Choice
-from lowalt.echo.motion import Rigid, Scene, check
+from lowalt.echo.motion import Rigid, Scene, check, target
 from lowalt.echo.precise import reference
 from lowalt.echo.radar import Radar, radar
 from lowalt.echo.terms import aim_cosines
@@ -101,6 +101,25 @@ def echo_signal(
     return EchoResult(
         found.values, found.cells, int(found.ties.sum()), bound, choice, found.gaps, found.totals
     )  # fmt: skip
+
+
+def echo_signals(
+    network: Network,
+    motion: Rigid | np.ndarray,
+    rcs_m2: np.ndarray | float,
+    aim_m: np.ndarray,
+    tolerance: float | None = None,
+    sample: str = "",
+) -> np.ndarray:
+    """Return the symbol-domain signals of all the network's stations, complex128 (stations, symbols).
+
+    Arguments, errors and source as `echo_signal`, which also says how each was computed; the motion is checked once.
+    """
+    seen = target(motion, rcs_m2, sample)
+    return np.stack([
+        echo_signal(network, station, seen, None, aim_m, tolerance, sample=sample).signal
+        for station in network.stations
+    ])  # fmt: skip
 
 
 def explain(result: EchoResult) -> str:

@@ -13,7 +13,7 @@ from lowalt.echo.cells import PLACES, SIDE
 from lowalt.echo.certify import AGAIN, FINE, certify
 from lowalt.echo.compile import LEAN
 from lowalt.echo.fits import TOP
-from lowalt.echo.segment import constants, fill_tile, fit_gain
+from lowalt.echo.segment import constants, fill_tile, fit_gains
 from lowalt.echo.spans import SIZE, SPREAD
 from lowalt.echo.terms import cell_phase
 
@@ -104,7 +104,6 @@ def run(
     values, cells, state, totals, bounds, ties, gaps = out
     slow_moments, slow_sums, slow_errors = slow
     room, m, k, moments, coefficients, typed, sums, far = rooms
-    weights_h, rates_h, weights_v, rates_v = rules
     fit, share, peak, unit, block, near, final = plan
     psi0, omega0 = aims
     padded = len(small[9])
@@ -112,12 +111,7 @@ def run(
     rounding = rounding_of(unit, block, padded, orders)
     for index in range(len(segs)):
         start, end = int(segs[index, 0]), int(segs[index, 1])
-        degree_h, bound_h = fit_gain(
-            weights_h, rates_h, segs[index, 2] - psi0, segs[index, 3], fit, unit, fold, room, coefficients, typed, 0
-        )
-        degree_v, bound_v = fit_gain(
-            weights_v, rates_v, segs[index, 4] - omega0, segs[index, 5], fit, unit, fold, room, coefficients, typed, 1
-        )
+        degree_h, degree_v, gains = fit_gains(segs, index, aims, rules, fit, unit, fold, room, coefficients, typed)
         if degree_h < 0 or degree_v < 0:
             for i in range(start, end):
                 state[symbols[i]] = AGAIN
@@ -142,7 +136,7 @@ def run(
             second *= scale * (1.0 + unit * (chunk + 24))
             peaks = scale / (1.0 - span[i, SPREAD]) ** 2
             summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
-            bound = total * (share + error) + summed + peaks * (peak + bound_h + bound_v + bound_h * bound_v)
+            bound = total * (share + error) + summed + peaks * (peak + gains)
             if len(slow_moments):
                 away = (refs[i, 6] - centre) / half
                 add_slow(slow_moments, i, refs[i, 4], away, 1.0 / (r * r), orders, moments)
@@ -195,7 +189,6 @@ def moments_at(scene, lay, radar, q, refs, span, segs, aims, rules, table, fits,
     kernels, _, half, _, sizes = table
     found, strengths, errors = out
     room, m, k, moments, coefficients, typed, _, _ = rooms
-    weights_h, rates_h, weights_v, rates_v = rules
     fit, share, peak, unit, block, near, _ = plan
     psi0, omega0 = aims
     padded = len(small[9])
@@ -203,12 +196,7 @@ def moments_at(scene, lay, radar, q, refs, span, segs, aims, rules, table, fits,
     rounding = rounding_of(unit, block, padded, orders)
     for index in range(len(segs)):
         start, end = int(segs[index, 0]), int(segs[index, 1])
-        degree_h, bound_h = fit_gain(
-            weights_h, rates_h, segs[index, 2] - psi0, segs[index, 3], fit, unit, fold, room, coefficients, typed, 0
-        )
-        degree_v, bound_v = fit_gain(
-            weights_v, rates_v, segs[index, 4] - omega0, segs[index, 5], fit, unit, fold, room, coefficients, typed, 1
-        )
+        degree_h, degree_v, gains = fit_gains(segs, index, aims, rules, fit, unit, fold, room, coefficients, typed)
         if degree_h < 0 or degree_v < 0:
             return False
         for i in range(start, end):
@@ -225,7 +213,7 @@ def moments_at(scene, lay, radar, q, refs, span, segs, aims, rules, table, fits,
             second *= lay.total * (1.0 + unit * (chunk + 24))
             strengths[i, 0], strengths[i, 1] = total, second
             peaks = lay.total / (1.0 - span[i, SPREAD]) ** 2
-            errors[i] = total * share + peaks * (peak + bound_h + bound_v + bound_h * bound_v)
+            errors[i] = total * share + peaks * (peak + gains)
             errors[i] += rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
     return True
 

@@ -30,6 +30,23 @@ def fit_gain(weights, rates, centre, half, error, unit, fold, room, coefficients
 
 
 @LEAN
+def fit_gains(segs, index, aims, rules, error, unit, fold, room, coefficients, typed):
+    """Fit a segment's horizontal and vertical gain; returns (their degrees, bound of the error of their product).
+
+    segs: of `spans.segments`; aims: the beams' direction cosines; rules: weights and rates of both; else as `fit_gain`.
+    """
+    weights_h, rates_h, weights_v, rates_v = rules
+    centre_h, centre_v = segs[index, 2] - aims[0], segs[index, 4] - aims[1]
+    degree_h, bound_h = fit_gain(
+        weights_h, rates_h, centre_h, segs[index, 3], error, unit, fold, room, coefficients, typed, 0
+    )
+    degree_v, bound_v = fit_gain(
+        weights_v, rates_v, centre_v, segs[index, 5], error, unit, fold, room, coefficients, typed, 1
+    )
+    return degree_h, degree_v, bound_h + bound_v + bound_h * bound_v
+
+
+@LEAN
 def constants(radar, refs, i, segs, index, psi0, omega0, centre, half, k, m):
     """Fill k with the constants of symbol i, in segment `index`, for `lanes.geometry`, and m[12:] for placing.
 

@@ -57,9 +57,9 @@ def main(arguments: list[str]) -> None:
 
         occluders = read_all(given.occluders)
     rows = read_table(given.motion)
-    for station, out, reference in zip(given.station, given.out, given.power, strict=True):
-        found, power = signals(scene, station, clouds, rows, occluders)
-        for path, values in ((out, found), (reference, power)):
+    found = [signals(scene, station, clouds, rows, occluders) for station in given.station]
+    for files in zip(zip(given.out, given.power, strict=True), found, strict=True):
+        for path, values in zip(*files, strict=True):
             with replacing(path) as temporary:
                 np.save(temporary, values)
             print(f"{path}: {len(values)} models", file=sys.stderr)
