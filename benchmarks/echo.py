@@ -193,6 +193,8 @@ def main() -> None:
             result.append({"what": f"echo stage, {len(rows)} models x {len(everyone)} stations, {how}, "
                            f"{processes} process(es)", "seconds": seconds, "models_per_s": len(rows) / seconds,
                            "paper_minutes": PAPER / (len(rows) / seconds) / 60})  # fmt: skip
+        start = stage(config, paths, rows[:1], [everyone[:1]], 1, Path(folder))
+    result.append({"what": "a job of one model and station: start, files and first calls", "seconds": start})
     alone = [row["seconds"] for row in result if "1 process" in row["what"]][-1]
     result += [{"what": f"inside the stage, 1 process: {name[:-2]}", "seconds": value, "share": value / alone}
                for name, value in inside(config, clouds, rows).items()]  # fmt: skip
