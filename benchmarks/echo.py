@@ -24,17 +24,19 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config import canonical
-from lowalt.echo import cost, echo_signal, fast
-from lowalt.echo.motion import Rigid
-from lowalt.files import replacing
+from lowalt.common.config import canonical
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
+from lowalt.common.streams import stream
+from lowalt.common.yaml_files import load_yaml
+from lowalt.echo import echo_signal
+from lowalt.echo.fast import driver
+from lowalt.echo.scene import Rigid
+from lowalt.measure import echo_cost as cost
 from lowalt.motion import poses, write_table
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.network import Network
-from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.records import load_table
-from lowalt.yaml_files import load_yaml
 
 COLUMNS = (
     "method", "category", "points", "tolerance", "seconds_a_sample", "relative_error", "proved_bound",
@@ -120,7 +122,7 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
     """Seconds of poses, signals and the kernels in these, for all rows at all stations, without files and start-up."""
     network = Network.from_settings(config["network"])
     by_name = {cloud.subtype: cloud for cloud in clouds}
-    kernel, spent = fast.run, {"poses_s": 0.0, "signals_s": 0.0, "kernel_s": 0.0}
+    kernel, spent = driver.run, {"poses_s": 0.0, "signals_s": 0.0, "kernel_s": 0.0}
 
     def timed(name: str, call: Callable, *arguments):
         start = time.perf_counter()
@@ -128,7 +130,7 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
         spent[name] += time.perf_counter() - start
         return result
 
-    fast.run = functools.partial(timed, "kernel_s", kernel)
+    driver.run = functools.partial(timed, "kernel_s", kernel)
     try:
         for row in rows:
             cloud, aim = by_name[row["subtype"]], np.array([row["x_m"], row["y_m"], row["z_m"]])
@@ -138,7 +140,7 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
                     "signals_s", echo_signal, network, station, motion, cloud.rcs_m2, aim, config["echo"]["tolerance"]
                 )
     finally:
-        fast.run = kernel
+        driver.run = kernel
     return spent
 
 

@@ -3,11 +3,10 @@
     python benchmarks/echo_scenes.py --count 10000 [--seed 1] [--out results/benchmarks/echo_scenes.csv]
 
 Ranges 1 m to 100 km, 1 to 5000 points, 0.5 to 100 GHz, any array sizes. Each scene is judged at eight random symbols
-and the two deepest fades. The judge (`lowalt.echo.peers`) sums elements and subcarriers one by one, its ranges in
-extended precision; it shares nothing with the closed form. A tolerance below a scene's floor is refused, which is
-counted, not judged. In every second scene the engine must use what the tolerance allows, also where the exact mode
-would be as fast.
-"""
+and the two deepest fades. The judge (`lowalt.measure.echo_baselines`) sums elements and subcarriers one by one, its
+ranges in extended precision; it shares nothing with the closed form. A tolerance below a scene's floor is refused,
+which is counted, not judged. In every second scene the engine must use what the tolerance allows, also where the exact
+mode would be as fast. """
 
 import argparse
 import csv
@@ -18,17 +17,18 @@ from unittest.mock import patch
 
 import numpy as np
 
-from lowalt.echo import Rigid, echo_signal, ladder, slow
-from lowalt.echo.cost import hardware
-from lowalt.echo.peers import judge
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.streams import stream
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.common.streams import stream
+from lowalt.echo import Rigid, echo_signal, refine
+from lowalt.echo.slow_time import pose_series
+from lowalt.measure.echo_baselines import judge
+from lowalt.measure.echo_cost import hardware
 
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48
-PRICES = ((ladder.TRYING, slow.WORTH), (-np.inf, 1))
+PRICES = ((refine.TRYING, pose_series.WORTH), (-np.inf, 1))
 """What a shortcut must save to be taken: as shipped, and nothing at all."""
 NEAR_TIE = 1e-12
 
@@ -79,8 +79,8 @@ def examine(seed: int, index: int) -> list[dict]:
         }  # fmt: skip
         try:
             with (
-                patch.object(ladder, "TRYING", PRICES[index % 2][0]),
-                patch.object(slow, "WORTH", PRICES[index % 2][1]),
+                patch.object(refine, "TRYING", PRICES[index % 2][0]),
+                patch.object(pose_series, "WORTH", PRICES[index % 2][1]),
             ):
                 result = echo_signal(network, station, motion, rcs, aim, tolerance, sample=f"scene {index}")
         except InputError as error:

@@ -27,9 +27,9 @@ import yaml
 from PIL import Image
 from zlib_ng import zlib_ng
 
-from lowalt.files import replacing
-from lowalt.hardware import describe
-from lowalt.network import SPEED_OF_LIGHT, Network
+from lowalt.common.files import replacing
+from lowalt.common.hardware import describe
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.shards.tar import Writer
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, Scale, encode, paint

@@ -22,18 +22,18 @@ import yaml
 from PIL import Image
 from torch.utils.data import DataLoader, Dataset
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.hardware import describe
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.hardware import describe
+from lowalt.common.network import Network
+from lowalt.common.splits import FOLDS
 from lowalt.motion import read_table
-from lowalt.network import Network
 from lowalt.shards import Batches, ShardSet
 from lowalt.shards.index import build
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
 from lowalt.shards.write import npy, write_shard
 from lowalt.spectra import Spectra
-from lowalt.splits import FOLDS
 from lowalt.tiles import Images, Renderer, encode, paint
 
 COLUMNS = ("what", "kind", "pixels", "workers", "samples", "value", "unit", "hardware")

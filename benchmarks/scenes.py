@@ -15,15 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config import load_yaml
+from lowalt.common.config import load_yaml
+from lowalt.common.files import replacing
+from lowalt.common.hardware import describe
+from lowalt.common.network import Network
 from lowalt.echo.__main__ import signals as echo_signals
 from lowalt.effects.__main__ import signals as scene_signals
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene
-from lowalt.files import replacing
-from lowalt.hardware import describe
 from lowalt.motion import read_table
-from lowalt.network import Network
 from lowalt.targets.cloud import read
 
 COLUMNS = ("method", "models", "ms_per_signal", "ratio_to_echo_stage", "same_bytes", "hardware")

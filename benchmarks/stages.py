@@ -15,9 +15,9 @@ import json
 from collections import defaultdict
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
-from lowalt.hardware import describe
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.hardware import describe
 from lowalt.shards.index import load
 from lowalt.shards.size import sample_bytes
 

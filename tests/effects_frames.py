@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.effects import waveform
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
 
 
 def network(symbols: int = 400, subcarriers: int = 256, interval_s: float = 2.5e-3) -> Network:

@@ -6,9 +6,9 @@ import sys
 
 import pytest
 
-from lowalt.command import pick, settings
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing, sha256
+from lowalt.common.command import pick, settings
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, sha256
 
 
 def test_settings_come_as_json_or_as_a_file(tmp_path):

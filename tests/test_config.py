@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.config import canonical, check, load, load_yaml, merge
-from lowalt.errors import InputError
-from lowalt.files import slug
+from lowalt.common.config import canonical, check, load, load_yaml, merge
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.common.plan import Plan
 from lowalt.motion import COLUMNS
-from lowalt.plan import Plan
 from lowalt.report.__main__ import STAGE_COLUMNS
-from lowalt.sources import PACKAGE, sources
+from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -104,7 +104,7 @@ def test_slugs_are_plain_and_distinct():
 
 def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller():
     plain = set(sources("lowalt.targets"))
-    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/cloud.py", PACKAGE / "errors.py"} <= plain
+    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/cloud.py", PACKAGE / "common/errors.py"} <= plain
     assert PACKAGE / "targets/gait.py" not in plain
     assert set(sources("lowalt.targets", "lowalt.targets.gait")) > plain | {PACKAGE / "targets/gait.py"}
 

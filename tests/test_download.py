@@ -4,7 +4,7 @@ import hashlib
 
 import pytest
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import download
 
 

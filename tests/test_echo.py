@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal, range_cells, subcarrier_matrix
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
 
 
 def network(**changes) -> Network:
@@ -129,7 +129,7 @@ def test_crossing_a_cell_edge_turns_the_phase_by_almost_pi():
 
 @pytest.mark.parametrize("count", [1, 2, 16, 25, 256])
 def test_chebyshev_limits(count):
-    from lowalt.echo.terms import dirichlet
+    from lowalt.echo.pointwise.terms import dirichlet
 
     for whole in range(-3, 4):
         sign = (-1.0) ** (whole * (count - 1))
@@ -155,7 +155,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_positions_are_named(case):
-    from lowalt.errors import InputError
+    from lowalt.common.errors import InputError
 
     value, message = BAD[case]
     net = network()
@@ -164,7 +164,7 @@ def test_bad_positions_are_named(case):
 
 
 def test_other_bad_arguments_are_named():
-    from lowalt.errors import InputError
+    from lowalt.common.errors import InputError
 
     net = network()
     good = np.full((2, 3, 3), 40.0)

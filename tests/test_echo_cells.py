@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.echo import Path, Rigid, echo_signal
-from lowalt.echo.cells import PLACES, SIDE, cells
-from lowalt.echo.certify import far_limit, far_moments
+from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cells
+from lowalt.echo.fast.strongest_cell import far_limit, far_moments
 from test_echo import cloud_in_motion, network, relative
 
 

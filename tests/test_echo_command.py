@@ -8,14 +8,14 @@ import sys
 import numpy as np
 import pytest
 
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.echo import echo_signal, echo_signals
 from lowalt.echo.__main__ import main
-from lowalt.echo.cost import COLUMNS, rows_of, sample
-from lowalt.echo.motion import Rigid, target
-from lowalt.errors import InputError
+from lowalt.echo.scene import Rigid, target
+from lowalt.measure.echo_cost import COLUMNS, rows_of, sample
 from lowalt.motion import poses, positions, write_table
 from lowalt.motion.table import NUMBERS
-from lowalt.network import Network
 from lowalt.targets.cloud import Cloud, write
 
 NETWORK = {

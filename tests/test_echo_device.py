@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.echo.device import device_signal
-from lowalt.errors import InputError
 from lowalt.motion import poses, positions
-from lowalt.network import Network
 from test_echo_command import NETWORK, craft, row
 
 torch = pytest.importorskip("torch")

@@ -7,8 +7,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import Path, Rigid, echo_signal, ellipse, explain, fast, interpolate, slow
+from lowalt.echo import Path, Rigid, echo_signal, explain
+from lowalt.echo.fast import driver
 from lowalt.echo.radar import radar
+from lowalt.echo.slow_time import interpolation as interpolate
+from lowalt.echo.slow_time import node_count, pose_series
 from test_echo import network, relative
 
 SHARED = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -63,12 +66,12 @@ def test_the_bound_holds_on_the_whole_ellipse(seed, away, size, speed, yaw, rho)
     motion = flight(rng, 200, 1, (away, 0.2 * away, 30.0), size, speed, yaw)
     refs = np.zeros((200, 7))
     refs[:, :3] = motion.translation[:, 0] - np.array(seen.position_m)
-    poses = slow.series(motion.rotation, motion.translation, refs, 0, np.array([0, 1]), slow.fit(200))
+    poses = pose_series.series(motion.rotation, motion.translation, refs, 0, np.array([0, 1]), pose_series.fit(200))
     points = rng.normal(size=(2, 20, 3)) * size / 3
     radii = np.linalg.norm(points, axis=2).max(axis=1)
-    moves, sizes, _ = slow.extent(*poses, np.arange(2), np.zeros((2, 3)), radii)
+    moves, sizes, _ = pose_series.extent(*poses, np.arange(2), np.zeros((2, 3)), radii)
     phases, rates = radio.kappa / 4 * 36, np.pi * radio.kappa / 2 * 36
-    whole, bare, most = ellipse._growth(rho, moves, sizes, radio.turns, radio.cells, phases, rates)
+    whole, bare, most = node_count._growth(rho, moves, sizes, radio.turns, radio.cells, phases, rates)
     if not whole < np.inf:
         return
     angle = np.linspace(0, 2 * np.pi, 41)
@@ -102,22 +105,22 @@ def test_the_bound_is_worth_having():
     motion = flight(np.random.default_rng(1), 400, 1, (150.0, 60.0, 60.0), 0.4)
     refs = np.zeros((400, 7))
     refs[:, :3] = motion.translation[:, 0] - np.array(net.stations[0].position_m)
-    poses = slow.series(motion.rotation, motion.translation, refs, 0, np.array([0]), slow.fit(400))
-    sizes = slow.extent(*poses, np.array([0]), np.zeros((1, 3)), np.array([0.4]))
+    poses = pose_series.series(motion.rotation, motion.translation, refs, 0, np.array([0]), pose_series.fit(400))
+    sizes = pose_series.extent(*poses, np.array([0]), np.zeros((1, 3)), np.array([0.4]))
     # By radians: the tip turns through 0.4 x 0.15 m, the direction through 15 m in 160 m, over half the look.
     swing = 2 * np.pi * radio.turns * 0.4 * (0.15 + 0.5 * 15 / 160)
     assert 10 < swing < 20
     for target in (1e-3, 1e-9):
-        degree, error, *_ = ellipse.choose(
+        degree, error, *_ = node_count.choose(
             *sizes[:2], radio.turns, 1.0, 0.01, radio.kappa * 9, np.pi * radio.kappa * 18, 8, (1.0, 0.1, 0.1), target,
-            400, ellipse.RHO,
+            400, node_count.RHO,
         )  # fmt: skip
         assert error <= target and swing < degree < 3 * swing + 4 * np.log10(1 / target)
 
 
 @pytest.mark.parametrize("degree", [4, 7, 30, 200, 480])
 def test_weights_carry_polynomials_exactly_and_nothing_grows(degree):
-    polynomial, linear, _ = slow.weights(500, degree)
+    polynomial, linear, _ = pose_series.weights(500, degree)
     nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
     symbols = np.linspace(-1, 1, 500)
     for order in (0, 1, degree // 2, degree):
@@ -133,7 +136,7 @@ def test_moments_move_with_the_place_they_are_about():
     z, v, away, turned = rng.normal(size=9) + 1j * rng.normal(size=9), rng.uniform(-1, 1, 9), -0.3, 0.2
     old = z @ v[:, None] ** np.arange(8)
     found = np.ones((2, 8))
-    fast.add_slow(np.stack([old.real, old.imag])[None].copy(), 0, turned, away, 3.0, 8, found)
+    driver.add_slow(np.stack([old.real, old.imag])[None].copy(), 0, turned, away, 3.0, 8, found)
     truth = 3 * np.exp(-2j * np.pi * turned) * z @ (v[:, None] + away) ** np.arange(8)
     assert abs(found[0] + 1j * found[1] - (1 + 1j) - truth).max() < 1e-13
     assert abs(truth[2] - 3 * np.exp(-2j * np.pi * turned) * sum(

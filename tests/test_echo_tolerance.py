@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import Path, echo_signal, explain, fits, range_cells
-from lowalt.echo.precise import reference as reference_ranges
+from lowalt.echo import Path, echo_signal, explain, range_cells
+from lowalt.echo.fast import polynomials
+from lowalt.echo.pointwise.reference_range import reference as reference_ranges
 from lowalt.echo.radar import radar
 from test_echo import cloud_in_motion, network, positions, relative
 
@@ -67,20 +68,20 @@ def test_incoherent_clouds_are_certified_against_all_cells():
 @pytest.mark.parametrize("band", [0.1, 1.0, 3.0, 6.0])
 @pytest.mark.parametrize("error", [1e-3, 1e-8, 1e-14])
 def test_fitted_cosines_keep_their_bound(band, error):
-    degree = fits.degree_for(band, error)
+    degree = polynomials.degree_for(band, error)
     weights, rates = np.array([0.25, 0.45, 0.3]), np.array([1.0, 0.6, 0.1])
-    out, s = np.zeros(fits.TOP + 1), np.linspace(-1, 1, 401)
-    fits.economised(weights, rates, 0.3, 1.7, band, degree, fits.folding(), np.empty((3, 3)), out)
+    out, s = np.zeros(polynomials.TOP + 1), np.linspace(-1, 1, 401)
+    polynomials.economised(weights, rates, 0.3, 1.7, band, degree, polynomials.folding(), np.empty((3, 3)), out)
     truth = np.cos(np.outer(1.7 + band * s, rates) + 0.3) @ weights
-    assert abs(np.polynomial.polynomial.polyval(s, out) - truth).max() <= fits.tail(band, degree) + 2e-15
-    assert fits.tail(band, degree) <= error
+    assert abs(np.polynomial.polynomial.polyval(s, out) - truth).max() <= polynomials.tail(band, degree) + 2e-15
+    assert polynomials.tail(band, degree) <= error
 
 
 @pytest.mark.parametrize("kind", ["inverse", "excess", "cosine", "sine"])
 @pytest.mark.parametrize("degree", [3, 5, 7, 10])
 def test_fixed_functions_keep_their_bound(kind, degree):
     reach = 0.25 if kind in ("cosine", "sine") else 0.1
-    coefficients, bound = fits.smooth(kind, reach, degree)
+    coefficients, bound = polynomials.smooth(kind, reach, degree)
     x = np.linspace(1e-6 if kind in ("cosine", "sine") else -reach, reach, 200)
     exact = {
         "inverse": lambda v: 1 / mpmath.sqrt(1 + v), "excess": lambda v: (mpmath.sqrt(1 + v) - 1) / v,
@@ -95,9 +96,9 @@ def test_fixed_functions_keep_their_bound(kind, degree):
 
 @pytest.mark.parametrize("count", [1, 2, 3, 17, 24, 25, 256, 3300])
 def test_the_cell_kernel_is_a_short_cosine_sum(count):
-    weights, rates = fits.cell_rule(count)
+    weights, rates = polynomials.cell_rule(count)
     m = np.arange(count) - (count - 1) / 2
-    for x in np.linspace(-fits.CELL_REACH, fits.CELL_REACH, 33):
+    for x in np.linspace(-polynomials.CELL_REACH, polynomials.CELL_REACH, 33):
         truth = np.cos(2 * np.pi * m * x / count).mean()
         assert abs((weights * np.cos(rates * x)).sum() - truth) < 5e-15
     assert len(weights) <= 16 and (rates >= 0).all()
@@ -120,10 +121,10 @@ def test_reference_ranges_hold_more_than_a_double(distance):
 
 
 def test_machine_code_follows_every_source_of_the_folder():
-    from lowalt.echo import compile as compiling
+    from lowalt.common import jit as compiling
 
     key = compiling._SourceCache._index_key
-    from lowalt.echo.fast import run
+    from lowalt.echo.fast.driver import run
 
     assert isinstance(run._cache, compiling._SourceCache) and compiling.DIGEST in _key_of(run._cache, key)
 

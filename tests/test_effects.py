@@ -9,6 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference_effects
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network, Station
+from lowalt.common.streams import stream
 from lowalt.echo import echo_signal, subcarrier_matrix
 from lowalt.echo.radar import radar
 from lowalt.effects import need, waveform
@@ -16,10 +19,7 @@ from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.facts import check
 from lowalt.effects.hear import Scene, hear, observe
 from lowalt.effects.response import Way, response
-from lowalt.errors import InputError
 from lowalt.motion.table import NUMBERS
-from lowalt.network import Network, Station
-from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud
 
 

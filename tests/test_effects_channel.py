@@ -8,14 +8,14 @@ import pytest
 from scipy import stats
 from scipy.special import gamma, kv
 
-from lowalt.config import load_yaml
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.echo.radar import radar
 from lowalt.effects.channel import clutter, cross_sections, ground_reflection
 from lowalt.effects.response import response
 from lowalt.effects.view import View
-from lowalt.errors import InputError
 from lowalt.motion.table import NUMBERS
-from lowalt.network import SPEED_OF_LIGHT, Network
 from lowalt.targets.cloud import Cloud
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])

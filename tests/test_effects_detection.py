@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from effects_frames import network
+from lowalt.common.errors import InputError
 from lowalt.effects.catalogue import called
 from lowalt.effects.detection import canceller, cell_error
-from lowalt.errors import InputError
 
 KINDS = [
     {"kind": "mean"},

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from lowalt.config import load_yaml
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.effects.motion import gusts, rotor_spread
 from lowalt.effects.motion.markov import steps
-from lowalt.errors import InputError
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.poses import attitude
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.streams import stream
 from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import load_records

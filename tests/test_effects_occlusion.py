@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lowalt.config import canonical, load_yaml
+from lowalt.common.config import canonical, load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.effects.channel import occlusion
 from lowalt.effects.view import View
-from lowalt.errors import InputError
 from lowalt.motion.table import NUMBERS
-from lowalt.network import Network
 from lowalt.targets import occluders
 from lowalt.targets.__main__ import make
 from lowalt.targets.builtin import MODULES

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy.special import j0
 
 from effects_frames import frame, heard, network, point
+from lowalt.common.errors import InputError
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import ORDER, called
 from lowalt.effects.receiver import (
@@ -26,7 +27,6 @@ from lowalt.effects.receiver import (
     receiver_noise,
     timing_offset,
 )
-from lowalt.errors import InputError
 
 C = 299_792_458.0
 IDLE = [

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from lowalt.__main__ import main
-from lowalt.config import canonical, load
+from lowalt.common.config import canonical, load
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.echo.__main__ import main as echo_command
 from lowalt.effects.__main__ import main as effects_command
 from lowalt.effects.catalogue import PLACES
 from lowalt.effects.facts import check
-from lowalt.errors import InputError
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import write_table
 from lowalt.noise.__main__ import main as noise_command
-from lowalt.streams import stream
 from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import write
 from lowalt.targets.records import load_records

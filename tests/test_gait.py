@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
 from lowalt.targets.records import load_table, merge, read_records

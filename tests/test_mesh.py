@@ -10,7 +10,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import cloud as clouds
 from lowalt.targets import mesh
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh

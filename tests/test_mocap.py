@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import cloud as clouds
 from lowalt.targets import mocap
 from lowalt.targets.mocap_files import read_motion, read_skeleton

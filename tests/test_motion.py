@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.motion import poses, positions, read_table, write_table
 from lowalt.motion.poses import attitude, rodrigues, turns
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
-from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud
 
 MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.noise import add_noise
 from lowalt.noise.__main__ import noisy_signals
 

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.config import load_yaml
+from lowalt.common.config import load_yaml
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses
 from lowalt.motion.table import NUMBERS
-from lowalt.network import SPEED_OF_LIGHT, Network
 from lowalt.spectra import Spectra, trp, vrp
 from lowalt.targets.cloud import Cloud
 

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.recognition import network, schemes
 
 BLOCK = {

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.recognition import freeze, order, orderings, predictions, protocols, samples, schemes, tables
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.augment import KEYS, augment
-from lowalt.streams import stream
 
 SUBTYPES = {"Mini": ("seen", 0), "Avata": ("unseen", 0), "Crow": ("seen", 1), "Owl": ("unseen", 1),
             "M9": ("seen", 2), "A6": ("unseen", 2), "Walk": ("seen", 3), "Run": ("unseen", 3)}  # fmt: skip

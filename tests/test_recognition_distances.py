@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.recognition.distances import energy_distance, form
-from lowalt.streams import stream
 
 POINTS = st.integers(0, 10**6).map(lambda seed: stream(seed, "points").normal(size=(12, 3)))
 

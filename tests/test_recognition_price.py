@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.recognition import predictions, price, samples, schemes, statistics
 from lowalt.recognition.tables import Run
 from lowalt.report.accuracy import draw

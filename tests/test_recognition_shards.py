@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.errors import InputError
-from lowalt.network import Network
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.recognition import checkpoint, network, predictions, runs, samples, schemes, score, views
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds

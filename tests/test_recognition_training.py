@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint, inference, predictions, recipe, runs, samples, schemes
 from lowalt.recognition.__main__ import main
-from lowalt.streams import stream
 
 TRAINING = {
     "steps": 24, "batch": 8, "snrs_per_model": 1, "rate": 3e-3, "backbone_rate": 1.0, "weight_decay": 0.05,

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.recognition import predictions, samples, transfer
 from lowalt.recognition.tables import Run
-from lowalt.streams import stream
 
 SNRS = (3.0, np.inf)
 

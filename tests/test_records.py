@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lowalt.errors import InputError
-from lowalt.files import slug
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
 from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"

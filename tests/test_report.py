@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lowalt.config import load
-from lowalt.errors import InputError
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
 from lowalt.report import figures, recognition
 from lowalt.report.estimate import estimate, training_hours
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times

@@ -7,8 +7,8 @@ import jinja2
 import numpy as np
 import pytest
 
-from lowalt.echo.cost import COLUMNS as MEASURED
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.measure.echo_cost import COLUMNS as MEASURED
 from lowalt.report.cost import changes, figure, main, pixels, saved, signals
 from lowalt.report.cost_table import summary
 from lowalt.report.tables import read_csv
@@ -85,8 +85,8 @@ def test_pixels_are_those_of_rendered_tiles_and_a_fine_tolerance_changes_none(cl
 
 
 def test_a_tolerance_below_the_floor_keeps_the_exact_signal(cloud):
-    from lowalt.echo.cost import sample
-    from lowalt.network import Network
+    from lowalt.common.network import Network
+    from lowalt.measure.echo_cost import sample
 
     network = Network.from_settings(NETWORK)
     given = sample(cloud, PUBLISHED, network, BLOCK["motion"], 1, 150.0, None)

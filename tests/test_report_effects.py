@@ -11,12 +11,14 @@ import pytest
 from PIL import Image
 
 import lowalt.report
-from lowalt.config import load, merge
+from lowalt.common.config import load, merge
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.common.splits import fold
+from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES, called
 from lowalt.effects.hear import Scene
-from lowalt.errors import InputError
 from lowalt.motion import write_table
-from lowalt.network import Network
 from lowalt.noise.__main__ import noisy_signals
 from lowalt.report.__main__ import EFFECT_COLUMNS
 from lowalt.report.effect_calls import asked_snrs, calls
@@ -32,8 +34,6 @@ from lowalt.report.effect_samples import (
 from lowalt.report.effects import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
 from lowalt.report.effects_figure import figure, most_changed
 from lowalt.report.tables import read_csv
-from lowalt.splits import fold
-from lowalt.streams import stream
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.tiles import resize, split
 from lowalt.tiles.__main__ import renderer

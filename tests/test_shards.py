@@ -13,16 +13,16 @@ import pytest
 import webdataset
 from PIL import Image
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.common.splits import fold
 from lowalt.motion import COLUMNS, write_table
-from lowalt.network import Network
 from lowalt.shards import ShardSet, faults
 from lowalt.shards.__main__ import main
 from lowalt.shards.record import geometry, record, sample_key, snr_label
 from lowalt.shards.size import main as size_main
 from lowalt.shards.size import models_per_chunk, sample_bytes
 from lowalt.shards.table import map_samples
-from lowalt.splits import fold
 from lowalt.tiles import decode, encode, files, resize, split
 from test_tiles import IMAGES, NETWORK, SPECTRA, echoes, renderer
 

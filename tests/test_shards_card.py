@@ -8,7 +8,7 @@ import shutil
 import pytest
 import yaml
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.shards import ShardSet
 from lowalt.shards.card import main
 from test_shards import RENDER, SEED, SNRS, SPLIT, build

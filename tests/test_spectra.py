@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference_spectra as reference
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.spectra import Fourier, Spectra, Transfer, magnitudes, trp, vrp, vt, windows
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 

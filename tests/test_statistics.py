@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lowalt.common.streams import stream
 from lowalt.recognition import statistics
-from lowalt.streams import stream
 
 
 def test_accuracy_and_confusion_count_what_a_loop_counts():

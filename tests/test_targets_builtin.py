@@ -12,8 +12,8 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from lowalt.errors import InputError
-from lowalt.files import slug
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
 from lowalt.targets.assemble import allot, turn
 from lowalt.targets.builtin import MODULES, builtin_cloud
 from lowalt.targets.cloud import check, read, write

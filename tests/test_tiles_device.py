@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lowalt.errors import InputError
-from lowalt.network import Network
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.spectra import Fourier, Spectra, Transfer
 from lowalt.tiles import Images, Renderer, Scale, split
 from test_tiles import SCALES, echoes, renderer

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 import yaml
 
-from lowalt.config import load_yaml
+from lowalt.common.config import load_yaml
+from lowalt.common.files import slug
+from lowalt.common.network import Network
 from lowalt.echo import Rigid, echo_signal
-from lowalt.files import slug
 from lowalt.motion import poses, read_table
-from lowalt.network import Network
-from lowalt.sources import PACKAGE, sources
 from lowalt.targets.cloud import read
+from lowalt.workflow.sources import PACKAGE, sources
 
 pytest.importorskip("snakemake")
 pytestmark = pytest.mark.workflow
@@ -148,7 +148,7 @@ def test_a_changed_setting_re_runs_its_stage_and_what_follows(finished, tmp_path
 
 
 @pytest.mark.parametrize(
-    ("file", "first"), [("echo/engine.py", "echo"), ("noise/awgn.py", "noise"), ("shards/tar.py", "shard")]
+    ("file", "first"), [("echo/api.py", "echo"), ("noise/awgn.py", "noise"), ("shards/tar.py", "shard")]
 )
 def test_edited_code_re_runs_its_stage_and_what_follows(finished, file, first):
     path = finished / "src/lowalt" / file
@@ -223,7 +223,7 @@ def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
     assert set(seen) == set(RULES.values()) - {"gallery"}
     for rule, imported in seen.items():
         assert imported <= declared(rule), rule
-        assert "errors.py" in imported
+        assert "common/errors.py" in imported
 
 
 def test_any_one_sample_is_made_again_alone_from_its_row(finished):

@@ -5,7 +5,7 @@ import os
 import sys
 from pathlib import Path
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
 

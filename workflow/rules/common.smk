@@ -6,14 +6,14 @@ from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
-from lowalt.config import canonical, check
-from lowalt.environment import prepare
-from lowalt.errors import InputError
-from lowalt.network import Network
-from lowalt.files import slug
-from lowalt.plan import Plan
+from lowalt.common.config import canonical, check
+from lowalt.common.environment import prepare
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.common.files import slug
+from lowalt.common.plan import Plan
 from lowalt.recognition.schemes import named
-from lowalt.sources import sources
+from lowalt.workflow.sources import sources
 from lowalt.spectra import Spectra
 from lowalt.targets.records import load_records, missing_inputs, source_files
 from lowalt.tiles.settings import Images

@@ -5,7 +5,7 @@
 
 rule cost_table:
     input:
-        code=code("lowalt.echo.cost"),
+        code=code("lowalt.measure.echo_cost"),
         targets=config["targets"]["table"],
         clouds=cost_clouds,
     output:
@@ -21,7 +21,7 @@ rule cost_table:
         settings=cost_settings("network", "motion"),
     shell:
         "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
-        " python -m lowalt.echo.cost --settings {params.settings:q} --clouds {input.clouds:q}"
+        " python -m lowalt.measure.echo_cost --settings {params.settings:q} --clouds {input.clouds:q}"
         " --targets {input.targets:q} --out {output:q} 2> {log:q}"
 
 

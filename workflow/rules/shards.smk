@@ -71,4 +71,4 @@ rule configuration:
     params:
         settings=canonical(config),
     shell:
-        "python -m lowalt.config --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.common.config --settings {params.settings:q} --out {output:q} 2> {log:q}"

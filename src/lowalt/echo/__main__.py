@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
-from lowalt.echo.engine import echo_signal, explain
-from lowalt.echo.motion import Rigid, target
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
+from lowalt.echo.api import echo_signal, explain
+from lowalt.echo.scene import Rigid, target
 from lowalt.motion import poses, read_table
-from lowalt.network import Network
 from lowalt.targets.cloud import Cloud, cloud_of, read
 
 

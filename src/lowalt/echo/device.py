@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 
-from lowalt.echo.motion import check
-from lowalt.echo.precise import reference
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network, Station
+from lowalt.echo.pointwise.reference_range import reference
+from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.echo.terms import aim_cosines
-from lowalt.errors import InputError
-from lowalt.network import Network, Station
+from lowalt.echo.scene import check
 
 ROOM = 2**23
 """Most numbers in a work array; it sets how many cells are computed at a time."""

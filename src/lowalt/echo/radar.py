@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 
 LIGHT = Fraction(int(SPEED_OF_LIGHT))
 

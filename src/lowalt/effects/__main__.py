@@ -4,13 +4,13 @@ import sys
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene, hear
-from lowalt.errors import InputError
-from lowalt.files import replacing
 from lowalt.motion import read_table
-from lowalt.network import Network
 from lowalt.targets.cloud import Cloud, cloud_of, read
 
 

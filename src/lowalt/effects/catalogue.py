@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from types import ModuleType
 from typing import NamedTuple
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 ORDER = (
     "motion/rotor_spread",

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import need, waveform
 from lowalt.effects.catalogue import BY_NEED, Effect, placed
 from lowalt.effects.response import Way, response
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
-from lowalt.network import SPEED_OF_LIGHT
 
 
 class Outcome(NamedTuple):

@@ -11,17 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.config import load
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
+from lowalt.common.hardware import describe
+from lowalt.common.network import Network
+from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.echo import explain as explain_echo
 from lowalt.effects.catalogue import BY_NEED, PLACES, Effect, called
 from lowalt.effects.facts import check
 from lowalt.effects.hear import Scene, hear, observe
-from lowalt.errors import InputError
-from lowalt.hardware import describe
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.network import Network
-from lowalt.streams import stream
 from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import CATEGORIES, Cloud
 from lowalt.targets.records import load_records

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.effects.catalogue import called
-from lowalt.errors import InputError
-from lowalt.network import Network
 
 
 class Facts(NamedTuple):

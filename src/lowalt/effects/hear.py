@@ -10,15 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.network import Network, Station
+from lowalt.common.power import rms
+from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, Effect, placed
 from lowalt.effects.chain import Chain, Outcome
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
-from lowalt.network import Network, Station
-from lowalt.power import rms
-from lowalt.streams import stream
 from lowalt.targets.cloud import Cloud
 
 

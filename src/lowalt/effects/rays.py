@@ -8,10 +8,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from lowalt.echo.compile import kernel
-from lowalt.echo.fits import smooth
-from lowalt.echo.lanes import horner
-from lowalt.echo.terms import dirichlet
+from lowalt.common.jit import kernel
+from lowalt.echo.fast.polynomials import smooth
+from lowalt.echo.fast.vector_loops import horner
+from lowalt.echo.pointwise.terms import dirichlet
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 DEGREE = 11

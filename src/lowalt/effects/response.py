@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import factorial, jv
 
-from lowalt.echo.precise import reference
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.echo.pointwise.reference_range import reference
+from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.echo.terms import aim_cosines
 from lowalt.effects import interpolation, rays
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
 
 
 class Way(NamedTuple):

@@ -5,9 +5,9 @@ from functools import cached_property
 
 import numpy as np
 
+from lowalt.common.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.motion.poses import Perturbation, placed, poses, rotated
-from lowalt.network import Network, Station
 from lowalt.targets.cloud import Cloud
 
 

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lowalt.network import Network, Station
+from lowalt.common.network import Network, Station
 
 QPSK = np.exp(1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
 """The four data symbols, of unit modulus."""

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets.cloud import Cloud
 
 

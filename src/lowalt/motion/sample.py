@@ -9,7 +9,7 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.motion.poses import attitude
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.targets.cloud import Cloud

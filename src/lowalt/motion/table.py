@@ -4,8 +4,8 @@ import csv
 import math
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 
 PHASES = 16
 """Most moving parts with a phase of their own (EH216-S flown as coaxial pairs has 16 rotors)."""

@@ -4,12 +4,12 @@ import sys
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.streams import stream
 from lowalt.motion import read_table
 from lowalt.noise.awgn import add_noise
-from lowalt.streams import stream
 
 
 def noisy_signals(

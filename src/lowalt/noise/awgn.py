@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.power import rms
+from lowalt.common.errors import InputError
+from lowalt.common.power import rms
 
 
 def add_noise(

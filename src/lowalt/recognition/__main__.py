@@ -4,12 +4,12 @@ import json
 import sys
 from pathlib import Path
 
-from lowalt.command import parser, pick, run
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, Scheme, named, read
-from lowalt.yaml_files import load_yaml
 
 SCHEMES = "config/schemes.csv"
 

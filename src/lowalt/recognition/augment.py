@@ -15,8 +15,8 @@ Settings of this module, the block `recognition.augmentation` (zeros change noth
 
 import numpy as np
 
-from lowalt.command import pick
-from lowalt.errors import InputError
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import SPECTRA
 
 KEYS = ("mirror", "shift_doppler", "shift_time", "contrast", "mask_doppler", "mask_time", "drop_view")

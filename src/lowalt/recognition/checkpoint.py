@@ -11,8 +11,8 @@ from pathlib import Path
 
 import torch
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 
 
 def _digest(state: object) -> str:

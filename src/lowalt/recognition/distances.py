@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
 from lowalt.motion import positions
 from lowalt.targets.cloud import CATEGORIES, Cloud
 

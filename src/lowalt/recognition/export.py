@@ -5,8 +5,8 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
 from lowalt.recognition.runs import Trained
 
 

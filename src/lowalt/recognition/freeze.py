@@ -5,8 +5,8 @@ The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies
 
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing, sha256
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, sha256
 
 
 def freeze(paths: list[str | Path], out: str | Path) -> None:

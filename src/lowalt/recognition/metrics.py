@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 Metrics = Callable[[int, dict[str, float]], None]
 

@@ -23,8 +23,8 @@ import torch
 from safetensors import SafetensorError
 from torch import nn
 
-from lowalt.command import pick
-from lowalt.errors import InputError
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
 CLASSES = 4

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lowalt.common.streams import stream
 from lowalt.recognition.samples import Facts
-from lowalt.streams import stream
 
 
 def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model: int) -> np.ndarray:

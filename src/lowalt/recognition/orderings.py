@@ -4,8 +4,8 @@ import csv
 from collections.abc import Iterable
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),

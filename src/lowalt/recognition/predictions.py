@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 from lowalt.recognition.samples import Facts
 
 CLASSES = ("p_uav", "p_bird", "p_vehicle", "p_pedestrian")

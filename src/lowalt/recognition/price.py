@@ -23,12 +23,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.streams import stream
 from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
 from lowalt.recognition.statistics import accuracy_by, bootstrap, pareto
 from lowalt.recognition.tables import Run, snr_text
-from lowalt.streams import stream
 
 COLUMNS = (
     "scheme", "kind", "backbone", "pixels", "stations", "spectra", "steps", "train_samples", "parameters", "snr_db",

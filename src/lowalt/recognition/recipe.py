@@ -29,9 +29,9 @@ import os
 import torch
 from torch import nn
 
-from lowalt.command import pick
-from lowalt.errors import InputError
-from lowalt.streams import digest
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
+from lowalt.common.streams import digest
 
 KEYS = (
     "steps", "batch", "snrs_per_model", "rate", "backbone_rate", "weight_decay", "warmup", "clip",

@@ -14,10 +14,10 @@ import numpy as np
 import timm
 import torch
 
-from lowalt.command import pick
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.hardware import describe
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.hardware import describe
 from lowalt.recognition import augment, checkpoint, metrics, network, predictions, recipe
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
@@ -145,7 +145,7 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
     Raises: InputError for another kind of file or a shape that does not fit.
     """
-    from lowalt.network import Network
+    from lowalt.common.network import Network
     from lowalt.spectra import Spectra
     from lowalt.tiles import Images, Renderer, decode, split
 

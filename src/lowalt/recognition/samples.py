@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 
 VIEWS = 9
 

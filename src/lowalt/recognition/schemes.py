@@ -20,8 +20,8 @@ import csv
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing, slug
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, slug
 
 STATIONS = ("A", "B", "C")
 SPECTRA = ("VRP", "TRP", "VT")

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 from lowalt.recognition.predictions import CLASSES
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion

@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
-from lowalt.command import pick
-from lowalt.hardware import describe
+from lowalt.common.command import pick
+from lowalt.common.hardware import describe
 from lowalt.recognition import network, recipe
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.schemes import SPECTRA, Scheme

@@ -26,8 +26,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.streams import stream
 from lowalt.recognition import predictions
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
@@ -42,7 +43,6 @@ from lowalt.recognition.statistics import (
     reliability,
     threshold,
 )
-from lowalt.streams import stream
 from lowalt.targets.cloud import CATEGORIES
 
 DETECTIONS = (0.9, 0.95, 0.99)

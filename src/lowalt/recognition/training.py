@@ -17,8 +17,9 @@ from timm.utils import ModelEmaV3
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint
 from lowalt.recognition.augment import augment
 from lowalt.recognition.inference import Machine, probabilities
@@ -26,7 +27,6 @@ from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.recipe import check, optimiser, schedule
 from lowalt.recognition.statistics import cross_entropy
-from lowalt.streams import stream
 
 HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
 

@@ -19,11 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.streams import stream
 from lowalt.recognition.statistics import bootstrap
 from lowalt.recognition.tables import Run, snr_text
-from lowalt.streams import stream
 
 COLUMNS = (
     "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",

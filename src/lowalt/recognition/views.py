@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.network import Network
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.recognition import samples
 from lowalt.recognition.samples import VIEWS, Facts
 from lowalt.recognition.schemes import SPECTRA, STATIONS

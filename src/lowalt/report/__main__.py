@@ -9,9 +9,9 @@ from pathlib import Path
 import jinja2
 import yaml
 
-from lowalt.command import parser, pick, run
-from lowalt.files import existing, replacing, sha256
-from lowalt.hardware import describe
+from lowalt.common.command import parser, pick, run
+from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.hardware import describe
 from lowalt.motion import read_table
 from lowalt.report import figures, recognition
 from lowalt.report.cost_table import read_summary

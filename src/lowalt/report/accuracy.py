@@ -4,9 +4,9 @@ import argparse
 
 from matplotlib import pyplot as plt
 
-from lowalt.command import run
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
 from lowalt.report.figures import SNR_LABELS, png
 from lowalt.report.tables import read_csv
 

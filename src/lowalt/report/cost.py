@@ -4,7 +4,8 @@
         --out-table cost_pixels.csv --figure cost.png
 
 Settings: network, motion, spectra, images and cost blocks of the configuration, and its seed. `--table` is what
-`lowalt.echo.cost` measured on the same clouds; its rows with a cloud's own number of points tell the time saved.
+`lowalt.measure.echo_cost` measured on the same clouds; its rows with a cloud's own number of points tell the time
+saved.
 """
 
 import sys
@@ -14,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
 from lowalt.echo import echo_signal
-from lowalt.echo.cost import sample
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.network import Network
+from lowalt.measure.echo_cost import sample
 from lowalt.report.tables import read_csv
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud, read
@@ -180,7 +181,7 @@ def figure(measured: list[dict[str, str]], rows: list[dict]):
 def main(arguments: list[str]) -> None:
     """Count the pixels that change, and write the table and the figure."""
     options = parser("lowalt.report.cost", __doc__.splitlines()[0])
-    options.add_argument("--table", required=True, help="what lowalt.echo.cost measured (.csv)")
+    options.add_argument("--table", required=True, help="what lowalt.measure.echo_cost measured (.csv)")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files, the same as that table's")
     options.add_argument("--targets", required=True, help="table of published targets (config/targets.csv)")
     options.add_argument("--out-table", required=True, help="table of changed pixels to write (.csv)")

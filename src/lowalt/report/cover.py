@@ -6,8 +6,8 @@ import sys
 import numpy as np
 from PIL import Image
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
 from lowalt.report.tiles import example_tiles
 from lowalt.shards import ShardSet
 

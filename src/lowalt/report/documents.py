@@ -8,9 +8,9 @@ beside the paper's, and which orderings hold) or `cost` (accuracy and its times)
 
 from pathlib import Path
 
-from lowalt.command import run
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 from lowalt.report.recognition import ordering_words
 from lowalt.report.tables import by_scheme, read_csv
 

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from lowalt.config import check, merge
+from lowalt.common.config import check, merge
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
 from lowalt.effects.facts import check as check_effects
-from lowalt.errors import InputError
-from lowalt.yaml_files import load_yaml
 
 ELSEWHERE = ("network", "targets", "motion", "spectra", "images", "split", "seed")
 """What a scene may not change here: its samples would no longer be the run's."""

@@ -15,16 +15,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.common.hardware import describe
+from lowalt.common.network import Network
+from lowalt.common.splits import fold
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene, hear
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
-from lowalt.hardware import describe
 from lowalt.motion import read_table
-from lowalt.network import Network
 from lowalt.noise.__main__ import noisy_signals
-from lowalt.splits import fold
 from lowalt.targets.cloud import CATEGORIES, Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
 from lowalt.tiles.__main__ import renderer

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES
-from lowalt.errors import InputError
-from lowalt.files import replacing
 from lowalt.report.effect_samples import read_samples
-from lowalt.streams import stream
 
 COLUMNS = (
     "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",

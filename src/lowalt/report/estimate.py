@@ -11,10 +11,10 @@ import math
 import sys
 from pathlib import Path
 
-from lowalt.config import load
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.plan import Plan
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.plan import Plan
 from lowalt.recognition.schemes import SPECTRA, STATIONS, read
 from lowalt.report.tables import read_csv
 from lowalt.targets.records import load_table

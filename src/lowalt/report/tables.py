@@ -6,8 +6,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 
 
 def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:

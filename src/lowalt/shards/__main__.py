@@ -2,10 +2,10 @@
 
 import argparse
 
-from lowalt.command import parser, pick, run
-from lowalt.errors import InputError
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.motion import read_table
-from lowalt.network import Network
 from lowalt.shards.index import build
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults

@@ -14,9 +14,9 @@ import numpy as np
 import yaml
 
 from lowalt import __version__
-from lowalt.command import run
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing, sha256
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, sha256
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.read import ShardSet
 

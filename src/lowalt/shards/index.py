@@ -8,8 +8,8 @@ import hashlib
 import json
 from pathlib import Path
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing, sha256
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, sha256
 from lowalt.shards.table import read_header, table_path
 
 FORMAT = "lowalt-shards-1"

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.streams import stream
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, sha256
-from lowalt.network import Network
-from lowalt.plan import GROUPS
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, sha256
+from lowalt.common.network import Network
+from lowalt.common.plan import GROUPS
+from lowalt.common.splits import FOLDS
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
 from lowalt.spectra import Spectra
-from lowalt.splits import FOLDS
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import VIEWS, Renderer, split
 from lowalt.tiles.resample import resize

@@ -8,9 +8,9 @@ import math
 import numpy as np
 
 from lowalt import __version__
-from lowalt.files import slug
-from lowalt.network import Network
-from lowalt.streams import digest
+from lowalt.common.files import slug
+from lowalt.common.network import Network
+from lowalt.common.streams import digest
 from lowalt.targets.cloud import CATEGORIES
 
 

@@ -2,12 +2,12 @@
 
 import argparse
 
-from lowalt.command import run
-from lowalt.config import load_yaml
-from lowalt.errors import InputError
-from lowalt.network import Network
+from lowalt.common.command import run
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.common.splits import FOLDS
 from lowalt.shards.tar import BLOCK
-from lowalt.splits import FOLDS
 
 RECORD_BYTES = 2048
 """Space of a sample's JSON record in the tar, padded."""

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 from lowalt.tiles.files import map_array
 
 SAMPLE = np.dtype(

@@ -9,7 +9,7 @@ import tarfile
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 BLOCK = 512
 RECORD = 10240

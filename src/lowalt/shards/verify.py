@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import sha256
+from lowalt.common.errors import InputError
+from lowalt.common.files import sha256
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.tar import BLOCK

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import replacing
-from lowalt.network import Network
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
+from lowalt.common.splits import FOLDS, fold
 from lowalt.shards.record import rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Writer
-from lowalt.splits import FOLDS, fold
 from lowalt.targets.cloud import CATEGORIES
 
 

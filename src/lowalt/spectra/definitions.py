@@ -6,8 +6,8 @@ use the single-pass kernels of `lowalt.spectra.sliding`, which compute the same 
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.spectra.settings import Fourier, Spectra, windows
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.command import pick
-from lowalt.errors import InputError
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
 
 
 def _whole(where: str, value: object, least: int) -> int:

@@ -3,8 +3,8 @@
 import os
 from pathlib import Path
 
-from lowalt.command import parser, pick, run
-from lowalt.errors import InputError
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
 from lowalt.targets.cloud import Cloud, write
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.sampling import face_normals, sample_surface, thin
 from lowalt.targets.surfaces import Surface, inside, merged

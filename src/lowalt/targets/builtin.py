@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.streams import stream
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.assemble import assemble
 from lowalt.targets.cloud import Cloud

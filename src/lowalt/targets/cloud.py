@@ -24,8 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")

@@ -4,8 +4,8 @@ import argparse
 import csv
 from pathlib import Path
 
-from lowalt.command import run
-from lowalt.files import replacing
+from lowalt.common.command import run
+from lowalt.common.files import replacing
 from lowalt.targets.records import load_records
 
 COLUMNS = ("subtype", "category", "figure", "value", "unit", "source")

@@ -11,9 +11,9 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-from lowalt.command import run
-from lowalt.errors import InputError
-from lowalt.files import replacing, sha256
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing, sha256
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
 TIMEOUT_S = 60

@@ -9,7 +9,7 @@ import json
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import gait_run, gait_walk
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation

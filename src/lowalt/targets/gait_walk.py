@@ -8,7 +8,7 @@ Source: "A global human walking model with real-time kinematic personification",
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:

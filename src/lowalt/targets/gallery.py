@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.command import run
-from lowalt.files import replacing
+from lowalt.common.command import run
+from lowalt.common.files import replacing
 from lowalt.targets.cloud import CATEGORIES, Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS
 

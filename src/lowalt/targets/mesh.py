@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import sha256
-from lowalt.streams import stream
+from lowalt.common.errors import InputError
+from lowalt.common.files import sha256
+from lowalt.common.streams import stream
 from lowalt.targets import bird, vehicle
 from lowalt.targets.assemble import Part, allot, sample_part
 from lowalt.targets.builtin import checksum

@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation

@@ -28,7 +28,7 @@ from pathlib import Path
 
 import jsonschema
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.mesh_files import UNITS_M
 

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import sha256
+from lowalt.common.errors import InputError
+from lowalt.common.files import sha256
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
 from lowalt.targets.mocap_files import Skeleton, read_motion, read_skeleton

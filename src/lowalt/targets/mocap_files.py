@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 from lowalt.targets.skeleton import LIMBS, NODES
 
 INCH_M = 0.0254

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
-from lowalt.environment import INPUTS
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.command import parser, pick, run
+from lowalt.common.environment import INPUTS
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 from lowalt.targets.assemble import Part, turn
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged

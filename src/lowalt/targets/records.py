@@ -10,10 +10,10 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from lowalt.errors import InputError
-from lowalt.files import existing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.common.yaml_files import load_yaml
 from lowalt.targets.cloud import CATEGORIES
-from lowalt.yaml_files import load_yaml
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = ("source", "points", "rcs_m2_per_point")

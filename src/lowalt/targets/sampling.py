@@ -7,7 +7,7 @@ drawn systematically, which halves the unevenness before thinning and spares the
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 
 def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.command import parser, pick, run
-from lowalt.errors import InputError
-from lowalt.files import existing
-from lowalt.network import Network
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.common.network import Network
 from lowalt.spectra import Spectra
 from lowalt.tiles import files
 from lowalt.tiles.png import encode

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 from lowalt.tiles.render import VIEWS, Renderer
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import deflate
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.files import existing, replacing
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
 
 
 def _header(dtype: str, count: int) -> bytes:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT, Network
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.spectra.settings import Spectra, windows
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps

@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 
 @lru_cache(maxsize=64)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 SCALES = ("linear", "decibel", "power")
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lowalt.command import pick
-from lowalt.errors import InputError
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
 from lowalt.tiles.colour import colour_map
 from lowalt.tiles.scale import Scale
 

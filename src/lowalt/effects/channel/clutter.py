@@ -11,12 +11,12 @@ import numpy as np
 from scipy.fft import next_fast_len
 from scipy.special import gamma, gammaincinv
 
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
-from lowalt.echo.terms import aim_cosines
 from lowalt.effects.facts import Facts, above_ground
 from lowalt.effects.view import View
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT, Network, Station
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import j1
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects.view import View
-from lowalt.network import SPEED_OF_LIGHT
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (

@@ -7,12 +7,12 @@ back by either route gives four echoes; the response forms them. Points are take
 import numpy as np
 from scipy.special import i0e
 
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects.facts import Facts, above_ground
 from lowalt.effects.response import Way
 from lowalt.effects.view import View
-from lowalt.errors import InputError
-from lowalt.network import SPEED_OF_LIGHT
 
 SOURCE = (
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "

@@ -6,9 +6,9 @@ Waves of other routes (a ground reflection) are taken to be hidden where the dir
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.effects.channel.shadows import GRID, capsules, triangles
 from lowalt.effects.view import View
-from lowalt.errors import InputError
 
 SOURCE = (
     "geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5 (shadowing); "

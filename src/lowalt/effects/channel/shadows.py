@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from lowalt.echo.compile import kernel
+from lowalt.common.jit import kernel
 
 RAYS = kernel(error_model="numpy")
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects.view import View
-from lowalt.network import SPEED_OF_LIGHT
 
 SOURCE = "Balanis, Antenna Theory, 4th ed., 2016, section 4.4.1 (phase error of the far-field approximation)"
 DEFAULTS: dict[str, float] = {}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.errors import InputError
+from lowalt.common.errors import InputError
 
 SOURCE = (
     "this project's own error model, for the imperfect range-bin selection that the paper leaves out (Luo et al., "

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from lowalt.echo.compile import PLAIN
+from lowalt.common.jit import PLAIN
 
 
 class Steps(NamedTuple):

@@ -7,8 +7,8 @@ from statistics import NormalDist
 
 import numpy as np
 
-from lowalt.errors import InputError
-from lowalt.network import Network
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 
 CUT = 3.0
 """Standard deviations at which draws are cut."""

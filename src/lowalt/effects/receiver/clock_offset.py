@@ -8,9 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
-from lowalt.errors import InputError
 
 SOURCE = (
     "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using non-synchronized sampling, "

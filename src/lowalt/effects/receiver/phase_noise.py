@@ -7,9 +7,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.effects.receiver import _oscillator
 from lowalt.effects.waveform import Frame, turned
-from lowalt.errors import InputError
 
 SOURCE = (
     "IEEE Std 1139-2008 (L(f)); D. Petrovic, W. Rave, G. Fettweis, Effects of phase noise on OFDM systems with and "

@@ -6,9 +6,9 @@ Past the prefix it would take in the neighbouring symbol, whose data no scene st
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
-from lowalt.errors import InputError
 
 SOURCE = (
     "M. Speth, S. A. Fechtel, G. Fock, H. Meyr, Optimum receiver design for wireless broad-band systems using OFDM I, "

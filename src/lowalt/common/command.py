@@ -1,0 +1,74 @@
+"""What every stage's command line shares: the settings argument, clear failure, the peak memory.
+
+A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
+The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.
+"""
+
+import argparse
+import json
+import resource
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.common.memory import keep_freed_memory
+
+
+def parser(module: str, description: str) -> argparse.ArgumentParser:
+    """Return an argument parser for `python -m {module}` that already has `--settings`."""
+    result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
+    result.add_argument("--settings", required=True, type=_argument, metavar="JSON|@FILE", help="settings object")
+    return result
+
+
+def _argument(text: str) -> dict:
+    """`settings`, with its words kept: argparse replaces the message of any ValueError."""
+    try:
+        return settings(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def settings(text: str) -> dict:
+    """Return the settings object in `text`, a JSON object or `@` and the path of a file with one.
+
+    JSON has no infinity: the string "inf" stands for it wherever a number is expected.
+    Raises: InputError where the text is no JSON object.
+    """
+    source = text
+    if text.startswith("@"):
+        source = existing(text[1:], "--settings").read_text()
+    try:
+        value = json.loads(source)
+    except json.JSONDecodeError as error:
+        raise InputError(f"--settings {text[:80]!r}: not JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise InputError(f"--settings {text[:80]!r}: {type(value).__name__}, expected a JSON object")
+    return value
+
+
+def pick(block: dict, *keys: str) -> list:
+    """Return the values of exactly these keys of a settings block, in order.
+
+    Raises: InputError naming a missing or unknown key.
+    """
+    missing = [key for key in keys if key not in block]
+    unknown = [key for key in block if key not in keys]
+    if missing or unknown:
+        raise InputError(f"settings: missing {missing}, unknown {unknown}, expected exactly {sorted(keys)}")
+    return [block[key] for key in keys]
+
+
+def run(main: Callable[[list[str]], None]) -> None:
+    """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2."""
+    keep_freed_memory()
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    # ru_maxrss sees short peaks that sampling misses; KiB on Linux.
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{Path(sys.argv[0]).parent.name}: done, peak memory {peak:.0f} MiB", file=sys.stderr)

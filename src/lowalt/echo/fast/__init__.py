@@ -1,0 +1,1 @@
+"""The fast kernel: short polynomials for functions, a proved strongest cell, errors bounded beforehand."""

@@ -1,0 +1,101 @@
+"""Which precision and which polynomials a sample gets: a bound of the error first, then the cheapest that keeps it."""
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo.fast.polynomials import array_rule, smooth
+from lowalt.echo.radar import Radar
+
+SPREAD_LIMIT = 0.22
+"""Largest target radius over range that the fast kernel takes; nearer targets go to the general kernel."""
+FINEST = 1e-15
+"""Accuracy asked of every polynomial in the exact mode."""
+
+
+class Plan(NamedTuple):
+    """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
+    relative to the sum of amplitudes and to the sum of peak amplitudes; `single`: float32 after the phase; `near`:
+    ranges by polynomials rather than roots; `fits`: of the range, of 1 / r, cosine, sine."""
+
+    fit: float
+    share: float
+    peak: float
+    single: bool
+    near: bool
+    fits: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+WAVES = (5, 7, 10)
+"""Degrees in t^2 of cosine and sine that `lanes` has loops for."""
+BLOCK = 128
+"""Most float32 numbers summed as such: more would round away what a tolerance of 1e-4 leaves."""
+SINGLE = 400 * 2.0**-24
+"""Least error for which float32 after the phase is worth trying: what its bound comes to."""
+
+
+def rules(radar: Radar):
+    """Cosine sums of the horizontal and vertical gain, for `fast.run`."""
+    return (
+        *array_rule(radar.transmit_h, radar.receive_h, radar.kappa),
+        *array_rule(radar.transmit_v, radar.receive_v, radar.kappa),
+    )
+
+
+def round_up(value: float, steps: int = 2) -> float:
+    """Next of `steps` steps an octave, so that few polynomials serve all samples."""
+    return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
+
+
+def plan(radar: Radar, spread: float, size_m: float, points: int, error: float) -> Plan:
+    """Return the cheapest plan whose bound is about `error` relative to the sum of amplitudes.
+
+    spread: largest target radius over range; size_m: largest radius (m). `error` below FINEST means the exact mode.
+    """
+    return _plan(
+        radar.turns, radar.kappa, radar.transmit_h + radar.receive_h - 2, radar.transmit_v + radar.receive_v - 2,
+        min(0.5, round_up(2.01 * spread + spread * spread)), round_up(size_m), -(-points // 512),
+        2.0 ** math.floor(math.log2(max(error, FINEST))),
+    )  # fmt: skip
+
+
+@lru_cache(maxsize=4096)
+def _plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Plan:
+    wave = 2 * np.pi * turns * 2 * size_m
+    array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
+    unit = 2.0**-53
+    single = error > SINGLE
+    coarse = 2.0**-24 if single else unit
+    part = error / 6
+    excess, excess_error = smooth("excess", reach, 4)
+    inverse, inverse_error = smooth("inverse", reach, 3)
+    near = wave * excess_error + (2 + array_phase) * inverse_error <= 2 * part
+    if not near:
+        excess_error = inverse_error = 0.0
+    for degree in WAVES:
+        cosine, cosine_error = smooth("cosine", 0.25, degree)
+        sine, sine_error = smooth("sine", 0.25, degree)
+        if cosine_error + 0.5 * sine_error <= 2 * part:
+            break
+    # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
+    # and the products that make the amplitude another 16.
+    rounding = (16 * wave + 8 * array_phase + 30) * unit + (85 + 16) * coarse + tiles * unit
+    share = wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
+    kind = np.float32 if single else np.float64
+    fits = (excess, inverse, cosine.astype(kind), sine.astype(kind))
+    peak = array_phase * inverse_error + 8 * array_phase * unit
+    return Plan(max(part, FINEST), share, peak, single, bool(near), fits)
+
+
+def general_share(radar: Radar, size_m: float, points: int) -> tuple[float, float]:
+    """Bound of the general kernel's error relative to its sums of amplitudes and of risks (`terms.terms`).
+
+    Phase: a range difference carries a few roundings of the offset, whatever the range; the rest is sums. Risk: the
+    roundings of a direction cosine, as the gains and the array's phase see them.
+    """
+    elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v
+    wave = 2 * np.pi * radar.turns * 2 * size_m
+    share = (20 * wave + 200 + points) * 2.0**-53
+    return float(share), float(40 * (1 + np.pi * radar.kappa / 2 * (elements - 4)) * 2.0**-53)

@@ -1,0 +1,182 @@
+"""Short polynomials in place of functions, each with a bound of its error proved before it is used.
+
+Array gains and the range-cell kernel are finite sums of cosines, so over a short stretch their Chebyshev
+coefficients are Bessel functions, |2 J_p(B)| <= 2 (B/2)^p / p!; B is the band times half the stretch.
+"""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from lowalt.common.jit import LEAN, VECTOR
+
+TOP = 40
+"""Highest degree of any polynomial here; a stretch that would need more goes to the general kernel."""
+EXTRA = 8
+"""Taylor orders beyond the degree that are folded back into it (economisation)."""
+
+
+@LEAN
+def tail(band, degree):
+    """Bound of the error of `economised` for a sum of cosines with weights of sum 1 and phases up to `band` (rad)."""
+    half = 0.5 * band
+    term = 4.0
+    for p in range(1, degree + 2):
+        term *= half / p
+    ratio = half / (degree + 2)
+    cut = 1.0
+    for p in range(1, degree + EXTRA + 2):
+        cut *= band / p
+    other = band / (degree + EXTRA + 2)
+    if ratio >= 0.9 or other >= 0.9:
+        return np.inf
+    return term / (1.0 - ratio) + cut / (1.0 - other)
+
+
+@LEAN
+def degree_for(band, error):
+    """Smallest degree whose `tail` is at most `error`; TOP + 1 where none is."""
+    for degree in range(TOP + 1):
+        if tail(band, degree) <= error:
+            return degree
+    return TOP + 1
+
+
+@lru_cache(maxsize=1)
+def folding() -> np.ndarray:
+    """Weights (TOP + 1, EXTRA, TOP + 1): x^(d + 1 + j) on [-1, 1], truncated after T_d, as powers of x."""
+    top = TOP + EXTRA + 1
+    # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2 x T_n - T_{n-1}.
+    shares, powers = np.zeros((top + 1, top + 1)), np.zeros((TOP + 1, TOP + 1))
+    shares[0, 0] = shares[1, 1] = powers[0, 0] = powers[1, 1] = 1.0
+    for p in range(1, top):
+        shares[p + 1, 1:] = shares[p, :-1] / 2
+        shares[p + 1, :-1] += shares[p, 1:] / 2
+        shares[p + 1, 1] += shares[p, 0] / 2
+    for n in range(1, TOP):
+        powers[n + 1, 1:] = 2 * powers[n, :-1]
+        powers[n + 1] -= powers[n - 1]
+    result = np.zeros((TOP + 1, EXTRA, TOP + 1))
+    for degree in range(TOP + 1):
+        result[degree] = shares[degree + 1 : degree + 1 + EXTRA, : degree + 1] @ powers[: degree + 1]
+    return result
+
+
+@VECTOR
+def economised(weights, rates, phase, centre, half, degree, fold, room, out):
+    """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s.
+
+    Rates are not negative; room: (3, at least as many as rates), overwritten.
+    """
+    count = len(weights)
+    term, even, odd = room[0], room[1], room[2]
+    for i in range(count):
+        angle = rates[i] * centre + phase
+        term[i], even[i], odd[i] = weights[i], math.cos(angle), -math.sin(angle)
+    out[:] = 0.0
+    for p in range(degree + EXTRA + 1):
+        value = 0.0
+        sign = -1.0 if p & 2 else 1.0
+        step = half / (p + 1)
+        if p & 1:
+            for i in range(count):
+                value += term[i] * odd[i]
+                term[i] *= rates[i] * step
+        else:
+            for i in range(count):
+                value += term[i] * even[i]
+                term[i] *= rates[i] * step
+        value *= sign
+        if p <= degree:
+            out[p] += value
+        else:
+            for k in range(degree + 1):
+                out[k] += fold[degree, p - degree - 1, k] * value
+
+
+def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The same sum of cosines with rates +-r joined: only rates >= 0, largest first."""
+    order = np.argsort(-rates, kind="stable")
+    weights, rates = weights[order], rates[order]
+    keep = (len(rates) + 1) // 2
+    weights = 2 * weights[:keep]
+    if len(rates) % 2:
+        weights[-1] /= 2
+        rates = np.append(rates[: keep - 1], 0.0)
+    return weights, np.ascontiguousarray(rates[:keep])
+
+
+@lru_cache(maxsize=64)
+def cell_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Weights and rates (rad a cell) of a short cosine sum equal to the cell kernel of `count` subcarriers.
+
+    Gauss rule of the subcarriers' own uniform discrete measure (recurrence of the discrete Chebyshev polynomials):
+    32 nodes are exact to degree 63, which leaves less than 1e-17 at seven cells' distance.
+    """
+    nodes = min(count, 32)
+    k = np.arange(1, nodes)
+    off = np.sqrt(k**2 * (count**2 - k**2) / (4.0 * (4.0 * k**2 - 1.0)))
+    values, vectors = np.linalg.eigh(np.diag(off, 1) + np.diag(off, -1))
+    weights = vectors[0] ** 2
+    return _half(weights / weights.sum(), 2 * np.pi / count * values)
+
+
+CELL_REACH = 7.0
+"""Distance (cells) up to which `cell_rule` holds."""
+
+
+@lru_cache(maxsize=64)
+def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, np.ndarray]:
+    """Weights (of sum 1) and rates (rad per unit of direction cosine) of U_{T-1} U_{R-1} / (T R) as a cosine sum."""
+    weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
+    top = transmit + receive - 2
+    return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
+
+
+@lru_cache(maxsize=1)
+def _nodes() -> tuple[np.ndarray, np.ndarray]:
+    """The 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
+
+    Extended precision where the machine has it, so that the transform's own rounding does not look like a tail.
+    """
+    count = 96
+    angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count) + np.longdouble(0.5)) / count
+    matrix = 2 * np.cos(np.arange(count)[:, None] * angle) / count
+    matrix[0] /= 2
+    return np.cos(angle), matrix
+
+
+@lru_cache(maxsize=1024)
+def _expansion(kind: str, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Chebyshev coefficients (96,) of a function of `smooth`, and for each degree the error of stopping there."""
+    s, matrix = _nodes()
+    if kind in ("cosine", "sine"):
+        turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt(reach / 2 + reach / 2 * s)
+        value = np.cos(turn) if kind == "cosine" else 8 * np.arctan(np.longdouble(1)) * np.sin(turn) / turn
+    else:
+        root = np.sqrt(1 + reach * s)
+        value = 1 / root if kind == "inverse" else 1 / (1 + root)
+    coefficients = matrix @ value
+    noise = max(64 * float(np.finfo(np.longdouble).eps), 1e-17) * float(abs(coefficients).max())
+    size = np.where(abs(coefficients) < noise, 0, abs(coefficients)).astype(np.float64)
+    return coefficients, np.append(np.cumsum(size[::-1])[::-1][1:], 0.0) + 2e-16
+
+
+@lru_cache(maxsize=1024)
+def smooth(kind: str, reach: float, degree: int) -> tuple[np.ndarray, float]:
+    """Coefficients of a polynomial of `degree` for one of the fixed functions on [-reach, reach], and its error bound.
+
+    kind "inverse": (1 + x)^(-1/2); "excess": (sqrt(1 + x) - 1) / x; both have their only singularity at x = -1.
+    "cosine", "sine": cos(2 pi t), sin(2 pi t) / t as functions of x = t^2, from 0 to reach. The bound is the sum of the
+    Chebyshev coefficients left out, computed with 96 nodes, plus rounding.
+    """
+    coefficients, tails = _expansion(kind, reach)
+    powers = chebyshev.cheb2poly(coefficients[: degree + 1])
+    if kind in ("cosine", "sine"):
+        inner = np.polynomial.Polynomial(np.array([-1, 2 / np.longdouble(reach)], np.longdouble))
+        powers = np.polynomial.Polynomial(powers)(inner).coef
+    else:
+        powers = powers / np.longdouble(reach) ** np.arange(len(powers))
+    return powers.astype(np.float64), float(tails[degree])

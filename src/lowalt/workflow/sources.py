@@ -1,0 +1,56 @@
+"""Which source files a module runs: its transitive imports inside the package, read from the syntax tree.
+
+The workflow declares them as inputs of each stage, so editing a module re-runs the stages that use it.
+"""
+
+import ast
+import functools
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+ROOT = PACKAGE.parent
+
+
+def _file(module: str) -> Path | None:
+    base = ROOT.joinpath(*module.split("."))
+    for path in (base / "__init__.py", base.with_suffix(".py")):
+        if path.is_file():
+            return path
+    return None
+
+
+@functools.cache
+def _imports(path: Path) -> tuple[str, ...]:
+    """Modules of the package that one file imports: anywhere in it, but in a `__main__` only at its top.
+
+    What a command imports inside its functions belongs to the subcommand asked for; the caller names those.
+    """
+    tree = ast.parse(path.read_text(), str(path))
+    found = []
+    for node in tree.body if path.name == "__main__.py" else ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(name for name in found if name.split(".")[0] == PACKAGE.name and _file(name))
+
+
+@functools.cache
+def sources(*modules: str) -> tuple[Path, ...]:
+    """Return the package's files that running `python -m` on these modules can import, sorted.
+
+    modules: as on the command line, then the modules that the subcommand in question imports by itself.
+    Raises: ModuleNotFoundError where there is no such module.
+    """
+    todo, seen = [], set()
+    for module in modules:
+        if _file(module) is None:
+            raise ModuleNotFoundError(module)
+        todo += [module, *([f"{module}.__main__"] if _file(f"{module}.__main__") else [])]
+    while todo:
+        name = todo.pop()
+        if name not in seen:
+            seen.add(name)
+            parent = name.rpartition(".")[0]
+            todo += [*([parent] if parent else []), *_imports(_file(name))]
+    return tuple(sorted({_file(name) for name in seen}))
