@@ -6,7 +6,8 @@ Ranges 1 m to 100 km, 1 to 5000 points, 0.5 to 100 GHz, any array sizes. Each sc
 and the two deepest fades. The judge (`lowalt.measure.echo_baselines`) sums elements and subcarriers one by one, its
 ranges in extended precision; it shares nothing with the closed form. A tolerance below a scene's floor is refused,
 which is counted, not judged. In every second scene the engine must use what the tolerance allows, also where the exact
-mode would be as fast. """
+mode would be as fast.
+"""
 
 import argparse
 import csv
