@@ -18,7 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import BelowFloor
 from lowalt.common.files import replacing
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.common.streams import stream
@@ -84,9 +84,7 @@ def examine(seed: int, index: int) -> list[dict]:
                 patch.object(pose_series, "WORTH", PRICES[index % 2][1]),
             ):
                 result = echo_signal(network, station, motion, rcs, aim, tolerance, sample=f"scene {index}")
-        except InputError as error:
-            if "below the floor" not in str(error):
-                raise
+        except BelowFloor:
             rows.append(row | {"refused": 1, "error": 0.0, "bound": 0.0, "wrong_cells": 0, "near_ties": 0})
             continue
         largest = abs(result.signal).max()

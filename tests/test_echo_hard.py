@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import reference
+from lowalt.common.errors import BelowFloor
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, echo_signal
 
@@ -180,9 +181,7 @@ def test_a_million_symbols_do_not_drift():
 
 @pytest.mark.parametrize("tolerance", [1e-16, 1e-14])
 def test_a_tolerance_below_the_floor_is_refused(tolerance):
-    from lowalt.common.errors import InputError
-
-    with pytest.raises(InputError, match="below the floor"):
+    with pytest.raises(BelowFloor, match="below the floor"):
         echo_signal(NET, NET.stations[0], cluster(130)[None], 1.0, away(128), tolerance)
 
 

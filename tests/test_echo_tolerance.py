@@ -120,23 +120,6 @@ def test_reference_ranges_hold_more_than_a_double(distance):
         assert abs(2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[5]) - mpmath.mpf(found[6])) < 1e-15
 
 
-def test_machine_code_follows_every_source_of_the_folder():
-    from lowalt.common import jit as compiling
-
-    key = compiling._SourceCache._index_key
-    from lowalt.echo.fast.driver import run
-
-    assert isinstance(run._cache, compiling._SourceCache) and compiling.DIGEST in _key_of(run._cache, key)
-
-
-def _key_of(cache, key) -> tuple:
-    class Codegen:
-        def magic_tuple(self):
-            return ("any",)
-
-    return key(cache, ("signature",), Codegen())
-
-
 @pytest.mark.parametrize("size, tolerance", [(0.4, None), (2.0, None), (2.0, 1e-2), (60.0, None)])
 def test_the_gap_is_a_lower_bound_that_says_something(size, tolerance):
     net = network(symbols=60)

@@ -1,5 +1,9 @@
-"""The one exception for bad input: what came in, where, and what was expected."""
+"""The exceptions for bad input: their message names the file, key or value, and what was expected instead."""
 
 
 class InputError(ValueError):
     """Bad input from outside; the message names the file, key or value and what was expected instead."""
+
+
+class BelowFloor(InputError):
+    """A tolerance smaller than the error bound that float64 arithmetic can prove for a sample."""

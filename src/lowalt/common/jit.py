@@ -1,39 +1,97 @@
-"""How the kernels are compiled: once a machine, kept on disk, and anew whenever any kernel's source changes.
+"""How kernels are compiled: once a machine, kept on disk, and again whenever the code that a kernel runs changes.
 
-numba's own cache looks at the file of a function only, not at the functions it calls in other files: an edit there
-would leave old machine code in use. Here the key of every entry holds a digest of the whole folder.
+numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
+files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
+kernel's bytecode, of all kernels and constants that it uses, of those that these use, and so on. Code that is not
+compiled has no part in it.
 """
 
 import hashlib
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from types import CodeType, FunctionType, ModuleType
 
+import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
 
 
-def _digest() -> str:
+def _text_of(value) -> str:
+    """Return a constant as text that is the same in every process."""
+    if isinstance(value, (set, frozenset)):
+        return f"set {sorted(map(_text_of, value))}"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(_text_of, value))})"
+    if isinstance(value, np.ndarray):
+        return f"array {value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    return repr(value)
+
+
+def _used(function: FunctionType) -> Iterator[tuple[str, object]]:
+    """Yield the names and values of globals, of attributes of modules, and of outer variables that a function uses."""
+    code = function.__code__
+    for name in code.co_names:
+        value = function.__globals__.get(name)
+        if isinstance(value, ModuleType):
+            held = vars(value)
+            yield from ((f"{name}.{inner}", held[inner]) for inner in code.co_names if inner in held)
+        elif value is not None:
+            yield name, value
+    for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
+    """Yield as text everything that the machine code of `function` is made from, each kernel that it calls once."""
+    name = f"{function.__module__}.{function.__qualname__}"
+    if name in seen:
+        return
+    seen.add(name)
+    code = function.__code__
+    yield f"{name} {code.co_code.hex()} {code.co_names} {code.co_varnames}"
+    for value in code.co_consts:
+        if isinstance(value, CodeType):
+            yield f"{value.co_code.hex()} {_text_of(value.co_consts)} {value.co_names}"
+        elif value != function.__doc__:
+            yield _text_of(value)
+    for label, value in _used(function):
+        if isinstance(value, Dispatcher):
+            options = sorted(value.targetoptions.items())
+            yield f"{label} {[(option, _text_of(setting)) for option, setting in options]}"
+            yield from _parts(value.py_func, seen)
+        elif isinstance(value, type) and hasattr(value, "_fields"):
+            yield f"{label} {value._fields}"
+        elif isinstance(value, (bool, int, float, complex, str, tuple, np.ndarray, np.generic)):
+            yield f"{label} {_text_of(value)}"
+
+
+def _fields(kind) -> tuple:
+    """Return the names of the fields of a named tuple's type, of those inside it, and so on, in their order."""
+    return (getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
+
+
+def digest(function: FunctionType) -> str:
+    """Return the SHA-256 of a kernel's bytecode and of all kernels, settings and constants that it uses."""
     total = hashlib.sha256()
-    for path in sorted((Path(__file__).parents[1] / "echo").rglob("*.py")):
-        total.update(path.name.encode() + b"\0" + path.read_bytes())
+    for part in _parts(function, set()):
+        total.update(part.encode() + b"\0")
     return total.hexdigest()
 
 
-DIGEST = _digest()
-"""SHA-256 of the folder's sources."""
-
-
-class _SourceCache(FunctionCache):
+class _DigestCache(FunctionCache):
     counted = True
     """Whether the function may use counted references, and so allocate."""
 
     def _index_key(self, sig, codegen):
-        return (*super()._index_key(sig, codegen), DIGEST)
+        return (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
 
     def load_overload(self, sig, target_context):
-        """Return finished machine code for a signature, or None; as numba's own, but for what it loads first."""
-        # numba's own would first load everything that a compilation may need, scipy.linalg included: a third of a
+        """Return finished machine code for a signature, or None.
+
+        Like numba's method, except that it does not load the compiler before it looks for finished machine code.
+        """
+        # numba's method first loads everything that a compilation may need, scipy.linalg included: a third of a
         # job's start. Finished machine code needs the counted references' runtime at most; compilation loads the rest.
         if self.counted:
             rtsys.initialize(target_context)
@@ -42,11 +100,11 @@ class _SourceCache(FunctionCache):
 
 
 def kernel(**options) -> Callable:
-    """Return a decorator like `numba.njit(**options)` with an on-disk cache that follows all sources of the folder."""
+    """Return a decorator like `numba.njit(**options)` whose on-disk cache follows everything that is compiled."""
 
     def wrap(function: Callable) -> Callable:
         compiled = njit(**options)(function)
-        compiled._cache = _SourceCache(function)
+        compiled._cache = _DigestCache(function)
         compiled._cache.counted = options.get("_nrt", True)
         return compiled
 
@@ -54,8 +112,8 @@ def kernel(**options) -> Callable:
 
 
 PLAIN = kernel()
-"""Every operation as written."""
+"""Every operation is done as written."""
 LEAN = kernel(error_model="numpy", _nrt=False)
-"""Without counted references (they took a quarter of the time, and their runtime loads slowly), so no allocation."""
+"""As written, without counted references: they took a quarter of the time. Such a function cannot allocate."""
 VECTOR = kernel(error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
-"""Lean, and sums may be reordered and products fused: the loops become vector instructions."""
+"""As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""

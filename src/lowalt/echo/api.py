@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import BelowFloor, InputError
 from lowalt.common.network import Network, Station
 from lowalt.echo import refine
 from lowalt.echo.pointwise import sums
@@ -63,7 +63,8 @@ def echo_signal(
     rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
     the sample's max |Y_bin|, None for the exact closed form; paths: all ways of the wave (default: the direct one
     alone); sample: a name for error messages.
-    Raises: InputError naming the argument, its value and the sample. Source: paper Eqs. 7 and 22 to 25.
+    Raises: InputError naming the argument, its value and the sample; BelowFloor, a kind of it, for a tolerance smaller
+    than the bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
     """
     _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
@@ -95,7 +96,7 @@ def echo_signal(
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
         where = f"{sample}: " if sample else ""
-        raise InputError(
+        raise BelowFloor(
             f"{where}tolerance is {tolerance}, below the floor of this sample: float64 can promise {bound:.1e} of its "
             f"largest value, expected a larger tolerance or null"
         )

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.command import parser, pick, run
-from lowalt.common.errors import InputError
+from lowalt.common.errors import BelowFloor
 from lowalt.common.files import replacing
 from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
@@ -120,9 +120,7 @@ def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, see
         call = functools.partial(echo_signal, *arguments, tolerance)
         try:
             call()
-        except InputError as refused:
-            if "below the floor" not in str(refused):
-                raise
+        except BelowFloor:
             continue
         # Calls of a millisecond: one interrupt would be a quarter of five of them.
         methods.append(("engine", tolerance or "exact", call, repeats, 8))

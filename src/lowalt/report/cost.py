@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.command import parser, pick, run
-from lowalt.common.errors import InputError
+from lowalt.common.errors import BelowFloor, InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
 from lowalt.echo import echo_signal
@@ -45,9 +45,7 @@ def signals(network: Network, given: tuple, tolerance: float | None) -> np.ndarr
     for place, station in enumerate(network.stations):
         try:
             found = echo_signal(network, station, *given, tolerance)
-        except InputError as refused:
-            if "below the floor" not in str(refused):
-                raise
+        except BelowFloor:
             found = echo_signal(network, station, *given)
         result[place] = found.signal
     return result

@@ -1,0 +1,76 @@
+"""Kept machine code follows what it is compiled from: kernels, constants and settings, however deep, and no more."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import lowalt
+from lowalt.common.jit import _DigestCache, digest
+from lowalt.echo.fast.driver import run
+from lowalt.effects.rays import routes
+
+PROGRAM = """
+from lowalt.common.jit import digest
+from lowalt.echo.fast.driver import run
+from lowalt.effects.rays import routes
+print(digest(run.py_func), digest(routes.py_func))
+"""
+
+
+def digests(package: Path) -> list[str]:
+    """Digests of the echo's main kernel and of one of the effects, from the sources in `package`."""
+    call = [sys.executable, "-c", PROGRAM]
+    done = subprocess.run(call, env={"PYTHONPATH": str(package.parent)}, capture_output=True, text=True, check=True)
+    return done.stdout.split()
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory):
+    place = tmp_path_factory.mktemp("sources") / "lowalt"
+    shutil.copytree(Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__"))
+    return place
+
+
+@pytest.fixture(scope="module")
+def before(package):
+    return digests(package)
+
+
+# file, text, its replacement, and whether the keys of the echo's and of the effects' kernel change by it
+EDITS = {
+    "a module without kernels": ("echo/api.py", "import numpy as np", "import numpy as np\nUNUSED = 1", [0, 0]),
+    "a function that is not compiled": ("echo/fast/polynomials.py", "nodes = min(count, 32)", "nodes = 31", [0, 0]),
+    "a comment in a kernel": ("echo/fast/vector_loops.py", "    k = degree - first", "    # Why.\n    k = degree - first",
+                              [0, 0]),
+    "a called kernel": ("echo/fast/vector_loops.py", "k = degree - first", "k = degree - first + 0", [1, 1]),
+    "a kernel called by a called one": ("echo/fast/polynomials.py", "half = 0.5 * band", "half = band * 0.5", [1, 0]),
+    "a constant": ("echo/fast/cell_kernel.py", "SIDE = 4", "SIDE = 3", [1, 0]),
+    "the settings of a called kernel": ("echo/pointwise/terms.py", "@PLAIN\ndef dirichlet", "@LEAN\ndef dirichlet",
+                                        [0, 1]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", EDITS)
+def test_the_key_changes_with_what_is_compiled_alone(case, package, before):
+    name, text, other, changed = EDITS[case]
+    path = package / name
+    kept = path.read_text()
+    assert text in kept
+    path.write_text(kept.replace(text, other))
+    try:
+        assert [int(new != old) for new, old in zip(digests(package), before, strict=True)] == changed
+    finally:
+        path.write_text(kept)
+
+
+def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
+    class Codegen:
+        def magic_tuple(self):
+            return ("processor",)
+
+    for compiled in (run, routes):
+        key = compiled._cache._index_key(("signature",), Codegen())
+        assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key
