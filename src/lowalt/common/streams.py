@@ -8,6 +8,8 @@ import hashlib
 
 import numpy as np
 
+from lowalt.common.draws import Draws
+
 Key = str | int | float
 
 
@@ -34,11 +36,11 @@ def digest(seed: int, purpose: str, *keys: Key) -> bytes:
     return hashlib.sha256(b"".join(parts)).digest()
 
 
-def stream(seed: int, purpose: str, *keys: Key) -> np.random.Generator:
-    """Return the generator of the stream (seed, purpose, *keys): NumPy's PCG64 seeded by SHA-256.
+def stream(seed: int, purpose: str, *keys: Key) -> Draws:
+    """Return the generator of the stream (seed, purpose, *keys): NumPy's PCG64 seeded by SHA-256, read by `Draws`.
 
     Raises: TypeError for a key that is no str, int or float.
     Source: NumPy's SeedSequence takes entropy of any size; 256 bits make collisions a non-event.
     """
     entropy = int.from_bytes(digest(seed, purpose, *keys), "little")
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence(entropy)))
+    return Draws(np.random.PCG64(np.random.SeedSequence(entropy)))
