@@ -79,8 +79,8 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
-	$(BIN)/python -m lowalt.report.estimate results/reference/default-stages.csv \
-		results/reference/default-accuracy_cost.csv workflow/schemas/config.schema.yaml results/reference/scale.csv config/default.yaml config/workstation.yaml config/paper.yaml
+	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
+		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/default/$$table.csv results/reference/tables-$$table.csv; done
@@ -94,7 +94,7 @@ reference:  ## keep the small tables of the finished default and real runs
 	for run in default real; do for table in $(REFERENCE); do cp results/$$run/$$table results/reference/$$run-$$table; done; done
 
 pictures: $(SETUP)  ## the README's picture, from the finished default run
-	$(BIN)/python -m lowalt.report.cover results/default/shards/index.json design/pictures/tiles.png
+	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
 
 pins: $(SETUP)  ## write the installed versions as the pins
 	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt

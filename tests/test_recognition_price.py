@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from lowalt.common.errors import InputError
-from lowalt.recognition import predictions, price, samples, schemes, statistics
+from lowalt.measure import accuracy_cost, network_speed
+from lowalt.recognition import predictions, samples, schemes, statistics
 from lowalt.recognition.tables import Run
-from lowalt.report.accuracy import draw
+from lowalt.report.figures.accuracy_cost import draw
 
 SNRS = (3.0, np.inf)
 HEAD = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
@@ -71,12 +72,12 @@ def table(tmp_path):
         "unseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here,2,0.3\n"
     )
     runs = [run_of(tmp_path, "small", 10), run_of(tmp_path, "base", 4)]
-    speeds = price.read_speeds(
+    speeds = accuracy_cost.read_speeds(
         [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
     )
     found = schemes.read(tmp_path / "schemes.csv")
     out = tmp_path / "accuracy_cost.csv"
-    price.write(runs, found, speeds, 280000.0, price.fidelity_rows(tmp_path / "transfer.csv"), out, 1)
+    accuracy_cost.write(runs, found, speeds, 280000.0, accuracy_cost.fidelity_rows(tmp_path / "transfer.csv"), out, 1)
     with out.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -103,12 +104,12 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
 def test_runs_without_speed_or_row_are_refused(table, tmp_path):
     found, run = schemes.read(tmp_path / "schemes.csv"), run_of(tmp_path, "base", 0)
     with pytest.raises(InputError, match="base"):
-        price.write([run], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+        accuracy_cost.write([run], found, {}, 1.0, [], tmp_path / "out.csv", 1)
     with pytest.raises(InputError, match="stranger"):
-        price.write([run_of(tmp_path, "stranger", 0)], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+        accuracy_cost.write([run_of(tmp_path, "stranger", 0)], found, {}, 1.0, [], tmp_path / "out.csv", 1)
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match=r"bad\.json: not a record of speed"):
-        price.read_speeds([tmp_path / "bad.json"])
+        accuracy_cost.read_speeds([tmp_path / "bad.json"])
 
 
 def test_the_figure_is_a_picture_and_repeats(table):
@@ -121,7 +122,7 @@ def test_the_figure_is_a_picture_and_repeats(table):
 
 
 def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
-    from lowalt.recognition.speed import least_s
+    from lowalt.common.timing import least_s
 
     now, spans = [0.0], itertools.chain([9.0, 3.0, 2.0, 4.0], itertools.repeat(5.0))
 
@@ -135,11 +136,9 @@ def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
 
 
 def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(monkeypatch):
-    from lowalt.recognition import speed
-
     # A clock that moves by a millisecond whenever it is read: every call takes one, whatever the machine is busy with.
     ticks = iter(range(10**9))
-    monkeypatch.setattr(speed, "_clock", lambda *_: lambda: 1e-3 * next(ticks))
+    monkeypatch.setattr(network_speed, "_clock", lambda *_: lambda: 1e-3 * next(ticks))
 
     training = {
         "steps": 10, "batch": 4, "snrs_per_model": 1, "rate": 1e-3, "backbone_rate": 1.0, "weight_decay": 0.0,
@@ -150,15 +149,15 @@ def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(mo
     block = {"backbone": "test_vit", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
              "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
     given = {"seed": 1, "size": 32, "colour_map": "gray", "network": block, "training": training, "augmentation": {}}
-    nine = speed.measure(schemes.Scheme("nine", (0, 1, 2), (0, 1, 2)), given, 0.3)
-    one = speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.3)
+    nine = network_speed.measure(schemes.Scheme("nine", (0, 1, 2), (0, 1, 2)), given, 0.3)
+    one = network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.3)
     for times in (nine, one):
         assert times["inference_ms_1"] == pytest.approx(1.0)
         assert times["inference_ms_64"] == pytest.approx(1 / 64)
         assert times["train_batch"] == 4
         assert times["train_ms"] == pytest.approx(1 / 4)
     # A call of 1 ms leaves no room for 64 samples in 50 ms; a fourth of 8 ms has none for two training samples.
-    assert speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.05)["inference_ms_64"] is None
-    assert speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.008)["train_batch"] == 1
+    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.05)["inference_ms_64"] is None
+    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.008)["train_batch"] == 1
     # Only the modality embedding grows with the spectra.
     assert nine["parameters"] - one["parameters"] == 2 * 64

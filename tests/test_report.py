@@ -12,8 +12,9 @@ from PIL import Image
 
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
-from lowalt.report import figures, recognition
-from lowalt.report.estimate import estimate, training_hours
+from lowalt.measure.scale import estimate, training_hours
+from lowalt.report.figures import style as figures
+from lowalt.report.sections import recognition
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
 
 BANDS = [
@@ -114,7 +115,7 @@ def test_training_scales_with_images_and_no_network_is_guessed_at():
 
 
 def test_the_page_does_without_any_picture_that_a_run_may_lack():
-    text = (Path(figures.__file__).parent / "page.html").read_text()
+    text = (Path(figures.__file__).parents[1] / "page.html").read_text()
     conditions = [found for found in re.findall(r"{% if (.*?) %}", text) if "images" in found]
     assert len(conditions) >= 2
     strict = jinja2.Environment(undefined=jinja2.StrictUndefined)

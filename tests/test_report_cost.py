@@ -7,11 +7,13 @@ import jinja2
 import numpy as np
 import pytest
 
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.echo_cost import COLUMNS as MEASURED
-from lowalt.report.cost import changes, figure, main, pixels, saved, signals
-from lowalt.report.cost_table import summary
-from lowalt.report.tables import read_csv
+from lowalt.measure.echo_pixels import changes, main, pixels, saved, signals
+from lowalt.report.figures.echo_cost import figure
+from lowalt.report.figures.echo_cost import main as draw
+from lowalt.report.sections.echo_cost import summary
 from lowalt.tiles.__main__ import renderer
 from test_echo_command import craft
 
@@ -78,7 +80,7 @@ def test_pixels_are_those_of_rendered_tiles_and_a_fine_tolerance_changes_none(cl
         noise = rng.normal(size=signal.shape) * abs(signal).max()
         return signal if tolerance is None else (signal + tolerance * noise).astype(np.complex64)
 
-    monkeypatch.setattr("lowalt.report.cost.signals", off)
+    monkeypatch.setattr("lowalt.measure.echo_pixels.signals", off)
     coarse, fine = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, BLOCK)
     assert coarse["changed_share"] == coarse["changed_pixels"] / coarse["pixels"] > 0.3
     assert coarse["largest_step"] > 5 and fine["changed_share"] < 0.01
@@ -120,14 +122,14 @@ def test_the_command_writes_a_table_and_a_figure(cloud, tmp_path):
     (tmp_path / "cost.csv").write_text("\n".join(lines) + "\n")
     arguments = ["--settings", json.dumps(SETTINGS), "--table", str(tmp_path / "cost.csv"), "--clouds",
                  str(tmp_path / "craft.npz"), "--targets", str(TARGETS)]  # fmt: skip
-    main([*arguments, "--out-table", str(tmp_path / "pixels.csv"), "--figure", str(tmp_path / "cost.png")])
+    main([*arguments, "--out", str(tmp_path / "pixels.csv")])
+    draw(["--table", str(tmp_path / "cost.csv"), "--pixels", str(tmp_path / "pixels.csv"), "--figure",
+          str(tmp_path / "cost.png")])  # fmt: skip
     coarse, fine = read_csv(tmp_path / "pixels.csv", "tolerance", "changed_pixels", "time_saved")
     assert (coarse["time_saved"], fine["time_saved"], fine["changed_pixels"]) == ("0.5", "", "0")
     picture = (tmp_path / "cost.png").read_bytes()
     assert picture.startswith(b"\x89PNG")
-    rows = [
-        {**row, "range_m": 150.0, "tolerance": float(row["tolerance"]), "changed_share": 0.5} for row in (coarse, fine)
-    ]
+    rows = [{**row, "range_m": "150.0", "changed_share": "0.5"} for row in (coarse, fine)]
     panels = figure(table, rows).axes
     named = ["measured error / largest value"] * 2 + ["tolerance asked for"]
     assert [panel.get_xlabel() for panel in panels] == named

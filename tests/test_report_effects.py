@@ -12,17 +12,16 @@ from PIL import Image
 
 import lowalt.report
 from lowalt.common.config import load, merge
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES, called
 from lowalt.effects.hear import Scene
-from lowalt.motion import write_table
-from lowalt.noise.__main__ import noisy_signals
-from lowalt.report.__main__ import EFFECT_COLUMNS
-from lowalt.report.effect_calls import asked_snrs, calls
-from lowalt.report.effect_samples import (
+from lowalt.measure.effects_calls import asked_snrs, calls
+from lowalt.measure.effects_cost import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
+from lowalt.measure.effects_samples import (
     held_out,
     main,
     measure,
@@ -31,9 +30,10 @@ from lowalt.report.effect_samples import (
     signal_change,
     takes,
 )
-from lowalt.report.effects import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
-from lowalt.report.effects_figure import figure, most_changed
-from lowalt.report.tables import read_csv
+from lowalt.motion import write_table
+from lowalt.noise.__main__ import noisy_signals
+from lowalt.report.__main__ import EFFECT_COLUMNS
+from lowalt.report.figures.effects import figure, most_changed
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.tiles import resize, split
 from lowalt.tiles.__main__ import renderer

@@ -6,7 +6,7 @@
 
 rule speed:
     input:
-        code=code("lowalt.recognition", "lowalt.recognition.speed"),
+        code=code("lowalt.measure.network_speed"),
         schemes=config["recognition"]["table"],
     output:
         "results/{run}/speed/{scheme}.json",
@@ -21,13 +21,13 @@ rule speed:
     params:
         settings=training_settings,
     shell:
-        "python -m lowalt.recognition speed --settings {params.settings:q} --scheme {wildcards.scheme}"
+        "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_table:
     input:
-        code=code("lowalt.recognition", "lowalt.recognition.price"),
+        code=code("lowalt.measure.accuracy_cost"),
         predictions=expand("results/{{run}}/predictions/{training}.csv", training=PRICED),
         about=expand("results/{{run}}/predictions/{training}.json", training=PRICED),
         speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=BY_SCHEME),
@@ -45,14 +45,14 @@ rule accuracy_table:
     params:
         settings=canonical({"seed": config["seed"]}),
     shell:
-        "python -m lowalt.recognition price --settings {params.settings:q} --predictions {input.predictions:q}"
+        "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
         " --speeds {input.speeds:q} --index {input.index:q} --fidelity {input.fidelity:q}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_figure:
     input:
-        code=code("lowalt.report.accuracy"),
+        code=code("lowalt.report.figures.accuracy_cost"),
         table="results/{run}/accuracy_cost.csv",
     output:
         "results/{run}/accuracy_cost.png",
@@ -63,4 +63,4 @@ rule accuracy_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.accuracy --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.accuracy_cost --table {input.table:q} --figure {output:q} 2> {log:q}"

@@ -121,7 +121,7 @@ def occluders_option(wildcards, input):
 @functools.cache
 def effect_calls():
     """What is priced: no effects, each alone with its defaults, scenes; {effects, tolerance, snr_db} by name."""
-    from lowalt.report.effect_calls import calls
+    from lowalt.measure.effects_calls import calls
 
     try:
         return calls(config, SCHEMA)
@@ -139,7 +139,7 @@ def effect_call(wildcards):
 def call_code(wildcards):
     from lowalt.effects.catalogue import dotted
 
-    return code("lowalt.report.effect_samples", *map(dotted, effect_call(wildcards)["effects"]))
+    return code("lowalt.measure.effects_samples", *map(dotted, effect_call(wildcards)["effects"]))
 
 
 def call_occluders(wildcards):

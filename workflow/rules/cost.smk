@@ -25,24 +25,40 @@ rule cost_table:
         " --targets {input.targets:q} --out {output:q} 2> {log:q}"
 
 
-rule cost_figure:
+rule cost_pixels:
     input:
-        code=code("lowalt.report.cost"),
+        code=code("lowalt.measure.echo_pixels"),
         targets=config["targets"]["table"],
         table="results/{run}/cost.csv",
         clouds=cost_clouds,
     output:
-        table="results/{run}/cost_pixels.csv",
-        figure="results/{run}/cost.png",
+        "results/{run}/cost_pixels.csv",
+    log:
+        "results/{run}/logs/cost_pixels.log",
+    benchmark:
+        "results/{run}/benchmarks/cost_pixels.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=cost_settings("network", "motion", "spectra", "images"),
+    shell:
+        "python -m lowalt.measure.echo_pixels --settings {params.settings:q} --table {input.table:q}"
+        " --clouds {input.clouds:q} --targets {input.targets:q} --out {output:q} 2> {log:q}"
+
+
+rule cost_figure:
+    input:
+        code=code("lowalt.report.figures.echo_cost"),
+        table="results/{run}/cost.csv",
+        pixels="results/{run}/cost_pixels.csv",
+    output:
+        "results/{run}/cost.png",
     log:
         "results/{run}/logs/cost_figure.log",
     benchmark:
         "results/{run}/benchmarks/cost_figure.jsonl"
     conda:
         "../../envs/environment.yaml"
-    params:
-        settings=cost_settings("network", "motion", "spectra", "images"),
     shell:
-        "python -m lowalt.report.cost --settings {params.settings:q} --table {input.table:q}"
-        " --clouds {input.clouds:q} --targets {input.targets:q} --out-table {output.table:q}"
-        " --figure {output.figure:q} 2> {log:q}"
+        "python -m lowalt.report.figures.echo_cost --table {input.table:q} --pixels {input.pixels:q}"
+        " --figure {output:q} 2> {log:q}"

@@ -21,18 +21,17 @@ rule effect_samples:
         settings=call_settings,
         occluders=occluders_option,
     shell:
-        "python -m lowalt.report.effect_samples --settings {params.settings:q} --motion {input.motion:q}"
+        "python -m lowalt.measure.effects_samples --settings {params.settings:q} --motion {input.motion:q}"
         " --clouds {input.clouds:q} {params.occluders} --out {output:q} 2> {log:q}"
 
 
 rule effects_table:
     input:
-        code=code("lowalt.report.effects"),
+        code=code("lowalt.measure.effects_cost"),
         samples=call_files,
         model=asked_model,
     output:
-        table="results/{run}/effects.csv",
-        figure="results/{run}/effects.png",
+        "results/{run}/effects.csv",
     log:
         "results/{run}/logs/effects_table.log",
     benchmark:
@@ -43,5 +42,23 @@ rule effects_table:
     params:
         settings=canonical({"seed": config["seed"], "evaluation": config["recognition"]["evaluation"]}),
     shell:
-        "python -m lowalt.report.effects --settings {params.settings:q} --samples {input.samples:q}"
-        " --model {input.model:q} --table {output.table:q} --figure {output.figure:q} 2> {log:q}"
+        "python -m lowalt.measure.effects_cost --settings {params.settings:q} --samples {input.samples:q}"
+        " --model {input.model:q} --out {output:q} 2> {log:q}"
+
+
+rule effects_figure:
+    input:
+        code=code("lowalt.report.figures.effects"),
+        table="results/{run}/effects.csv",
+        samples=call_files,
+    output:
+        "results/{run}/effects.png",
+    log:
+        "results/{run}/logs/effects_figure.log",
+    benchmark:
+        "results/{run}/benchmarks/effects_figure.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    shell:
+        "python -m lowalt.report.figures.effects --table {input.table:q} --samples {input.samples:q}"
+        " --figure {output:q} 2> {log:q}"

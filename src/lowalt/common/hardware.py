@@ -7,7 +7,8 @@ import subprocess
 from pathlib import Path
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the processor's name as the system gives it."""
     try:
         for line in Path("/proc/cpuinfo").read_text().splitlines():
             if line.startswith("model name"):
@@ -31,4 +32,4 @@ def describe() -> str:
     """Return one line without commas (it stands in CSV cells), such as "Intel Xeon; 2 cores; 24 GiB; no GPU"."""
     memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 2**30
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return f"{_processor()}; {cores} cores; {memory:.0f} GiB; {_accelerator()}".replace(",", " ")
+    return f"{processor()}; {cores} cores; {memory:.0f} GiB; {_accelerator()}".replace(",", " ")

@@ -3,9 +3,6 @@
 The costs are measured on the spot, on one motion model of each category the scene has, at its first station.
 """
 
-import statistics
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +13,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.hardware import describe
 from lowalt.common.network import Network
 from lowalt.common.streams import stream
+from lowalt.common.timing import median_s
 from lowalt.echo import echo_signal
 from lowalt.echo import explain as explain_echo
 from lowalt.effects.catalogue import BY_NEED, PLACES, Effect, called
@@ -73,24 +71,13 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
     return result
 
 
-def milliseconds(work: Callable[[], object]) -> float:
-    """Return the median time of a call after one that warms up (ms)."""
-    work()
-    taken = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        work()
-        taken.append(1e3 * (time.perf_counter() - start))
-    return statistics.median(taken)
-
-
 def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, float]:
     """Return milliseconds a sample and station: "base", each effect added alone to the base, and "together"."""
     station = scene.network.station(station_name)
 
     def mean(effects: tuple[Effect, ...]) -> float:
         part = Scene(scene.network, scene.seed, scene.tolerance, effects)
-        times = [milliseconds(lambda s=s: hear(part, station, s.cloud, s.row, s.occluders)) for s in chosen]
+        times = [1e3 * median_s(lambda s=s: hear(part, station, s.cloud, s.row, s.occluders), REPEATS) for s in chosen]
         return sum(times) / len(times)
 
     result = {"base": mean(())}

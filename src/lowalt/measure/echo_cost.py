@@ -5,23 +5,19 @@
 Settings: network, motion and cost blocks of the configuration, and its seed.
 """
 
-import csv
 import functools
 import os
-import platform
-import statistics
 import sys
-import time
-from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.command import parser, pick, run
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import BelowFloor
-from lowalt.common.files import replacing
+from lowalt.common.hardware import processor
 from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
+from lowalt.common.timing import in_turn
 from lowalt.echo.api import echo_signal
 from lowalt.echo.scene import Rigid
 from lowalt.measure import echo_baselines
@@ -37,11 +33,8 @@ COLUMNS = (
 
 
 def hardware() -> str:
-    """The processor's name, as the tables give it."""
-    info = Path("/proc/cpuinfo")
-    names = [line for line in info.read_text().splitlines() if "model name" in line] if info.exists() else []
-    name = names[0].split(":")[1].strip() if names else platform.processor() or platform.machine()
-    return f"{name}, {os.cpu_count()} cores, one used"
+    """The processor's name and how many of its cores were used, as the table gives them."""
+    return f"{processor()}, {os.cpu_count()} cores, one used"
 
 
 def sample(
@@ -66,22 +59,6 @@ def sample(
     order = chosen[np.argsort(cloud.part[chosen], kind="stable")]
     moved = Rigid(*poses(cloud, row, network.times_s), cloud.points[order], cloud.part[order])
     return moved, cloud.rcs_m2[order], np.array([row["x_m"], row["y_m"], row["z_m"]])
-
-
-def in_turn(calls: list[tuple[Callable, int, int]]) -> list[tuple[float, object]]:
-    """Median seconds and last result of each call, given as (call, rounds, times a round).
-
-    Calls take turns, so that what slows the machine for a second slows all of them and not one method.
-    """
-    spent: list[list[float]] = [[] for _ in calls]
-    results: list[object] = [None] * len(calls)
-    for turn in range(max(rounds for _, rounds, _ in calls)):
-        for index, (call, rounds, times) in enumerate(calls):
-            for _ in range(times if turn < rounds else 0):
-                start = time.perf_counter()
-                results[index] = call()
-                spent[index].append(time.perf_counter() - start)
-    return [(statistics.median(own), result) for own, result in zip(spent, results, strict=True)]
 
 
 def truths(network: Network, station: Station, given: tuple, signal: np.ndarray, seed: int) -> dict[int, np.ndarray]:
@@ -155,14 +132,6 @@ def measure(network: Network, clouds: list[Cloud], published: dict, block: dict)
     return rows
 
 
-def write(path: str | Path, rows: list[dict]) -> None:
-    """Write the table as CSV."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-
-
 def main(arguments: list[str]) -> None:
     """Measure and write the table."""
     options = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
@@ -173,7 +142,8 @@ def main(arguments: list[str]) -> None:
     network, motion, seed, block = pick(given.settings, "network", "motion", "seed", "cost")
     block |= {"motion": motion, "seed": seed}
     network = Network.from_settings(network)
-    write(given.out, measure(network, [read(path) for path in given.clouds], load_table(given.targets), block))
+    rows = measure(network, [read(path) for path in given.clouds], load_table(given.targets), block)
+    write_csv(given.out, COLUMNS, rows)
 
 
 if __name__ == "__main__":

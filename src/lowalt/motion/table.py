@@ -4,8 +4,9 @@ import csv
 import math
 from pathlib import Path
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import existing
 
 PHASES = 16
 """Most moving parts with a phase of their own (EH216-S flown as coaxial pairs has 16 rotors)."""
@@ -20,12 +21,12 @@ COLUMNS = (*TEXTS, "model", *NUMBERS)
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
     """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for row in rows:
-            numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in NUMBERS)
-            writer.writerow([*(row[name] for name in TEXTS), int(row["model"]), *numbers])
+    write_csv(path, COLUMNS, map(_cells, rows))
+
+
+def _cells(row: dict) -> list:
+    numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in NUMBERS)
+    return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
 
 def read_table(path: str | Path) -> list[dict]:

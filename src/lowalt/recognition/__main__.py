@@ -9,9 +9,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import PROTOCOLS, Scheme, named, read
-
-SCHEMES = "config/schemes.csv"
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, read
 
 
 def _views(arguments: list[str]) -> None:
@@ -72,7 +70,7 @@ def _train(arguments: list[str]) -> None:
     _sources(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
-    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     given = line.parse_args(arguments)
@@ -118,7 +116,7 @@ def _tables(arguments: list[str]) -> None:
     line = parser("lowalt.recognition tables", _tables.__doc__)
     line.add_argument("--predictions", nargs="+", required=True, help="prediction files (.csv), records beside them")
     line.add_argument("--published", help="the paper's accuracies (.csv), where there are any to stand beside")
-    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="folder for the tables")
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
@@ -136,7 +134,7 @@ def _transfer(arguments: list[str]) -> None:
     line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")
     line.add_argument("--other", nargs="+", required=True, help="of other runs' models, evaluated with --trained-on")
     line.add_argument("--configs", nargs="+", required=True, help="configuration of this run, then of the others")
-    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="table to write (.csv)")
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
@@ -161,43 +159,6 @@ def _distances(arguments: list[str]) -> None:
     pick(given.settings)
     motion = [row for path in given.motion for row in read_table(path)]
     distances.write(given.out, distances.rows([read_cloud(path) for path in given.clouds], motion))
-
-
-def _speed(arguments: list[str]) -> None:
-    """Time a scheme's network on this machine. Settings: seed, size, colour_map, network, training, augmentation."""
-    from lowalt.recognition.speed import measure
-
-    line = parser("lowalt.recognition speed", _speed.__doc__)
-    line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
-    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
-    line.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
-    line.add_argument("--out", required=True, help="record to write (.json)")
-    given = line.parse_args(arguments)
-    scheme = named(given.schemes, given.scheme)
-    found = measure(scheme, scheme.settled(given.settings), given.limit_s)
-    with replacing(given.out) as temporary:
-        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
-
-
-def _price(arguments: list[str]) -> None:
-    """Write what accuracy costs in time, from predictions and measured speeds. Settings: seed."""
-    from lowalt.recognition import price
-    from lowalt.recognition.tables import Run
-
-    line = parser("lowalt.recognition price", _price.__doc__)
-    line.add_argument("--predictions", nargs="+", required=True, help="prediction files of the unseen protocol (.csv)")
-    line.add_argument("--speeds", nargs="+", required=True, help="records of `speed`, of these and of other schemes")
-    line.add_argument("--index", required=True, help="index of the shards: bytes a sample")
-    line.add_argument("--fidelity", help="transfer.csv of models trained on echoes at a tolerance")
-    line.add_argument("--schemes", default=SCHEMES, help=f"table of schemes (default: {SCHEMES})")
-    line.add_argument("--out", required=True, help="table to write (.csv)")
-    given = line.parse_args(arguments)
-    (seed,) = pick(given.settings, "seed")
-    shards = json.loads(existing(given.index, "index").read_text())["shards"]
-    size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
-    runs, speeds = [Run(path) for path in given.predictions], price.read_speeds(given.speeds)
-    fidelity = price.fidelity_rows(given.fidelity) if given.fidelity else []
-    price.write(runs, read(given.schemes), speeds, size, fidelity, given.out, seed)
 
 
 def _score(arguments: list[str]) -> None:
@@ -242,8 +203,7 @@ def _export(arguments: list[str]) -> None:
 
 COMMANDS = {
     "views": _views, "freeze": _freeze, "distances": _distances, "train": _train, "evaluate": _evaluate,
-    "tables": _tables, "transfer": _transfer, "speed": _speed, "price": _price, "score": _score, "predict": _predict,
-    "export": _export,
+    "tables": _tables, "transfer": _transfer, "score": _score, "predict": _predict, "export": _export,
 }  # fmt: skip
 
 

@@ -14,14 +14,13 @@ distances.csv, one row a subtype:
                                                  unseen protocol trains; of a trained subtype, another one
 """
 
-import csv
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.motion import positions
 from lowalt.targets.cloud import CATEGORIES, Cloud
 
@@ -107,7 +106,4 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
 
 def write(out: str | Path, lines: list[list]) -> None:
     """Write distances.csv."""
-    with replacing(out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(lines)
+    write_csv(out, COLUMNS, lines)

@@ -16,8 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import existing
 from lowalt.recognition.samples import Facts
 
 CLASSES = ("p_uav", "p_bird", "p_vehicle", "p_pedestrian")
@@ -84,15 +85,15 @@ def _number(value: float) -> str:
 
 def write(path: str | Path, found: Predictions) -> None:
     """Write a prediction file; equal predictions give equal bytes."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for row in range(len(found)):
-            writer.writerow([
-                found.key[row], found.subtype[row], found.group[row], found.fold[row], int(found.model[row]),
-                _number(found.snr_db[row]), int(found.label[row]), _number(found.range_m[row]),
-                _number(found.aspect_deg[row]), *(repr(float(value)) for value in found.probabilities[row]),
-            ])  # fmt: skip
+    rows = (
+        [
+            found.key[row], found.subtype[row], found.group[row], found.fold[row], int(found.model[row]),
+            _number(found.snr_db[row]), int(found.label[row]), _number(found.range_m[row]),
+            _number(found.aspect_deg[row]), *(repr(float(value)) for value in found.probabilities[row]),
+        ]
+        for row in range(len(found))
+    )  # fmt: skip
+    write_csv(path, COLUMNS, rows)
 
 
 def read(path: str | Path) -> Predictions:

@@ -23,6 +23,8 @@ from pathlib import Path
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, slug
 
+TABLE = "config/schemes.csv"
+"""Where the table of schemes stands if a command names no other."""
 STATIONS = ("A", "B", "C")
 SPECTRA = ("VRP", "TRP", "VT")
 FUSIONS = ("attention", "mean")

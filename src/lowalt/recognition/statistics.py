@@ -44,7 +44,6 @@ def bootstrap(
 ) -> Interval:
     """Mean of `values` (samples,) with the percentile interval from resampling whole clusters (samples,).
 
-    For a paired comparison, values are the differences of two schemes on the same samples.
     Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the module's docstring.
     """
     _, place = np.unique(clusters, return_inverse=True)
@@ -56,6 +55,13 @@ def bootstrap(
         means[repeat] = total[chosen].sum() / count[chosen].sum()
     low, high = np.quantile(means, [0.025, 0.975])
     return Interval(float(np.mean(values)), float(low), float(high))
+
+
+def paired_difference(
+    clusters: np.ndarray, one: np.ndarray, other: np.ndarray, generator: np.random.Generator
+) -> Interval:
+    """Mean of one - other, two measures (samples,) of the same samples, with its interval as `bootstrap` gives it."""
+    return bootstrap(clusters, np.asarray(one, float) - other, generator)
 
 
 def mcnemar(first: np.ndarray, second: np.ndarray) -> tuple[int, int, float]:

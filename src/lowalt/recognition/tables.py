@@ -19,15 +19,15 @@ Files written, each with the columns `protocol, scheme` first:
                      motion model lies above zero), is reversed (below) or is undecided (zero inside)
 """
 
-import csv
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import existing
 from lowalt.common.streams import stream
 from lowalt.recognition import predictions
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
@@ -36,10 +36,10 @@ from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import (
     accuracy_by,
     alarm_rates,
-    bootstrap,
     calibration,
     confusion,
     mcnemar,
+    paired_difference,
     reliability,
     threshold,
 )
@@ -171,19 +171,16 @@ def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[
     one, other = first[0].test, second[0].test
     if not np.array_equal(one.key, other.key):
         raise InputError(f"{first[0].scheme} and {second[0].scheme} were tested on different samples")
-    gain = np.mean([run.test.correct for run in first], axis=0) - np.mean([run.test.correct for run in second], axis=0)
+    shares = [np.mean([run.test.correct for run in runs], axis=0) for runs in (first, second)]
     discordant = mcnemar(one.correct, other.correct)
     for unit, clusters in (("motion model", one.motion), ("subtype", one.subtype)):
         generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme, unit)
-        interval = bootstrap(clusters, gain, generator)
+        interval = paired_difference(clusters, *shares, generator)
         yield [unit, *map(_percent, interval), *discordant[:2], f"{discordant[2]:.6g}"]
 
 
 def _write(path: Path, columns: list[str], rows: list[list]) -> None:
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["protocol", "scheme", *columns])
-        writer.writerows(rows)
+    write_csv(path, ["protocol", "scheme", *columns], rows)
 
 
 def write(runs: list[Run], order: list[str], published: dict, folder: str | Path, seed: int) -> None:

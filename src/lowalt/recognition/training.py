@@ -4,7 +4,6 @@ Plain torch because a loop library hides what an exact resume needs (the order o
 and the loop is one page without it. The settings are those of `lowalt.recognition.recipe`.
 """
 
-import csv
 import math
 import sys
 import time
@@ -17,8 +16,8 @@ from timm.utils import ModelEmaV3
 from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint
 from lowalt.recognition.augment import augment
@@ -269,8 +268,6 @@ class Trainer:
         if self.machine.rank:
             return
         checkpoint.save(self.folder / "model.pt", self.name, {"weights": self.best_weights, **extra})
-        with replacing(self.folder / "history.csv") as temporary, temporary.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(HISTORY)
-            writer.writerows([[repr(value) for value in row] for row in self.at.history])
+        history = [[repr(value) for value in row] for row in self.at.history]
+        write_csv(self.folder / "history.csv", HISTORY, history)
         (self.folder / "checkpoint.pt").unlink(missing_ok=True)

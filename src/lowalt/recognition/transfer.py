@@ -13,16 +13,15 @@ transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over th
                                  moves, which the interval does not hold
 """
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.common.streams import stream
-from lowalt.recognition.statistics import bootstrap
+from lowalt.recognition.statistics import paired_difference
 from lowalt.recognition.tables import Run, snr_text
 
 COLUMNS = (
@@ -62,7 +61,7 @@ def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterab
         rows = slice(None) if snr is None else test.snr_db == snr
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
-        interval = bootstrap(test.motion[rows], (theirs - mine)[rows], generator)
+        interval = paired_difference(test.motion[rows], theirs[rows], mine[rows], generator)
         numbers = [f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)]
         accuracies = [[run.test.correct[rows].mean() for run in runs] for runs in (own, other)]
         yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), _spread(accuracies)]
@@ -91,7 +90,4 @@ def write(own: list[Run], other: list[Run], order: list[str], out: str | Path, s
         if key[:2] not in mine:
             raise InputError(f"transfer: {key[2]} has {key[1]} in the {key[0]} protocol, this run has not")
         lines += [[*key, *row] for row in comparison(mine[key[:2]], theirs[key], key[2], seed)]
-    with replacing(out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows(lines)
+    write_csv(out, COLUMNS, lines)

@@ -13,12 +13,13 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.files import existing, replacing, sha256
 from lowalt.common.hardware import describe
 from lowalt.motion import read_table
-from lowalt.report import figures, recognition
-from lowalt.report.cost_table import read_summary
+from lowalt.report.figures import style as figures
+from lowalt.report.figures.motion_strip import motion_strip
+from lowalt.report.figures.tiles import example_tiles
 from lowalt.report.made_with import versions
-from lowalt.report.strip import motion_strip
+from lowalt.report.sections import recognition
+from lowalt.report.sections.echo_cost import read_summary
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
-from lowalt.report.tiles import example_tiles
 from lowalt.shards import ShardSet
 from lowalt.targets.cloud import CATEGORIES, read
 

@@ -4,10 +4,10 @@ A command of its own, `python -m lowalt.shards.card`, so that a change of wordin
 """
 
 import argparse
-import csv
 import json
 import re
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ import yaml
 
 from lowalt import __version__
 from lowalt.common.command import run
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
 from lowalt.shards.croissant import FIELDS, metadata
@@ -86,13 +87,14 @@ def write_samples(shards: ShardSet, path: Path) -> None:
     numbers, records = _subtypes(shards)
     columns = (shards.keys, shards.labels, numbers, shards.models, shards.snrs_db)
     owners = np.repeat(np.arange(len(shards.shards)), [entry["samples"] for entry in shards.shards])
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(FIELDS)
+
+    def rows() -> Iterator[tuple]:
         for key, label, number, model, snr_db, owner in zip(*columns, owners, strict=True):
             entry, record = shards.shards[owner], records[number]
             row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
-            writer.writerow([*row, model, f"{snr_db:g}", entry["name"]])
+            yield (*row, model, f"{snr_db:g}", entry["name"])
+
+    write_csv(path, FIELDS, rows())
 
 
 def description(shards: ShardSet) -> str:

@@ -1,11 +1,10 @@
 """Dimension table: every figure of the built-in models with its source or the mark "estimate", as CSV."""
 
 import argparse
-import csv
 from pathlib import Path
 
 from lowalt.common.command import run
-from lowalt.common.files import replacing
+from lowalt.common.csv_tables import write_csv
 from lowalt.targets.records import load_records
 
 COLUMNS = ("subtype", "category", "figure", "value", "unit", "source")
@@ -41,9 +40,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--records", required=True, nargs="+", type=Path, help="record files (YAML)")
     line.add_argument("--out", required=True, type=Path, help="table to write (.csv)")
     given = line.parse_args(arguments)
-    with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerows([COLUMNS, *rows(load_records(given.table, given.records))])
+    write_csv(given.out, COLUMNS, rows(load_records(given.table, given.records)))
 
 
 if __name__ == "__main__":

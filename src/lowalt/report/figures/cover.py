@@ -8,7 +8,7 @@ from PIL import Image
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
-from lowalt.report.tiles import example_tiles
+from lowalt.report.figures.tiles import example_tiles
 from lowalt.shards import ShardSet
 
 GAP = 12

@@ -6,17 +6,16 @@ accuracy_cost.csv has it, times all steps of all schemes; early stopping and val
 that was never timed is not guessed at. A processor's price: no GPU is extrapolated to.
 """
 
-import csv
+import argparse
 import math
-import sys
 from pathlib import Path
 
+from lowalt.common.command import run
 from lowalt.common.config import load
+from lowalt.common.csv_tables import read_csv, write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.common.plan import Plan
 from lowalt.recognition.schemes import SPECTRA, STATIONS, read
-from lowalt.report.tables import read_csv
 from lowalt.targets.records import load_table
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
@@ -89,19 +88,23 @@ def estimate(
 
 
 def main(arguments: list[str]) -> None:
-    """Write the estimate of every overlay: estimate.py STAGES COSTS SCHEMA OUT BASE OVERLAY..."""
-    stages, costs, schema, out, base, *overlays = arguments
-    rows = read_csv(stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
-    timed = read_csv(costs, *COST_COLUMNS)
-    found = [estimate(rows, timed, load([base, overlay], schema), Path(overlay).stem) for overlay in overlays]
-    with replacing(out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(found)
+    """Write a row of every overlay."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.measure.scale", description=__doc__)
+    options.add_argument("--stages", required=True, help="stages.csv of a finished run")
+    options.add_argument("--costs", required=True, help="table of lowalt.measure.accuracy_cost (.csv)")
+    options.add_argument("--schema", required=True, help="schema of the configuration (.yaml)")
+    options.add_argument("--base", required=True, help="configuration on which the overlays lie (.yaml)")
+    options.add_argument("--overlays", nargs="+", required=True, help="configurations to estimate (.yaml)")
+    options.add_argument("--out", required=True, help="table to write (.csv)")
+    given = options.parse_args(arguments)
+    stages = read_csv(given.stages, "rule", "wall_s", "samples", "sample_bytes", "hardware")
+    costs = read_csv(given.costs, *COST_COLUMNS)
+    found = [
+        estimate(stages, costs, load([given.base, overlay], given.schema), Path(overlay).stem)
+        for overlay in given.overlays
+    ]
+    write_csv(given.out, COLUMNS, found)
 
 
 if __name__ == "__main__":
-    try:
-        main(sys.argv[1:])
-    except InputError as error:
-        raise SystemExit(f"error: {error}") from None
+    run(main)

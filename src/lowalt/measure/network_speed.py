@@ -1,45 +1,31 @@
 """What a scheme's network costs in time on this machine: inference a sample, and a training step a sample.
 
-Untrained weights are timed, since time does not depend on them; images are in memory, so reading is not in it. The
-least of several passes counts, on one thread in processor time: what else runs on a machine only ever adds.
+    python -m lowalt.measure.network_speed --settings JSON --scheme NAME --out speed.json
+
+Settings: seed, size, colour_map, network, training, augmentation.
+The weights are untrained, since time does not depend on them. The images are in memory, so reading is not timed.
+The least of several passes counts, because other work on the machine only ever adds time. On one thread the time is
+processor time.
 """
 
+import json
 import time
 from collections.abc import Callable
 
 import numpy as np
 import torch
 
-from lowalt.common.command import pick
+from lowalt.common.command import parser, pick, run
+from lowalt.common.files import replacing
 from lowalt.common.hardware import describe
+from lowalt.common.timing import least_s
 from lowalt.recognition import network, recipe
 from lowalt.recognition.inference import Machine
-from lowalt.recognition.schemes import SPECTRA, Scheme
+from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, named
 from lowalt.recognition.training import objective
 from lowalt.tiles import colour_map
 
 BATCHES = (1, 64)
-
-
-def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30) -> float:
-    """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
-
-    Calls stop once they took `limit_s` together; a first call that alone takes that long is the measurement.
-    """
-    begin = clock()
-    work()
-    spent = best = clock() - begin
-    if spent > limit_s:
-        return best
-    best = float("inf")
-    for _ in range(repeats):
-        start = clock()
-        work()
-        best = min(best, clock() - start)
-        spent += clock() - start
-        if spent > limit_s:
-            break
-    return best
 
 
 def _clock(machine: Machine, threads: int) -> Callable[[], float]:
@@ -108,3 +94,21 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
         "threads": block["threads"], "batch": block["batch"], "steps": block["steps"],
         "backbone": scheme.backbone or settings["network"]["backbone"], "hardware": describe(),
     }  # fmt: skip
+
+
+def main(arguments: list[str]) -> None:
+    """Time one scheme's network and write the record."""
+    options = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
+    options.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
+    options.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    options.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
+    options.add_argument("--out", required=True, help="record to write (.json)")
+    given = options.parse_args(arguments)
+    scheme = named(given.schemes, given.scheme)
+    found = measure(scheme, scheme.settled(given.settings), given.limit_s)
+    with replacing(given.out) as temporary:
+        temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,12 +1,13 @@
 """One call for effects, measured on test samples of a run: time, signal, range cells, spectra, images for its network.
 
-    python -m lowalt.report.effect_samples --settings JSON --motion a.csv ... --clouds b.npz ... --out adc.npz
+    python -m lowalt.measure.effects_samples --settings JSON --motion a.csv ... --clouds b.npz ... --out adc.npz
 
 Settings: name and effects of the call, the blocks network, spectra, images and split of the configuration, seed, the
 echo's tolerance, snr_db, size (pixels the network sees) and models (motion models of each subtype). Every sample is
 computed with and without the effects, one right after the other, so that both meet the same machine.
 """
 
+import functools
 import json
 import time
 import zipfile
@@ -21,6 +22,7 @@ from lowalt.common.files import existing, replacing
 from lowalt.common.hardware import describe
 from lowalt.common.network import Network
 from lowalt.common.splits import fold
+from lowalt.common.timing import once
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene, hear
 from lowalt.motion import read_table
@@ -95,9 +97,8 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
                 if index == place == 0:
                     # What is compiled or looked up once is no cost of a sample.
                     hear(scene, station, *given)
-                start = time.process_time()
-                heard = hear(scene, station, *given)
-                take.ms[index, place] = 1e3 * (time.process_time() - start)
+                seconds, heard = once(functools.partial(hear, scene, station, *given), time.process_time)
+                take.ms[index, place] = 1e3 * seconds
                 take.signal[index, place], take.cell[index, place] = heard.signal, heard.cell
                 take.power[index, place] = heard.power
     return found
@@ -170,7 +171,7 @@ def read_samples(path: str | Path) -> tuple[dict, dict[str, np.ndarray]]:
 
 def main(arguments: list[str]) -> None:
     """Measure one call for effects and write its file."""
-    options = parser("lowalt.report.effect_samples", __doc__.splitlines()[0])
+    options = parser("lowalt.measure.effects_samples", __doc__.splitlines()[0])
     options.add_argument("--motion", nargs="+", required=True, help="motion tables that have test models")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files of their subtypes")
     options.add_argument("--occluders", nargs="*", default=[], help="surface files of their subtypes")

@@ -1,6 +1,9 @@
 """What accuracy costs in time: trained schemes with their measured times, and networks that were only timed.
 
-accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
+    python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ... --speeds a.json ...
+        --index index.json --fidelity transfer.csv --out accuracy_cost.csv
+
+Settings: seed. accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
     kind                 trained: accuracy and times measured; timed: times of a network that was not trained, without
                          accuracy, its core_s_training extrapolated from the time of one step; fidelity: the first
                          scheme trained on echoes at a tolerance and tested on exact ones
@@ -16,18 +19,19 @@ accuracy_cost.csv, one row a scheme and SNR ("avg": mean over the SNRs):
     front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
 """
 
-import csv
 import json
 import math
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.command import parser, pick, run
+from lowalt.common.csv_tables import read_csv, short, write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import existing
 from lowalt.common.streams import stream
-from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
-from lowalt.recognition.statistics import accuracy_by, bootstrap, pareto
+from lowalt.recognition.schemes import SPECTRA, STATIONS, TABLE, Scheme, read
+from lowalt.recognition.statistics import accuracy_by, paired_difference, pareto
 from lowalt.recognition.tables import Run, snr_text
 
 COLUMNS = (
@@ -36,10 +40,15 @@ COLUMNS = (
     "train_ms", "core_s_training", "network_bytes", "shard_bytes", "front", "hardware", "seeds",
     "spread_points",
 )  # fmt: skip
+TRANSFER = (
+    "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "difference_points", "low", "high", "hardware",
+    "seeds", "spread_points",
+)  # fmt: skip
+"""Columns of a transfer table that are used here."""
 
 
 def read_speeds(paths: list[str | Path]) -> dict[str, dict]:
-    """Return what `speed.measure` found, by scheme.
+    """Return what `network_speed.measure` found, by scheme.
 
     Raises: InputError for a file that is no such record.
     """
@@ -82,11 +91,13 @@ def trained_rows(run: Run, base: Run, scheme: Scheme, speed: dict, shard_bytes: 
         "train_samples": run.about["train_samples"], "core_s_training": run.about["train_processor_s"],
     }  # fmt: skip
     seen, unseen = _shares(run, "seen_test"), _shares(run, "test")
-    gain = 1.0 * run.test.correct - base.test.correct
     rows = []
     for snr in unseen:
         chosen = slice(None) if snr == "avg" else run.test.snr_db == float(snr)
-        interval = bootstrap(run.test.motion[chosen], gain[chosen], stream(seed, "price", run.scheme, snr))
+        interval = paired_difference(
+            run.test.motion[chosen], run.test.correct[chosen], base.test.correct[chosen],
+            stream(seed, "price", run.scheme, snr),
+        )  # fmt: skip
         difference, low, high = (100 * value for value in interval)
         found = {"snr_db": snr, "seen_percent": seen.get(snr), "unseen_percent": unseen[snr]}
         rows.append({**same, **found, "difference_points": difference, "low": low, "high": high})
@@ -103,8 +114,7 @@ def timed_row(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
 
 def fidelity_rows(path: str | Path) -> list[dict]:
     """Return rows of the models in a transfer table, trained on other data and tested on this: its unseen protocol."""
-    with existing(path, "transfer table").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["protocol"] == "unseen"]
+    rows = [row for row in read_csv(path, *TRANSFER) if row["protocol"] == "unseen"]
     return [
         {"scheme": f"{row['scheme']} trained on {row['trained_on']}", "kind": "fidelity", "snr_db": row["snr_db"],
          "unseen_percent": float(row["accuracy_percent"]), "hardware": row["hardware"],
@@ -128,12 +138,6 @@ def _or_nan(value: float | None) -> float:
     return math.nan if value is None else value
 
 
-def _cell(value: object) -> object:
-    if value is None:
-        return ""
-    return f"{value:.6g}" if isinstance(value, float) else value
-
-
 def write(
     runs: list[Run], schemes: dict[str, Scheme], speeds: dict[str, dict], shard_bytes: float, fidelity: list[dict],
     out: str | Path, seed: int,
@@ -153,7 +157,26 @@ def write(
         rows += trained_rows(by_name[name], base, schemes[name], speeds[name], shard_bytes, seed)
     rows += [timed_row(schemes[name], speeds[name], shard_bytes) for name in speeds if name not in by_name]
     mark_front(rows)
-    with replacing(out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        writer.writerows([[_cell(row.get(name)) for name in COLUMNS] for row in rows + fidelity])
+    write_csv(out, COLUMNS, [[short(row.get(name)) for name in COLUMNS] for row in rows + fidelity])
+
+
+def main(arguments: list[str]) -> None:
+    """Write the table from predictions and measured speeds."""
+    options = parser("lowalt.measure.accuracy_cost", __doc__.splitlines()[0])
+    options.add_argument("--predictions", nargs="+", required=True, help="predictions of the unseen protocol (.csv)")
+    options.add_argument("--speeds", nargs="+", required=True, help="files of lowalt.measure.network_speed (.json)")
+    options.add_argument("--index", required=True, help="index of the shards: bytes a sample")
+    options.add_argument("--fidelity", help="transfer.csv of models trained on echoes at a tolerance")
+    options.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    options.add_argument("--out", required=True, help="table to write (.csv)")
+    given = options.parse_args(arguments)
+    (seed,) = pick(given.settings, "seed")
+    shards = json.loads(existing(given.index, "index").read_text())["shards"]
+    size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
+    runs, speeds = [Run(path) for path in given.predictions], read_speeds(given.speeds)
+    fidelity = fidelity_rows(given.fidelity) if given.fidelity else []
+    write(runs, read(given.schemes), speeds, size, fidelity, given.out, seed)
+
+
+if __name__ == "__main__":
+    run(main)

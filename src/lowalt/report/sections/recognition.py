@@ -5,9 +5,9 @@ import argparse
 
 from matplotlib import pyplot as plt
 
-from lowalt.report import accuracy
-from lowalt.report.figures import legend_below, png, scheme_colours
-from lowalt.report.tables import read_csv
+from lowalt.common.csv_tables import read_csv
+from lowalt.report.figures import accuracy_cost
+from lowalt.report.figures.style import legend_below, png, scheme_colours
 
 TABLES = {
     "orderings": ("protocol", "scheme", "over", "claim", "paper_points", "difference_points", "ordering"),
@@ -107,6 +107,6 @@ def section(given: argparse.Namespace) -> dict:
     if any(int(row["samples"]) >= FEWEST for rows in bands.values() for row in rows):
         found["pictures"]["bands"] = band_figure(bands)
     if given.accuracy_cost:
-        rows = read_csv(given.accuracy_cost, *accuracy.NEEDED, *accuracy.FIDELITY)
-        found["pictures"]["accuracy_cost"] = accuracy.draw(rows)
+        rows = read_csv(given.accuracy_cost, *accuracy_cost.NEEDED, *accuracy_cost.FIDELITY)
+        found["pictures"]["accuracy_cost"] = accuracy_cost.draw(rows)
     return found

@@ -1,25 +1,25 @@
-"""What each effect costs and does, alone and together: the table and the figure of a run.
+"""What each effect costs and does, alone and together: the table of a run.
 
-    python -m lowalt.report.effects --settings JSON --samples seen-none.npz unseen-none.npz ... --model model.pt
-        --table effects.csv --figure effects.png
+    python -m lowalt.measure.effects_cost --settings JSON --samples seen-none.npz unseen-none.npz ...
+        --model model.pt --out effects.csv
 
 Settings: seed, and evaluation of the configuration's recognition block. The files are those of
-`lowalt.report.effect_samples`, any number a call; the call without effects gives the accuracies that all others are
+`lowalt.measure.effects_samples`, any number a call; the call without effects gives the accuracies that all others are
 held against.
 """
 
 import sys
-from csv import DictWriter
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.command import parser, pick, run
+from lowalt.common.csv_tables import short, write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES
-from lowalt.report.effect_samples import read_samples
+from lowalt.measure.effects_samples import read_samples
+from lowalt.recognition.statistics import paired_difference
 
 COLUMNS = (
     "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",
@@ -74,10 +74,8 @@ def difference(
     without, with_it: (K, S) bool, the same samples; motion: (K,) names of motion models, which are resampled whole.
     Source: as `lowalt.recognition.statistics.bootstrap`.
     """
-    from lowalt.recognition.statistics import bootstrap
-
-    change = 100.0 * (with_it.astype(float) - without)
-    return tuple(bootstrap(np.repeat(motion, change.shape[1]), change.ravel(), rng))
+    found = paired_difference(np.repeat(motion, without.shape[1]), with_it.ravel(), without.ravel(), rng)
+    return tuple(100 * value for value in found)
 
 
 def typical_ms(times: np.ndarray, subtype: np.ndarray) -> float:
@@ -123,7 +121,7 @@ def rows(calls: list[tuple[dict, dict]], right: dict[str, np.ndarray], network: 
         without, with_it = right[NONE][:, places], right[name]
         value, low, high = difference(without, with_it, motion, stream(seed, "bootstrap", "effects", name))
         parts = [added[part] for part in header["effects"] if part in added] if len(header["effects"]) > 1 else []
-        # A sum without all its parts would pass for one with them.
+        # Leave the cell empty unless every effect of the scene was also measured alone.
         whole = len(parts) == len(header["effects"])
         result.append({
             "call": name, "effects": " ".join(header["effects"]), "motion_models": len(motion),
@@ -143,11 +141,7 @@ def rows(calls: list[tuple[dict, dict]], right: dict[str, np.ndarray], network: 
 
 def write(path: str | Path, table: list[dict]) -> None:
     """Write the rows as CSV, numbers to six digits."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        for row in table:
-            writer.writerow({key: f"{value:.6g}" if isinstance(value, float) else value for key, value in row.items()})
+    write_csv(path, COLUMNS, [{key: short(value) for key, value in row.items()} for row in table])
 
 
 class _Held:
@@ -187,24 +181,18 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
 
 
 def main(arguments: list[str]) -> None:
-    """Ask the trained network, and write the table and the figure."""
-    from lowalt.report.effects_figure import figure
-
-    options = parser("lowalt.report.effects", __doc__.splitlines()[0])
-    options.add_argument("--samples", nargs="+", required=True, help="files of lowalt.report.effect_samples")
+    """Ask the trained network, and write the table."""
+    options = parser("lowalt.measure.effects_cost", __doc__.splitlines()[0])
+    options.add_argument("--samples", nargs="+", required=True, help="files of lowalt.measure.effects_samples")
     options.add_argument("--model", required=True, help="model.pt of a network trained without effects")
-    options.add_argument("--table", required=True, help="table to write (.csv)")
-    options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
+    options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
     seed, evaluation = pick(given.settings, "seed", "evaluation")
     calls = gathered([read_samples(path) for path in given.samples])
     right, network = recognised(given.model, calls, evaluation)
     table = rows(calls, right, network, seed)
-    write(given.table, table)
-    examples = {header["name"]: (str(arrays["example_subtype"]), arrays["example"]) for header, arrays in calls}
-    with replacing(given.figure) as temporary:
-        temporary.write_bytes(figure(table, examples))
-    print(f"{given.table}: {len(table)} calls, {len(calls[0][1]['label'])} motion models", file=sys.stderr)
+    write(given.out, table)
+    print(f"{given.out}: {len(table)} calls, {len(calls[0][1]['label'])} motion models", file=sys.stderr)
 
 
 if __name__ == "__main__":

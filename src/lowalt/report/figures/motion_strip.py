@@ -5,7 +5,7 @@ from matplotlib import pyplot as plt
 
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report.figures import png
+from lowalt.report.figures.style import png
 from lowalt.targets.cloud import CATEGORIES, Cloud
 
 VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),

@@ -1,6 +1,6 @@
 """The report's short table of what accuracy costs: a row a method and tolerance, from the two measured tables."""
 
-from lowalt.report.tables import read_csv
+from lowalt.common.csv_tables import read_csv
 
 MEASURED = ("method", "points", "range_m", "tolerance", "seconds", "relative_error", "hardware")
 PIXELS = ("tolerance", "pixels", "changed_pixels")

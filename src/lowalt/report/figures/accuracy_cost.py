@@ -1,14 +1,17 @@
-"""The figure of accuracy over time, from accuracy_cost.csv: `python -m lowalt.report.accuracy --table --figure`."""
+"""The figure of recognition accuracy over its time, its training and the bytes it reads.
+
+python -m lowalt.report.figures.accuracy_cost --table accuracy_cost.csv --figure accuracy_cost.png
+"""
 
 import argparse
 
 from matplotlib import pyplot as plt
 
 from lowalt.common.command import run
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
-from lowalt.report.figures import SNR_LABELS, png
-from lowalt.report.tables import read_csv
+from lowalt.report.figures.style import SNR_LABELS, png
 
 NEEDED = (
     "scheme", "kind", "snr_db", "seen_percent", "unseen_percent", "inference_ms_64", "core_s_training", "network_bytes",
@@ -123,7 +126,7 @@ def draw(rows: list[dict[str, str]]) -> bytes:
 
 def main(arguments: list[str]) -> None:
     """Write the figure."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.report.accuracy", description=__doc__)
+    options = argparse.ArgumentParser(prog="python -m lowalt.report.figures.accuracy_cost", description=__doc__)
     options.add_argument("--table", required=True, help="accuracy_cost.csv")
     options.add_argument("--figure", required=True, help="picture to write (.png)")
     given = options.parse_args(arguments)

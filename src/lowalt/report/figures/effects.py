@@ -1,13 +1,26 @@
-"""The figure of `lowalt.report.effects`: one spectrum with and without each effect, time added, accuracy lost."""
+"""The figure of what effects cost and do: one spectrum with and without each effect, time added, accuracy lost.
+
+    python -m lowalt.report.figures.effects --table effects.csv --samples none.npz adc.npz ... --figure effects.png
+
+`--samples` are the files of `lowalt.measure.effects_samples` from which the table was made; they hold the spectra.
+"""
+
+import argparse
+from pathlib import Path
 
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
-from lowalt.report.effect_samples import pixel_change
-from lowalt.report.figures import SNR_LABELS, png
+from lowalt.common.command import run
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.files import replacing
+from lowalt.measure.effects_cost import COLUMNS, gathered
+from lowalt.measure.effects_samples import pixel_change, read_samples
+from lowalt.report.figures.style import SNR_LABELS, png
 from lowalt.tiles.render import VIEWS
 
+NUMBERS = ("base_ms", "added_ms", "parts_ms", "accuracy_without_percent", "difference_points", "low", "high")
 ACROSS = 4
 """Pairs of spectra in a row."""
 
@@ -69,8 +82,8 @@ def _bars(times, losses, table: list[dict]) -> None:
 def figure(table: list[dict], examples: dict[str, tuple[str, np.ndarray]], colours: str = "viridis") -> bytes:
     """Return PNG bytes: a pair of spectra a call, free of noise, above the bars of time and accuracy.
 
-    table: rows of `effects.rows`, the first without effects; examples: (subtype, spectra (2, V, S, S) uint8) of each
-    call; of a pair the spectrum at the first station that changes most is shown.
+    table: rows of `read_rows`, the first without effects; examples: (subtype, spectra (2, V, S, S) uint8) of each call,
+    of which the first station's spectrum that changes most is shown.
     """
     calls = table[1:]
     lines = -(-len(calls) // ACROSS)
@@ -92,3 +105,29 @@ def figure(table: list[dict], examples: dict[str, tuple[str, np.ndarray]], colou
         f"{row['accuracy_without_percent']:.1f} % right without them; {row['hardware']}", fontsize=9,
     )  # fmt: skip
     return png(result, 256)
+
+
+def read_rows(path: str | Path) -> list[dict]:
+    """Return the rows of effects.csv with their numbers (columns NUMBERS; a scene's `parts_ms` may be empty).
+
+    Raises: InputError where the table is missing or lacks a column.
+    """
+    rows = read_csv(path, *COLUMNS)
+    return [{**row, **{name: float(row[name]) if row[name] else "" for name in NUMBERS}} for row in rows]
+
+
+def main(arguments: list[str]) -> None:
+    """Write the figure."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.report.figures.effects", description=__doc__)
+    options.add_argument("--table", required=True, help="table of lowalt.measure.effects_cost (.csv)")
+    options.add_argument("--samples", nargs="+", required=True, help="files of lowalt.measure.effects_samples (.npz)")
+    options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
+    given = options.parse_args(arguments)
+    calls = gathered([read_samples(path) for path in given.samples])
+    examples = {header["name"]: (str(arrays["example_subtype"]), arrays["example"]) for header, arrays in calls}
+    with replacing(given.figure) as temporary:
+        temporary.write_bytes(figure(read_rows(given.table), examples))
+
+
+if __name__ == "__main__":
+    run(main)

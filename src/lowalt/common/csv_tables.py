@@ -1,0 +1,51 @@
+"""Tables as CSV files: the only place that writes one, and the reader of tables whose cells stay text.
+
+Lines end with a single newline on every system, and equal rows give equal bytes.
+"""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+
+
+def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
+    """Return a CSV file's rows as dicts of text.
+
+    Raises: InputError naming the file and the columns it lacks.
+    """
+    with existing(path, "table").open(newline="") as file:
+        reader = csv.DictReader(file)
+        missing = set(needed) - set(reader.fieldnames or ())
+        if missing:
+            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
+        return list(reader)
+
+
+def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
+    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys become empty cells.
+
+    Cells are written as `str` gives them, None as an empty cell. The file is there only once it is whole.
+    Raises: InputError naming the file and the keys of a dict that are no columns.
+    """
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            writer.writerow(_cells(path, columns, row) if isinstance(row, Mapping) else row)
+
+
+def _cells(path: str | Path, columns: Sequence[str], row: Mapping) -> list:
+    unknown = [key for key in row if key not in columns]
+    if unknown:
+        raise InputError(f"{path}: keys {unknown}, expected only the columns {list(columns)}")
+    return [row.get(name, "") for name in columns]
+
+
+def short(value: object) -> object:
+    """Return a float as text with six digits, None as an empty cell, and anything else as it is."""
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else value

@@ -1,0 +1,53 @@
+"""One timer for every measured time: calls that take turns, and the least of several passes. No numbers of its own."""
+
+import statistics
+import time
+from collections.abc import Callable
+
+
+def in_turn(
+    calls: list[tuple[Callable[[], object], int, int]], clock: Callable[[], float] = time.perf_counter
+) -> list[tuple[float, object]]:
+    """Return the median seconds and the last result of each call, given as (call, rounds, times a round).
+
+    Calls take turns, so that a second in which the machine is slow slows all of them and not one.
+    """
+    spent: list[list[float]] = [[] for _ in calls]
+    results: list[object] = [None] * len(calls)
+    for turn in range(max(rounds for _, rounds, _ in calls)):
+        for index, (call, rounds, times) in enumerate(calls):
+            for _ in range(times if turn < rounds else 0):
+                seconds, results[index] = once(call, clock)
+                spent[index].append(seconds)
+    return [(statistics.median(own), result) for own, result in zip(spent, results, strict=True)]
+
+
+def median_s(work: Callable[[], object], repeats: int) -> float:
+    """Return the median seconds of `repeats` calls, after one that warms up."""
+    work()
+    return in_turn([(work, repeats, 1)])[0][0]
+
+
+def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30) -> float:
+    """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
+
+    Calls stop once they took `limit_s` together; a first call that alone takes that long is the measurement.
+    """
+    spent, _ = once(work, clock)
+    if spent > limit_s:
+        return spent
+    best = float("inf")
+    for _ in range(repeats):
+        seconds, _ = once(work, clock)
+        best = min(best, seconds)
+        spent += seconds
+        if spent > limit_s:
+            break
+    return best
+
+
+def once(work: Callable[[], object], clock: Callable[[], float]) -> tuple[float, object]:
+    """Return the time (s) by `clock` that one call took, and its result."""
+    start = clock()
+    result = work()
+    return clock() - start, result
