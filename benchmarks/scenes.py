@@ -1,10 +1,10 @@
-"""What a scene without effects costs beside the echo stage alone: the same signals, made by both, in one run.
+"""Cost of a scene without effects against the echo stage alone: the same signals, made by both in one run.
 
     python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
 
 Processor seconds of one core, medians of alternating repeats, on the first motion models of the run's first chunk at
-its first station. The peer is the echo stage (`lowalt.echo`), which a run without effects uses; beside it stands the
-chain of effects (`lowalt.effects`) with none named, with only idle ones, and with one effect on the motion.
+its first station. The peer is the echo stage (`lowalt.echo`), which a run without effects uses. It is compared with
+the chain of effects (`lowalt.effects`) with no effect named, with only idle ones, and with one effect on the motion.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""The slow truth beyond Eq. 7: every element, route, subcarrier and time sample summed one by one.
+"""The slow truth beyond Eq. 7: every element, path, subcarrier and time sample summed one by one.
 
 Distances from every element to every point are formed as they are; nothing is expanded, interpolated or bounded, and
 no line is shared with `lowalt.effects`.
@@ -31,8 +31,8 @@ def one_way(network, station, shape, places, aim_m, f, squint, wavefront):
     return total * np.exp(-2j * np.pi * f / C * r)
 
 
-def subcarriers(network, station, places, rcs_m2, aim_m, routes=(), factor=1.0, squint=False, wavefront=False):
-    """Y (N, M) of points at `places` (N, L, 3); routes: of (places (N, L, 3), coefficient) beside the direct one."""
+def subcarriers(network, station, places, rcs_m2, aim_m, paths=(), factor=1.0, squint=False, wavefront=False):
+    """Y (N, M) of points at `places` (N, L, 3); paths: further paths (places (N, L, 3), coefficient)."""
     elements = np.prod(network.transmit) * np.prod(network.receive)
     scale = np.sqrt(network.power / elements) * C / network.carrier_hz / (4 * np.pi) ** 1.5
     f = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
@@ -40,9 +40,9 @@ def subcarriers(network, station, places, rcs_m2, aim_m, routes=(), factor=1.0, 
     result = np.zeros((len(places), network.subcarriers), complex)
     for n in range(len(places)):
         for m in range(network.subcarriers):
-            ways = [(places[n], 1.0), *((p[n], np.broadcast_to(c, places.shape[:2])[n]) for p, c in routes)]
+            every = [(places[n], 1.0), *((p[n], np.broadcast_to(c, places.shape[:2])[n]) for p, c in paths)]
             out, back = (
-                sum(c * one_way(network, station, shape, p, aim_m, f[m], squint, wavefront) for p, c in ways)
+                sum(c * one_way(network, station, shape, p, aim_m, f[m], squint, wavefront) for p, c in every)
                 for shape in (network.transmit, network.receive)
             )
             result[n, m] = (strength[n] * out * back).sum()

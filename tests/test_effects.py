@@ -14,11 +14,11 @@ from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal, subcarrier_matrix
 from lowalt.echo.radar import radar
-from lowalt.effects import need, waveform
+from lowalt.effects import interface, need, waveform
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
-from lowalt.effects.facts import check
+from lowalt.effects.checks import check
 from lowalt.effects.hear import Scene, hear, observe
-from lowalt.effects.response import Way, response
+from lowalt.effects.response import ImagePath, response
 from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud
 
@@ -67,14 +67,14 @@ def relative(value, truth):
 
 @pytest.mark.parametrize("shapes", [((4, 2), (4, 2)), ((3, 2), (5, 1))])
 @pytest.mark.parametrize("squint, wavefront", [(False, False), (True, False), (False, True), (True, True)])
-def test_response_is_the_sum_over_every_element_route_and_subcarrier(rng, shapes, squint, wavefront):
+def test_response_is_the_sum_over_every_element_path_and_subcarrier(rng, shapes, squint, wavefront):
     radio = network(subcarriers=17, symbols=3, transmit=shapes[0], receive=shapes[1])
     station = radio.stations[0]
     places = np.array([12.0, 3.0, 14.0]) + rng.normal(size=(3, 5, 3))
     rcs, aim, factor = rng.uniform(0.1, 2, 5), np.array([12.0, 3.0, 14.0]), rng.uniform(0, 1, (3, 5))
     image, coefficient = places * [1, 1, -1], rng.normal(size=(3, 5)) + 1j * rng.normal(size=(3, 5))
     ours = response(
-        radio, station, places, rcs, aim, ways=[Way(image, coefficient)], factor=factor, squint=squint,
+        radio, station, places, rcs, aim, paths=[ImagePath(image, coefficient)], factor=factor, squint=squint,
         wavefront=wavefront,
     )  # fmt: skip
     truth = reference_effects.subcarriers(
@@ -89,10 +89,10 @@ def test_a_coarser_response_errs_by_no_more_than_it_may(rng, squint, wavefront, 
     radio = network(subcarriers=40, subcarrier_spacing_hz=3e6, symbols=2, transmit=(16, 4), receive=(9, 3))
     station, aim = radio.stations[0], np.array([25.0, 30.0, 14.0])
     places, rcs = aim + rng.normal(size=(2, 40, 3)), rng.uniform(0.1, 2, 40)
-    image = Way(places * [1, 1, -1], 0.7j)
+    image = ImagePath(places * [1, 1, -1], 0.7j)
     given = (radio, station, places, rcs, aim)
-    ours = response(*given, ways=[image], squint=squint, wavefront=wavefront, error=error)
-    exact = response(*given, ways=[image], squint=squint, wavefront=wavefront)
+    ours = response(*given, paths=[image], squint=squint, wavefront=wavefront, error=error)
+    exact = response(*given, paths=[image], squint=squint, wavefront=wavefront)
     near = np.linalg.norm(places - station.position_m, axis=2).min()
     elements = np.prod(radio.transmit) * np.prod(radio.receive)
     peaks = radar(radio, station).scale * elements * np.sqrt(rcs).sum() / near**2 * (1 + 0.7) ** 2
@@ -130,10 +130,10 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):
 def test_the_catalogue_names_every_effect_module_and_only_those():
     for entry in ORDER:
         module = __import__(dotted(entry.partition("/")[2]), fromlist=["idle"])
-        assert module.SOURCE and isinstance(module.DEFAULTS, dict) and callable(module.idle)
-        work = {"motion": ("perturb",), "channel": ("visible", "ways", "scatter", "bound"), "receiver": ("receive",),
-                "detection": ("process", "choose")}[PLACES[entry.partition("/")[2]]]  # fmt: skip
-        assert sum(hasattr(module, name) for name in work) == 1
+        assert module.SOURCE and isinstance(module.DEFAULTS, dict)
+        assert isinstance(module, interface.Effect)
+        provided = [one for one in interface.WORK[PLACES[entry.partition("/")[2]]] if isinstance(module, one)]
+        assert len(provided) == 1
     assert len(set(ORDER)) == len(ORDER)
 
 
@@ -251,7 +251,7 @@ def random_case(rng):
 
 
 def random_company(rng):
-    """Effects beside physics by need: routes, clutter and what cancels it, and a receiver that is linear."""
+    """Further effects for a random scene: a ground path, clutter and its canceller, and a linear receiver."""
     static = {"kind": str(rng.choice(["mean", "pulse", "exponential"])), "order": int(rng.integers(1, 4)),
               "memory": rng.uniform(0.1, 0.99)}  # fmt: skip
     company = {

@@ -20,14 +20,14 @@ from lowalt.targets.cloud import Cloud
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 PLAIN = replace(NETWORK, transmit=(1, 1), receive=(1, 1), subcarriers=1)
-"""Isotropic arrays and one subcarrier: nothing but the ways of the wave."""
+"""Isotropic arrays and one subcarrier, so that only the propagation paths matter."""
 NOTHING = np.full(3, np.nan)
 METAL = {"permittivity": 1.0, "conductivity_s_m": 1e14, "roughness_m": 0.0, "polarisation": "horizontal"}
 """A mirror: reflection -1 at every angle."""
 
 
 def body(points: list, normals: np.ndarray | None = None, kind: str = "body") -> Cloud:
-    """A cloud of given points; beside a body, all others on one moving part about z."""
+    """A cloud of given points: the first ones on a body, all others on one part that turns about z."""
     points = np.array(points, float)
     moving = kind != "body"
     return Cloud(
@@ -40,15 +40,15 @@ def body(points: list, normals: np.ndarray | None = None, kind: str = "body") ->
 
 
 def seen(cloud: Cloud, network: Network = NETWORK, times_s: np.ndarray | None = None, **values: float) -> View:
-    """What station A sees of a cloud; motion values not given are zero."""
+    """The view of a cloud at station A; motion values not given are zero."""
     row = {"subtype": "test", "model": 0, **dict.fromkeys(NUMBERS, 0.0), **values}
     return View(network, network.station("A"), cloud, row, network.times_s if times_s is None else times_s)
 
 
 def heard(view: View, settings: dict | None) -> np.ndarray:
     """The subcarriers of a view, with the ground where there are settings for it."""
-    ways = [] if settings is None else ground_reflection.ways(settings, view)
-    return response(view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, ways=ways)
+    paths = [] if settings is None else ground_reflection.paths(settings, view)
+    return response(view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, paths=paths)
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_two_rays_add_as_the_closed_form_over_range_and_height(settings):
 
 
 def test_a_mirror_fades_to_nothing_and_rises_by_twelve_decibels():
-    # Far out the routes differ by 2 h z / x, so heights between two fades are lambda x / (2 h) apart.
+    # Far out the paths differ by 2 h z / x, so heights between two fades are lambda x / (2 h) apart.
     height = np.linspace(0.0, 40.0, 801)
     x, h = 1200.0, 25.0
     cloud = body([[0, 0, 0]])
@@ -140,9 +140,9 @@ def test_ground_like_air_is_idle_and_the_limit_is_continuous():
 )
 def test_impossible_scenes_are_refused_by_name(effect, change, place, words):
     station = replace(NETWORK.stations[0], position_m=(0.0, 0.0, place))
-    facts = SimpleNamespace(network=replace(NETWORK, stations=(station,)))
+    checked = SimpleNamespace(network=replace(NETWORK, stations=(station,)))
     with pytest.raises(InputError, match=words):
-        effect.check({**effect.DEFAULTS, **change}, facts)
+        effect.check({**effect.DEFAULTS, **change}, checked)
     effect.check(effect.DEFAULTS, SimpleNamespace(network=NETWORK))
 
 

@@ -176,7 +176,7 @@ def test_rarer_errors_are_a_part_of_the_frequent_ones():
 
 
 def test_a_spread_around_all_cells_is_refused():
-    facts = SimpleNamespace(network=network(4, 8), effects={})
+    checked = SimpleNamespace(network=network(4, 8), effects={})
     with pytest.raises(InputError, match="spread_cells: 4, expected less than half of 8"):
-        cell_error.check({**cell_error.DEFAULTS, "spread_cells": 4}, facts)
-    cell_error.check({**cell_error.DEFAULTS, "spread_cells": 3}, facts)
+        cell_error.check({**cell_error.DEFAULTS, "spread_cells": 4}, checked)
+    cell_error.check({**cell_error.DEFAULTS, "spread_cells": 3}, checked)

@@ -1,4 +1,4 @@
-"""Motion effects: what is added to a target's motion, read back from its poses, laws of the random processes."""
+"""Motion effects: the added motion is read back from the poses, and the random processes obey their laws."""
 
 import math
 from dataclasses import replace
@@ -96,7 +96,7 @@ def test_turning_a_part_that_does_not_move_is_refused(name):
 
 
 def craft(rotors: int = 4, category: str = "UAV") -> SimpleNamespace:
-    """What the motion effects ask of a cloud."""
+    """The attributes of a cloud that the motion effects use."""
     return SimpleNamespace(category=category, parts_of=lambda kind: list(range(rotors)) if kind == "rotor" else [])
 
 

@@ -153,7 +153,7 @@ def test_a_car_body_does_not_hide_its_wheels_in_their_wells():
     cut, whole = occlusion.hidden(view)[0], occlusion.hidden(replace(view, occluders=given))[0]
     assert cut[tyres].mean() < 0.2
     assert whole[tyres].mean() > cut[tyres].mean() + 0.2
-    # What is cut away is an area, and what is left of a half plane cut by a box is a half plane.
+    # The part cut away is an area; a half plane cut by a box leaves a half plane.
     plate = box((2.0, 2.0, 0.01))
     left = occluders.cut_away(plate, (box((4.0, 4.0, 4.0), (2.0, 0, 0), exponent=200.0),))
     assert surface_area(left) == pytest.approx(surface_area(plate) / 2, rel=0.02)

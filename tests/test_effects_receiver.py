@@ -1,4 +1,4 @@
-"""Receiver effects: what is set is read back from the signal, against closed forms and slow sums."""
+"""Receiver effects: each setting is read back from the signal, against closed forms and slow sums."""
 
 import math
 from pathlib import Path
@@ -39,7 +39,7 @@ IDLE = [
     (adc, {"bits": 0}),
     (adc, {"bits": None}),
 ]
-# Settings of strength `s`: a factor on what each effect does.
+# Settings of strength `s`: a factor on each effect's change.
 FAINT = [
     (receiver_noise, lambda s: {"temperature_k": 290 * s**2}),
     (timing_offset, lambda s: {"sigma_s": 2e-8 * s}),
@@ -51,8 +51,8 @@ FAINT = [
 ]
 
 
-def facts(radar, **effects):
-    """What `check` looks at."""
+def checked(radar, **effects):
+    """The scene that `check` looks at."""
     return SimpleNamespace(network=radar, effects=effects)
 
 
@@ -208,7 +208,7 @@ def test_each_station_has_its_fixed_offset():
     ]
     assert late == [1e-8, -2e-8, 0]
     with pytest.raises(InputError, match=r"timing_offset.fixed_s: station\(s\) \['Z'\]"):
-        timing_offset.check({**timing_offset.DEFAULTS, "fixed_s": {"Z": 1e-9}}, facts(radar))
+        timing_offset.check({**timing_offset.DEFAULTS, "fixed_s": {"Z": 1e-9}}, checked(radar))
 
 
 @settings(max_examples=20, deadline=None)
@@ -229,12 +229,12 @@ def test_a_late_window_brings_echoes_nearer(late, cell):
 def test_slips_beyond_the_prefix_are_refused():
     radar = network()
     with pytest.raises(InputError, match="timing_offset: the window can be off by"):
-        timing_offset.check({**timing_offset.DEFAULTS, "sigma_s": 1e-7}, facts(radar))
+        timing_offset.check({**timing_offset.DEFAULTS, "sigma_s": 1e-7}, checked(radar))
     clock = {**clock_offset.DEFAULTS, "fixed_ppm": 0.25, "sigma_ppm": 0}
-    clock_offset.check(clock, facts(radar))
+    clock_offset.check(clock, checked(radar))
     with pytest.raises(InputError, match="clock_offset: the window slips"):
-        clock_offset.check(clock, facts(radar, timing_offset=timing_offset.DEFAULTS))
-    timing_offset.check(timing_offset.DEFAULTS, facts(radar))
+        clock_offset.check(clock, checked(radar, timing_offset=timing_offset.DEFAULTS))
+    timing_offset.check(timing_offset.DEFAULTS, checked(radar))
 
 
 @pytest.mark.parametrize("ppm", [-3.0, 0.05, 20.0])
@@ -260,7 +260,7 @@ def test_clock_offset_makes_ranges_drift_and_lines_stay():
     drift_m = (strongest(moved) - 60.0) * look.network.cell_m
     slope = np.polyfit(look.symbol_times_s, drift_m, 1)[0]
     assert slope == pytest.approx(C * 0.2e-6 / 2, rel=2e-3)
-    # The oscillator is another effect's: its own subcarrier turns only with what leaks from the others.
+    # Another effect models the oscillator, so the subcarrier at its frequency turns only by leakage from others.
     assert abs(np.angle(moved[:, 128])).max() < 1e-3
 
 
@@ -334,7 +334,7 @@ def test_full_scale_sine_has_six_decibels_a_bit(bits):
     k = np.arange(1, 2000)
     exact = 0.5 * 4.0 ** (bits - 1) / (1 / 12 + np.sum(j0(np.pi * k * 2**bits) / (np.pi * k) ** 2))
     assert ratio == pytest.approx(exact, rel=0.01)
-    # What the rule of thumb leaves out is that sum, of which |J0(x)| <= sqrt(2 / pi x) bounds every term.
+    # The rule of thumb leaves that sum out; |J0(x)| <= sqrt(2 / pi x) bounds each of its terms.
     ripple = 10 * math.log10(1 + 12 / math.pi**2 * 1.342 * math.sqrt(2 / (math.pi**2 * 2**bits)))
     assert 10 * math.log10(ratio) == pytest.approx(6.0206 * bits + 1.7609, abs=ripple + 0.02)
 
@@ -400,7 +400,7 @@ def test_the_default_spectrum_is_that_of_the_3gpp_model():
 @pytest.mark.parametrize("points", [FLAT, STEEP])
 @pytest.mark.parametrize("delay_s", [None, 2e-6, 8e-6, 40e-6])
 def test_covariance_inside_a_symbol_is_the_integral_of_the_spectrum(points, delay_s):
-    """Structure function D(t) = 2 int S (1 - cos 2 pi f t): what the split's two parts give together."""
+    """Structure function D(t) = 2 int S (1 - cos 2 pi f t): the sum of the split's two parts."""
     at = _oscillator.grid(*LOOK)
     lags = _oscillator.covariance(points, at, delay_s)
     slow = _oscillator.density(points, at.slow_hz) * at.slow_weight
@@ -524,7 +524,7 @@ def test_odd_looks_have_the_right_variance(look):
     total = _oscillator.covariance(FLAT, at, None)[0] + 2 * np.sum(
         _oscillator.density(FLAT, at.slow_hz) * at.slow_weight
     )
-    # White to half the sample rate, but for the line at zero.
+    # White to half the sample rate, except for the missing line at zero.
     assert total == pytest.approx(1e-9 / look[3], rel=0.01)
     assert np.isfinite(_oscillator.phase(FLAT, look, None, np.random.default_rng(1))).all()
 
@@ -539,4 +539,4 @@ def test_odd_looks_have_the_right_variance(look):
 )
 def test_impossible_spectra_are_refused(given, radar, message):
     with pytest.raises(InputError, match=message):
-        phase_noise.check({**phase_noise.DEFAULTS, **given}, facts(radar))
+        phase_noise.check({**phase_noise.DEFAULTS, **given}, checked(radar))

@@ -13,7 +13,7 @@ from lowalt.common.streams import stream
 from lowalt.echo.__main__ import main as echo_command
 from lowalt.effects.__main__ import main as effects_command
 from lowalt.effects.catalogue import PLACES
-from lowalt.effects.facts import check
+from lowalt.effects.checks import check
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import write_table
 from lowalt.noise.__main__ import main as noise_command
@@ -28,8 +28,8 @@ SCENES = sorted((ROOT / "config/scenes").glob("*.yaml"))
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_a_shipped_scene_fits_together_and_is_a_few_lines(path):
-    facts = check(load([BASE, path], SCHEMA))
-    assert (path.stem == "paper") == (not facts.effects)
+    checked = check(load([BASE, path], SCHEMA))
+    assert (path.stem == "paper") == (not checked.effects)
     assert len(path.read_text().splitlines()) < 30
 
 

@@ -31,11 +31,11 @@ def main(arguments: list[str] | None = None) -> int:
     explain.add_argument("--station", help="the station that listens (default: the first)")
     explain.add_argument("--no-cost", action="store_true", help="do not measure times")
     given = line.parse_args(arguments)
-    from lowalt.effects.explain import explain as explained
+    from lowalt.effects.explain import explain_scene
 
     inputs = os.environ.get("LOWALT_INPUTS")
     try:
-        text = explained(
+        text = explain_scene(
             [given.base, *given.scene], given.schema, inputs and Path(inputs), given.sample, given.station,
             not given.no_cost,
         )  # fmt: skip

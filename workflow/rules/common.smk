@@ -36,7 +36,7 @@ def prepared(config):
         if RUN in block["transfer"]:
             raise InputError(f"recognition.transfer: {RUN!r} is this run, expected other runs")
         if config["effects"]:
-            from lowalt.effects.facts import check as check_effects
+            from lowalt.effects.checks import check as check_effects
 
             check_effects(config)
         lacking = missing_inputs(chosen, INPUTS)

@@ -1,6 +1,6 @@
-"""All effects there are, in the order the chain applies them, and the loading of those a scene names.
+"""The names of all effects in the order the chain applies them, and the loading of those a scene names.
 
-Only names live here: a module is imported when a scene calls for it, and never otherwise.
+Only names live here: a module is imported when a scene names it, and never otherwise.
 """
 
 import importlib
@@ -37,8 +37,8 @@ BY_NEED = ("squint", "wavefront", "symbol_motion")
 """Physics beyond Eq. 7 that is left out where its bound allows it."""
 
 
-class Effect(NamedTuple):
-    """An effect a scene calls for: its module, and its parameters with the module's defaults filled in."""
+class NamedEffect(NamedTuple):
+    """An effect that a scene names: its module (`interface.Effect`), and its settings, defaults filled in."""
 
     name: str
     place: str
@@ -49,14 +49,14 @@ class Effect(NamedTuple):
 def dotted(name: str) -> str:
     """Return the module of an effect, such as lowalt.effects.receiver.adc.
 
-    Raises: InputError for a name that is no effect.
+    Raises: InputError for a name that belongs to no effect.
     """
     if name not in PLACES:
         raise InputError(f"effects: unknown effect {name!r}, expected some of {sorted(PLACES)}")
     return f"lowalt.effects.{PLACES[name]}.{name}"
 
 
-def called(block: dict[str, dict | None]) -> list[Effect]:
+def called(block: dict[str, dict | None]) -> list[NamedEffect]:
     """Return the effects of a scene's `effects` block in the chain's order, without those that are the identity.
 
     Raises: InputError for an unknown effect or parameter.
@@ -76,10 +76,15 @@ def called(block: dict[str, dict | None]) -> list[Effect]:
             )
         settings = {**module.DEFAULTS, **given}
         if not module.idle(settings):
-            result.append(Effect(name, place, module, settings))
+            result.append(NamedEffect(name, place, module, settings))
     return result
 
 
-def placed(effects: Iterable[Effect], *places: str) -> list[Effect]:
+def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:
     """Return the effects of these places, order kept."""
     return [effect for effect in effects if effect.place in places]
+
+
+def providing(effects: Iterable[NamedEffect], protocol: type) -> list[NamedEffect]:
+    """Return the effects whose modules satisfy a protocol of `effects.interface`, order kept."""
+    return [effect for effect in effects if isinstance(effect.module, protocol)]

@@ -1,4 +1,4 @@
-"""One sample's channel, waveform, receiver and detection, with any choice of physics by need."""
+"""One sample's channel, waveform, receiver and detection, computed with any subset of the physics by need."""
 
 import math
 from collections.abc import Callable
@@ -9,8 +9,17 @@ import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import need, waveform
-from lowalt.effects.catalogue import BY_NEED, Effect, placed
-from lowalt.effects.response import Way, response
+from lowalt.effects.catalogue import NamedEffect, placed, providing
+from lowalt.effects.interface import (
+    AddsEchoes,
+    AddsPaths,
+    Amplifies,
+    BoundsItself,
+    ChoosesCells,
+    FiltersCells,
+    WeighsPoints,
+)
+from lowalt.effects.response import ImagePath, response
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
 
@@ -24,38 +33,38 @@ class Outcome(NamedTuple):
 
 
 class Chain:
-    """What computes a sample; effects: those beyond motion, in the chain's order.
+    """Computes one sample at one station; effects: all but motion's, in the chain's order.
 
-    draws: the stream of an effect for this sample and station, from its start at every call; power: mean |Y_bin|^2 of
-    the target's echo alone (W); error: of interpolation over frequencies and instants, relative to peak amplitudes.
+    draws: returns the stream of an effect for this sample and station, from its start at every call; power: mean
+    |Y_bin|^2 of the target's echo alone (W); error: largest error of interpolation over frequencies and over instants,
+    each relative to the sum of peak amplitudes.
     """
 
     def __init__(
         self,
-        effects: list[Effect],
+        effects: list[NamedEffect],
         view: View,
         draws: Callable[[str], np.random.Generator],
         power: float,
         error: float,
     ):
         self.view, self.draws, self.power, self.error = view, draws, power, error
-        self.by_need = {effect.name: effect for effect in effects if effect.name in BY_NEED}
-        self.channel = [effect for effect in placed(effects, "channel") if effect.name not in BY_NEED]
-        self.receiver, self.detection = placed(effects, "receiver"), placed(effects, "detection")
+        self.by_need = {effect.name: effect for effect in providing(effects, BoundsItself)}
+        self.channel, self.receiver, self.detection = (
+            placed(effects, place) for place in ("channel", "receiver", "detection")
+        )
         self.amplification = math.prod(
             effect.module.amplifies(effect.settings)
-            for effect in (*self.receiver, *self.detection)
-            if hasattr(effect.module, "amplifies")
+            for effect in providing((*self.receiver, *self.detection), Amplifies)
         )
         self.factor: np.ndarray | float = 1.0
-        for effect in self.channel:
-            if hasattr(effect.module, "visible"):
-                self.factor = self.factor * effect.module.visible(effect.settings, view)
+        for effect in providing(self.channel, WeighsPoints):
+            self.factor = self.factor * effect.module.visible(effect.settings, view)
 
     def bounds(self, names: frozenset[str]) -> dict[str, float]:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
-        routes = 1.0 + sum(float(np.max(abs(way.coefficient))) for way in self._ways)
-        peaks = need.part_amplitudes(self.view) * routes**2 * float(np.max(self.factor)) * self.amplification
+        amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
+        peaks = need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor)) * self.amplification
         return {
             name: float((effect.module.bound(effect.settings, self.view) * peaks).sum(axis=1).max())
             for name, effect in self.by_need.items()
@@ -75,14 +84,12 @@ class Chain:
         if self.receiver:
             spectrum = self._received(spectrum)
         cells = np.fft.ifft(spectrum, axis=1)
-        for effect in self.detection:
-            if hasattr(effect.module, "process"):
-                cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
+        for effect in providing(self.detection, FiltersCells):
+            cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
         best = abs(cells).argmax(axis=1)
         lead = need.gap(cells)
-        for effect in self.detection:
-            if hasattr(effect.module, "choose"):
-                best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
+        for effect in providing(self.detection, ChoosesCells):
+            best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
         return Outcome(cells[np.arange(len(cells)), best], best, lead)
 
     def patched(self, outcome: Outcome, contested: np.ndarray, everything: frozenset[str]) -> Outcome:
@@ -99,15 +106,15 @@ class Chain:
         return merged
 
     def _echo(self, view: View, on: frozenset[str], factor: np.ndarray | float) -> np.ndarray:
-        """The target's subcarriers (N, M) over all routes."""
+        """The target's subcarriers (N, M), summed over all paths."""
         return response(
             view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m,
-            ways=self._ways if view is self.view else self._routes(view), factor=factor, squint="squint" in on,
+            paths=self._paths if view is self.view else self._paths_of(view), factor=factor, squint="squint" in on,
             wavefront="wavefront" in on, error=self.error,
         )  # fmt: skip
 
     def _moving(self, view: View, on: frozenset[str], factor: np.ndarray | float, rows) -> np.ndarray:
-        """Subcarriers (N, M) of a target that moves while a symbol lasts: its response at a few instants, blended."""
+        """Subcarriers (N, M) of a target that moves while a symbol lasts, interpolated from a few instants of it."""
         sent = self._sent[rows]
         delays, weights = self.by_need["symbol_motion"].module.instants(view, self.error)
         samples = 0.0
@@ -122,27 +129,23 @@ class Chain:
             samples = effect.module.receive(effect.settings, samples, self._frame, self.draws(effect.name))
         return waveform.demodulate(samples, self._sent)
 
-    def _routes(self, view: View) -> list[Way]:
-        """The routes beside the direct one."""
+    def _paths_of(self, view: View) -> list[ImagePath]:
+        """All paths except the direct one."""
         return [
-            way
-            for effect in self.channel
-            if hasattr(effect.module, "ways")
-            for way in effect.module.ways(effect.settings, view)
+            path for effect in providing(self.channel, AddsPaths) for path in effect.module.paths(effect.settings, view)
         ]
 
     @cached_property
-    def _ways(self) -> list[Way]:
-        """The routes of the whole look."""
-        return self._routes(self.view)
+    def _paths(self) -> list[ImagePath]:
+        """All paths except the direct one, over the whole look."""
+        return self._paths_of(self.view)
 
     @cached_property
     def _clutter(self) -> np.ndarray | None:
-        """Sum of what else scatters (N, M), None for nothing."""
+        """Sum of the echoes of everything but the target (N, M), None where there are none."""
         added = [
             effect.module.scatter(effect.settings, self.view, self.draws(effect.name))
-            for effect in self.channel
-            if hasattr(effect.module, "scatter")
+            for effect in providing(self.channel, AddsEchoes)
         ]
         return sum(added[1:], added[0]) if added else None
 
@@ -153,7 +156,7 @@ class Chain:
 
     @cached_property
     def _frame(self) -> Frame:
-        """What receiver and detection effects know of the look."""
+        """The look as receiver and detection effects know it."""
         view = self.view
         range_m = float(np.linalg.norm(view.aim_m - np.asarray(view.station.position_m)))
         return Frame(view.network, view.station, self._sent, self.power, 2.0 * range_m / SPEED_OF_LIGHT)

@@ -1,6 +1,6 @@
-"""What a scene simulates, what it leaves out, by which bounds, and what each item costs: `lowalt explain SCENE`.
+"""The explanation that `lowalt explain SCENE` prints: effects, sources, decisions with their bounds, and costs.
 
-The costs are measured on the spot, on one motion model of each category the scene has, at its first station.
+The costs are measured when the command runs, on one motion model of each category of the scene, at its first station.
 """
 
 from pathlib import Path
@@ -16,8 +16,8 @@ from lowalt.common.streams import stream
 from lowalt.common.timing import median_s
 from lowalt.echo import echo_signal
 from lowalt.echo import explain as explain_echo
-from lowalt.effects.catalogue import BY_NEED, PLACES, Effect, called
-from lowalt.effects.facts import check
+from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
+from lowalt.effects.checks import check
 from lowalt.effects.hear import Scene, hear, observe
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.__main__ import make
@@ -75,7 +75,7 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
     """Return milliseconds a sample and station: "base", each effect added alone to the base, and "together"."""
     station = scene.network.station(station_name)
 
-    def mean(effects: tuple[Effect, ...]) -> float:
+    def mean(effects: tuple[NamedEffect, ...]) -> float:
         part = Scene(scene.network, scene.seed, scene.tolerance, effects)
         times = [1e3 * median_s(lambda s=s: hear(part, station, s.cloud, s.row, s.occluders), REPEATS) for s in chosen]
         return sum(times) / len(times)
@@ -86,7 +86,7 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
 
 
 def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
-    """Return what is computed of one sample at one station, and the bounds behind it."""
+    """Return lines that say what is computed for one sample at one station, and by which bounds."""
     station = scene.network.station(station_name)
     view = observe(scene, station, sample.cloud, sample.row, sample.occluders)
     own = echo_signal(scene.network, station, view.motion, sample.cloud.rcs_m2, view.aim_m, scene.tolerance)
@@ -106,7 +106,7 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
     return lines
 
 
-def explain(
+def explain_scene(
     paths: list[Path],
     schema: Path,
     inputs: Path | None,
@@ -120,7 +120,7 @@ def explain(
     costs are measured. Raises: InputError where the configuration, a sample or a station is wrong.
     """
     config = load(paths, schema)
-    facts = check(config)
+    checked = check(config)
     effects = tuple(called(config["effects"]))
     scene = Scene(Network.from_settings(config["network"]), config["seed"], config["echo"]["tolerance"], effects)
     station = station or scene.network.stations[0].name
@@ -139,7 +139,7 @@ def explain(
         kind = "by need" if effect.name in BY_NEED else effect.place
         values = ", ".join(f"{key} {value}" for key, value in effect.settings.items())
         lines += [f"{effect.name} ({kind}): {values or 'no parameters'}{cost}", f"  {effect.module.SOURCE}"]
-    idle = [name for name in config["effects"] if name not in facts.effects]
+    idle = [name for name in config["effects"] if name not in checked.effects]
     if idle:
         lines.append(f"named, but the identity with these parameters, so left out: {', '.join(idle)}")
     absent = [name for name in PLACES if name not in config["effects"]]

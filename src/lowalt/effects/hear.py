@@ -1,7 +1,7 @@
-"""What one station hears of one sample of a scene: the target's own echo, and physics by need decided on.
+"""The signal of one sample at one station in a scene, and the decision which physics by need is computed.
 
-Without effects beyond motion the echo engine answers alone. Only what is called for is computed: no waveform without
-a receiver effect, no frequency response where physics by need can all be left out.
+In a scene with effects on the motion only, the echo engine gives the signal. Otherwise the chain computes what the
+scene names: no waveform without a receiver effect, no frequency response where all physics by need can be left out.
 """
 
 import math
@@ -15,8 +15,9 @@ from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need
-from lowalt.effects.catalogue import BY_NEED, Effect, placed
+from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import Chain, Outcome
+from lowalt.effects.interface import AddsPaths
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
@@ -24,12 +25,12 @@ from lowalt.targets.cloud import Cloud
 
 @dataclass(frozen=True)
 class Scene:
-    """What a scene asks of every sample: `effects` in the chain's order (`catalogue.called`)."""
+    """A scene: its network, seed, tolerance, and its `effects` in the chain's order (`catalogue.called`)."""
 
     network: Network
     seed: int
     tolerance: float | None
-    effects: tuple[Effect, ...]
+    effects: tuple[NamedEffect, ...]
 
     def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
@@ -37,10 +38,10 @@ class Scene:
 
 
 class Heard(NamedTuple):
-    """What one station hears of one target.
+    """The signal of one target at one station.
 
     signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells; power: mean |Y_bin|^2 of the target's echo alone,
-    before any channel effect (W), which set SNRs refer to; decisions: what physics by need was computed, and why.
+    before any channel effect (W), which set SNRs refer to; decisions: which physics by need was computed, and why.
     """
 
     signal: np.ndarray
@@ -50,25 +51,26 @@ class Heard(NamedTuple):
 
 
 def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> Heard:
-    """Return what `station` hears of the motion model `row` (motion table) under the scene's effects.
+    """Return the signal at `station` of the motion model `row` (motion table) under the scene's effects.
 
     occluders: the target's surfaces, for self-occlusion.
-    Raises: InputError naming the sample where something cannot be computed with.
+    Raises: InputError naming the sample that cannot be computed.
     """
     sample = f"{row['subtype']}, model {row['model']}, station {station.name}"
     beyond = placed(scene.effects, "channel", "receiver", "detection")
     asked = [effect.name for effect in beyond if effect.name in BY_NEED]
-    # What is left out and what the engine approximates share the tolerance.
+    # Half the tolerance is for physics that is left out, the other half for the echo engine's approximations.
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
     view = observe(scene, station, cloud, row, occluders)
     own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
-    # Of the signal as it is stored, so that noise set against it is what it would be without this chain.
+    # Measure the power after rounding to complex64, as the echo stage does; the noise level is then the same with and
+    # without effects.
     power = rms(own.signal.astype(np.complex64)) ** 2
     if not beyond:
         return Heard(own.signal, own.cell, power, [])
     error = 1e-13
     if share is not None:
-        # Over frequencies and over instants: a fiftieth each of the tolerance, against the sum of peak amplitudes.
+        # Interpolation over frequencies and over instants may each err by a fiftieth of the tolerance.
         peaks = float(need.part_amplitudes(view).sum(axis=1).max())
         error = max(0.02 * share * float(abs(own.signal).max()) / peaks, error)
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power, error)
@@ -76,7 +78,7 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
         outcome = chain.run(frozenset(asked))
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
     else:
-        # Where nothing else is asked for, the engine's echo is the outcome without any of it.
+        # Where the scene names only physics by need, the engine's echo is the outcome without any of it.
         alone = len(asked) == len(beyond)
         trial = Outcome(own.signal, own.cell, own.gap) if alone else chain.run(frozenset())
         outcome, notes = settle(chain, asked, share, trial)
@@ -84,22 +86,22 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
 
 
 def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:
-    """Return the view of a sample with the scene's motion effects drawn; their draws know no station."""
+    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station."""
     times_s = scene.network.times_s
     grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
     moved = tuple(
         effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))
         for effect in placed(scene.effects, "motion")
     )
-    reflected = any(hasattr(effect.module, "ways") for effect in scene.effects)
+    reflected = bool(providing(scene.effects, AddsPaths))
     return View(scene.network, station, cloud, row, times_s, grid_s, moved, occluders, reflected)
 
 
 def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tuple[Outcome, list[Decision]]:
-    """Return the outcome and what was decided: physics `asked` for computed by need, given the outcome without any.
+    """Return the outcome with the physics `asked` for computed by need, and the decisions.
 
-    share: what may be left out, relative to the sample's largest value. Where what was left out could change which
-    cell is strongest, everything is computed.
+    share: largest change allowed by leaving physics out, relative to the sample's largest value; trial: the outcome
+    with none of it computed. Symbols whose strongest cell the physics left out could change are computed with all.
     """
     everything = frozenset(asked)
     largest = float(abs(trial.signal).max())

@@ -1,7 +1,7 @@
-"""Physics by need: which of the effects beyond Eq. 7 a sample can do without, decided by bounds.
+"""Physics by need: which of the effects beyond Eq. 7 can be left out of a sample, decided by bounds.
 
-A bound is against the sum of amplitudes, which is known beforehand; a tolerance is against the sample's largest
-value. So: bound, compute without, compare, and compute with where the bound does not fit.
+A bound is relative to the sum of amplitudes, which is known beforehand; a tolerance is relative to the sample's largest
+value. So the chain first computes without the effects, then compares the bounds, and computes those that do not fit.
 """
 
 import math
@@ -14,7 +14,7 @@ from lowalt.effects.view import View
 
 
 class Decision(NamedTuple):
-    """What was decided on one effect: `bound` relative to the sample's largest value, inf where nothing is known."""
+    """A decision on one effect; `bound` is relative to the sample's largest value, inf where it is unknown."""
 
     name: str
     bound: float
@@ -35,8 +35,8 @@ def leave_out(bounds: dict[str, float], tolerance: float | None, largest: float)
     """Return the effects that can be left out together, and the sum of their bounds.
 
     bounds: largest change of any range cell by each effect (same units as `largest`, the sample's largest value
-    computed without any of them); tolerance: relative to the true largest value, which is at least `largest` less all
-    bounds. Smallest bounds go first.
+    computed without any of them); tolerance: relative to the true largest value, which is at least `largest` minus the
+    sum of all bounds. The smallest bounds are left out first.
     """
     if tolerance is None:
         return [], 0.0

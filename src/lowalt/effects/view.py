@@ -1,4 +1,4 @@
-"""What one station sees of one moving target: poses, places and normals, each computed when first asked for."""
+"""One moving target as one station sees it: poses, places and normals, each computed when first needed."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -15,7 +15,7 @@ from lowalt.targets.cloud import Cloud
 class View:
     """A target's motion as one station sees it.
 
-    row: its row of the motion table; times_s: (N,) s; perturbations: what motion effects add, given at `grid_s`
+    row: its row of the motion table; times_s: (N,) s; perturbations: those of the motion effects, given at `grid_s`
     (G,) s, which spans the look and one symbol more; occluders: a target's surfaces (see `channel.occlusion`) or None.
     """
 
@@ -28,7 +28,7 @@ class View:
     perturbations: tuple[Perturbation, ...] = ()
     occluders: dict | None = field(default=None, repr=False)
     reflected: bool = False
-    """Whether the station sees images of the points beside the points: their directions are then anywhere."""
+    """Whether the station also sees images of the points; their directions are then not bounded by the target's."""
 
     @cached_property
     def motion(self) -> Rigid:

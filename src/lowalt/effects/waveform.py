@@ -1,8 +1,8 @@
-"""The OFDM waveform of a look: the data sent, the samples received, and what a receiver knows of both.
+"""The OFDM waveform of a look: the data sent, the samples received, and the receiver's view of both.
 
 Samples are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in NR
 (3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept; its
-cyclic prefix is taken to cover every echo, which is what Eq. 7 assumes. Impairments are in `effects.receiver`.
+cyclic prefix is taken to cover every echo, as Eq. 7 assumes. Impairments are in `effects.receiver`.
 """
 
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
 def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Return the responses (N, M) of time samples (N, M) that carried `data`: the inverse of `transmit`.
 
-    Dividing by what was sent (not by its conjugate, as the paper's Eq. 24 would need) leaves the response alone.
+    The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
     return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) * np.conj(data)
 
@@ -51,7 +51,7 @@ def turned(angle_rad: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Frame:
-    """One look as the receiver of one station has it."""
+    """One coherent processing interval (look) as the receiver of one station knows it."""
 
     network: Network
     station: Station

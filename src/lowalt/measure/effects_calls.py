@@ -6,7 +6,7 @@ from lowalt.common.config import check, merge
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
-from lowalt.effects.facts import check as check_effects
+from lowalt.effects.checks import check as check_effects
 
 ELSEWHERE = ("network", "targets", "motion", "spectra", "images", "split", "seed")
 """What a scene may not change here: its samples would no longer be the run's."""

@@ -1,1 +1,1 @@
-"""Effects between the station and the target: routes, visibility, other scatterers, physics beyond Eq. 7."""
+"""Effects between the station and the target: paths, visibility, other scatterers, physics beyond Eq. 7."""

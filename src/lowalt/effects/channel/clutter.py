@@ -15,7 +15,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
-from lowalt.effects.facts import Facts, above_ground
+from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -38,9 +38,9 @@ def idle(settings: dict) -> bool:
     return settings["gamma"] == 0
 
 
-def check(settings: dict, facts: Facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a station in or below the ground, or an amplitude law without that shape."""
-    above_ground("clutter", facts.network)
+    above_ground("clutter", scene.network)
     if settings["law"] == "weibull" and not settings["shape"] <= 2:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
 

@@ -1,7 +1,7 @@
-"""A second route by the ground: the wave reflected by a flat, possibly rough plane z = 0 (two-ray model).
+"""A second path by the ground: the wave reflected by a flat, possibly rough plane z = 0 (two-ray model).
 
 The station sees every point's image below the ground, by the Fresnel coefficient weaker and turned in phase. There and
-back by either route gives four echoes; the response forms them. Points are taken to be above the ground.
+back by either path gives four echoes; the response forms them. Points are taken to be above the ground.
 """
 
 import numpy as np
@@ -10,8 +10,8 @@ from scipy.special import i0e
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
-from lowalt.effects.facts import Facts, above_ground
-from lowalt.effects.response import Way
+from lowalt.effects.checks import CheckedScene, above_ground
+from lowalt.effects.response import ImagePath
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -26,13 +26,13 @@ VACUUM_F_M = 8.8541878128e-12
 
 
 def idle(settings: dict) -> bool:
-    """Return whether the ground is as the air and reflects nothing."""
+    """Return whether the ground has the air's permittivity and no conductivity, and so reflects nothing."""
     return settings["permittivity"] == 1 and settings["conductivity_s_m"] == 0
 
 
-def check(settings: dict, facts: Facts) -> None:
-    """Raise InputError for a station in or below the ground, or a ground that no matter is made of."""
-    above_ground("ground_reflection", facts.network)
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a station in or below the ground, or properties that no material has."""
+    above_ground("ground_reflection", scene.network)
     for key, low in (("permittivity", 1), ("conductivity_s_m", 0), ("roughness_m", 0)):
         if not low <= settings[key] < np.inf:
             raise InputError(f"effects.ground_reflection: {key} is {settings[key]}, expected at least {low}")
@@ -59,13 +59,14 @@ def fresnel(
 def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
     """Return the factor on the coherent reflection of a surface with heights of standard deviation `height_m`.
 
-    exp(-x) I_0(x) with x = 2 (k sigma sin psi)^2: what is lost is scattered elsewhere. Source: Miller et al. 1984.
+    exp(-x) I_0(x) with x = 2 (k sigma sin psi)^2; the rest of the power is scattered in other directions.
+    Source: Miller et al. 1984.
     """
     return i0e(2.0 * (2 * np.pi * frequency_hz / SPEED_OF_LIGHT * height_m * sine) ** 2)
 
 
-def ways(settings: dict, view: View) -> list[Way]:
-    """Return the one further route: images (N, L, 3) m and coefficients (N, L)."""
+def paths(settings: dict, view: View) -> list[ImagePath]:
+    """Return the one further path: images (N, L, 3) m and coefficients (N, L)."""
     images = view.places * [1.0, 1.0, -1.0]
     away = images - np.asarray(view.station.position_m)
     sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
@@ -75,4 +76,4 @@ def ways(settings: dict, view: View) -> list[Way]:
     coefficient = fresnel(np.clip(sine, 0.0, 1.0), *ground)
     if settings["roughness_m"] > 0:
         coefficient *= roughness(sine, settings["roughness_m"], frequency)
-    return [Way(images, coefficient)]
+    return [ImagePath(images, coefficient)]

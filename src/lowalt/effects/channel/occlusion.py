@@ -1,7 +1,7 @@
 """Self-occlusion: points that the target's own surfaces hide from a station do not echo.
 
 Straight rays, point by point and symbol by symbol, against the surfaces of all parts as they turn; shadows are sharp.
-Waves of other routes (a ground reflection) are taken to be hidden where the direct one is.
+Waves on other paths (a ground reflection) are taken to be hidden where the direct one is.
 """
 
 import numpy as np

@@ -9,11 +9,11 @@ DEFAULTS: dict[str, float] = {}
 
 
 def idle(settings: dict) -> bool:
-    """Return False: named means asked for."""
+    """Return False: a scene that names this effect always gets it, where its bound exceeds the tolerance."""
     return False
 
 
-def bound(settings: dict, view: View) -> np.ndarray:
+def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
     """Return a bound of squint's change of any range cell, relative to the sum of peak amplitudes; shape (N, 1).
 
     Element i of a row sees pi i x (kappa_m - kappa_k) more phase; averaged over elements that is half the row's end,

@@ -13,7 +13,7 @@ DEFAULTS: dict[str, float] = {}
 
 
 def idle(settings: dict) -> bool:
-    """Return False: named means asked for."""
+    """Return False: a scene that names this effect always gets it, where its bound exceeds the tolerance."""
     return False
 
 
@@ -36,7 +36,7 @@ def travel(view: View) -> np.ndarray:
     return 1.02 * step
 
 
-def bound(settings: dict, view: View) -> np.ndarray:
+def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
     """Return a bound (N, P) of the motion's change of any range cell, relative to each part's peak amplitudes.
 
     The largest phase a point gains within the symbol, 2 pi times turns a metre times its travel, and its amplitude's

@@ -10,11 +10,11 @@ DEFAULTS: dict[str, float] = {}
 
 
 def idle(settings: dict) -> bool:
-    """Return False: named means asked for."""
+    """Return False: a scene that names this effect always gets it, where its bound exceeds the tolerance."""
     return False
 
 
-def bound(settings: dict, view: View) -> np.ndarray:
+def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
     """Return a bound (N, P) of the wavefront's change of any range cell, relative to each part's peak amplitudes.
 
     An element at distance D from the array's corner has a path that differs from the plane wave's by at most

@@ -1,1 +1,1 @@
-"""Effects on range cells: what happens before the strongest is taken, and which one is taken."""
+"""Effects on range cells: filters before the strongest is chosen, and errors of that choice."""

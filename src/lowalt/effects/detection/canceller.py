@@ -54,7 +54,7 @@ def amplifies(settings: dict) -> float:
     """Return how much larger an output symbol's error can be than the largest input symbol's, start-up included.
 
     The sum of the filter's absolute weights. pulse: of binomials; exponential: a on the newest symbol and as much on
-    the older ones together, as they cancel what stands still; mean: 1 - 1/N twice, taken as 2.
+    the older ones together, since constant echoes cancel; mean: 1 - 1/N twice, taken as 2.
     """
     if settings["kind"] == "pulse":
         return 2 ** settings["order"] / gain(settings)
@@ -64,14 +64,14 @@ def amplifies(settings: dict) -> float:
 
 
 def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """Return range cells (N, M) without what stands still.
+    """Return range cells (N, M) without echoes that stand still.
 
     mean: less the look's mean. pulse: `order` first differences over symbols. exponential: less a mean that forgets
     as memory^n. The last two start as if the first symbol had lasted forever: their first output is zero, and clutter
     leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
     """
     if settings["kind"] == "mean":
-        # Differences to the first symbol first: what stands still is then zero to the last bit, not to N roundings.
+        # Subtract the first symbol before the mean: an echo that stands still then cancels to the last bit.
         moved = cells - cells[:1]
         moved -= moved.mean(axis=0)
         return moved

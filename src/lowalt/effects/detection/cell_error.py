@@ -3,6 +3,7 @@
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects.checks import CheckedScene
 
 SOURCE = (
     "this project's own error model, for the imperfect range-bin selection that the paper leaves out (Luo et al., "
@@ -16,9 +17,9 @@ def idle(settings: dict) -> bool:
     return settings["probability"] == 0 or settings["spread_cells"] == 0
 
 
-def check(settings: dict, facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a spread that reaches around all range cells."""
-    cells = facts.network.subcarriers
+    cells = scene.network.subcarriers
     if 2 * abs(settings["spread_cells"]) >= cells:
         spread = settings["spread_cells"]
         raise InputError(f"effects.cell_error.spread_cells: {spread}, expected less than half of {cells} range cells")

@@ -1,1 +1,1 @@
-"""Effects on how a target moves: what is added to the poses of the motion table."""
+"""Effects on a target's motion: angles, offsets and tilts added to the poses of the motion table."""

@@ -51,7 +51,7 @@ def mean_wind_mps(height_m: float, wind_mps: float) -> float:
 
 
 def process(scale: float, longitudinal: bool, response: float, attitude_lag: float) -> tuple[np.ndarray, ...]:
-    """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and what it does; all times in steps.
+    """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and the target's response; times in steps.
 
     scale: the turbulence's time L / V. Outputs: gust, the target's velocity (both of unit turbulence), the target's
     place (that times a step) and the lagged acceleration (that over a step). Each state is an integral of the one

@@ -1,4 +1,4 @@
-"""Linear Gaussian processes driven by white noise, discretised exactly: what the motion effects are made of.
+"""Linear Gaussian processes driven by white noise, discretised exactly; the motion effects are made of them.
 
 A process x' = F x + g n with white noise n of unit intensity moves over a step h by x <- exp(F h) x + w, and the
 covariance of w is known in closed form; no step is too long for it, and none adds an error.
@@ -13,7 +13,7 @@ from lowalt.common.jit import PLAIN
 
 
 class Steps(NamedTuple):
-    """A process of K states over one step: transition (K, K), and a root (K, K) of the covariance of what it adds."""
+    """A process of K states over one step: transition (K, K), and a root (K, K) of the added noise's covariance."""
 
     transition: np.ndarray
     root: np.ndarray

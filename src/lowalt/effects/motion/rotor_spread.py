@@ -26,7 +26,7 @@ def idle(settings: dict) -> bool:
 def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:
     """Return the turns (rad) added to each rotor at `times_s` (N,) s, equally spaced; nothing for other targets.
 
-    The added turn is zero at time 0 but for the wander, which starts from zero at the first of the times.
+    The spread's added turn is zero at time 0; the wander's is zero at the first of the times.
     """
     rotors = cloud.parts_of("rotor")
     if not rotors:

@@ -16,7 +16,7 @@ from numpy.polynomial import chebyshev
 from lowalt.effects.waveform import turned
 
 SPACING = 90
-"""Fewest samples from one symbol to the next: fewer leave no room between what is slow and half the sample rate."""
+"""Fewest samples from one symbol to the next; with fewer, the slow part would reach half the sample rate."""
 
 
 class Grid(NamedTuple):

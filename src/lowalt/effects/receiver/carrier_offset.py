@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
 
@@ -17,14 +18,14 @@ def idle(settings: dict) -> bool:
     return all(_offsets.idle(settings[f"fixed_{unit}"], settings[f"sigma_{unit}"]) for unit in ("hz", "ppm"))
 
 
-def check(settings: dict, facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for an unknown station."""
     for key in ("fixed_hz", "fixed_ppm"):
-        _offsets.check_stations(f"effects.carrier_offset.{key}", settings[key], facts.network)
+        _offsets.check_stations(f"effects.carrier_offset.{key}", settings[key], scene.network)
 
 
 def offset_hz(settings: dict, frame: Frame, rng: np.random.Generator) -> float:
-    """Return by how much all frequencies rise (Hz): what is given in Hz and in ppm of the oscillator, added up."""
+    """Return by how much all frequencies rise (Hz): the sum of the parts in Hz and in ppm of the oscillator."""
     name = frame.station.name
     hz = _offsets.fixed(settings["fixed_hz"], name) + settings["sigma_hz"] * _offsets.drawn(rng)
     ppm = _offsets.fixed(settings["fixed_ppm"], name) + settings["sigma_ppm"] * _offsets.drawn(rng)

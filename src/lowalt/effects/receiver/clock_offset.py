@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
 
@@ -27,10 +28,10 @@ def idle(settings: dict) -> bool:
     return _offsets.idle(settings["fixed_ppm"], settings["sigma_ppm"])
 
 
-def check(settings: dict, facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for an unknown station, or a slip that leaves the cyclic prefix before the look ends."""
-    _offsets.check_stations("effects.clock_offset.fixed_ppm", settings["fixed_ppm"], facts.network)
-    network, timing = facts.network, facts.effects.get("timing_offset")
+    _offsets.check_stations("effects.clock_offset.fixed_ppm", settings["fixed_ppm"], scene.network)
+    network, timing = scene.network, scene.effects.get("timing_offset")
     rate = 1e-6 * _offsets.largest(settings["fixed_ppm"], settings["sigma_ppm"])
     slip = rate * network.symbols * network.symbol_interval_s
     slip += _offsets.largest(timing["fixed_s"], timing["sigma_s"]) if timing else 0.0

@@ -1,6 +1,6 @@
-"""Phase noise of the oscillator: one random phase that wanders from symbol to symbol and jitters inside each.
+"""Phase noise of the oscillator: one random phase that changes from symbol to symbol and within each symbol.
 
-What wanders turns the whole symbol (common phase error, seen in Doppler); what jitters leaks between subcarriers.
+The slow part turns whole symbols (common phase error, seen in Doppler); the fast part leaks between subcarriers.
 """
 
 from itertools import pairwise
@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _oscillator
 from lowalt.effects.waveform import Frame, turned
 
@@ -32,12 +33,12 @@ def idle(settings: dict) -> bool:
     return not settings["points"]
 
 
-def check(settings: dict, facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for offsets that do not rise, or symbols too close together to tell slow from fast."""
     offsets = [offset for offset, _ in settings["points"]]
     if offsets[0] <= 0 or any(later <= earlier for earlier, later in pairwise(offsets)):
         raise InputError(f"effects.phase_noise.points: offsets {offsets}, expected positive and rising (Hz)")
-    network = facts.network
+    network = scene.network
     band = network.subcarriers * network.subcarrier_spacing_hz
     if network.symbol_interval_s * band < _oscillator.SPACING:
         raise InputError(

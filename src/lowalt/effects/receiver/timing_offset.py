@@ -7,6 +7,7 @@ Past the prefix it would take in the neighbouring symbol, whose data no scene st
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
 
@@ -22,9 +23,9 @@ def idle(settings: dict) -> bool:
     return _offsets.idle(settings["fixed_s"], settings["sigma_s"])
 
 
-def check(settings: dict, facts) -> None:
+def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for an unknown station, or a slip that can leave the cyclic prefix."""
-    _offsets.check_stations("effects.timing_offset.fixed_s", settings["fixed_s"], facts.network)
+    _offsets.check_stations("effects.timing_offset.fixed_s", settings["fixed_s"], scene.network)
     slip, slack = _offsets.largest(settings["fixed_s"], settings["sigma_s"]), settings["prefix_slack_s"]
     if slip > slack:
         raise InputError(

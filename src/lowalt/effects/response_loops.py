@@ -1,6 +1,6 @@
-"""The loops of the frequency response: one symbol's points at a time, in short passes the compiler turns into vectors.
+"""The compiled loops of the frequency response; each goes through one symbol's points in short vectorised passes.
 
-Sines, cosines and polynomials are those of `lowalt.echo`. Only a few work arrays a call are allocated.
+Sines, cosines and polynomials are those of `lowalt.echo`. Each call allocates only a few work arrays.
 """
 
 import math
@@ -22,7 +22,7 @@ COSINE, SINE = 0, 1
 
 @lru_cache(maxsize=16)
 def waves(error: float) -> np.ndarray:
-    """Return rows as WAVE of the smallest degree that keeps both the cosine and the sine to `error`."""
+    """Return polynomials as in WAVE, of the smallest degree at which cosine and sine err by at most `error`."""
     for degree in range(1, DEGREE):
         (cosine, off), (sine, slope) = smooth("cosine", 0.25, degree), smooth("sine", 0.25, degree)
         if off + 0.5 * slope <= error:
@@ -53,9 +53,9 @@ def array_sum(x, count, square, c, out, size):
 
 @LOOPS
 def beyond(across, up, side, z, r, spherical):
-    """Path (m) to the element `across` and `up` (m) from the array's corner less r, by a plane or spherical wave.
+    """Path (m) to the element `across` and `up` (m) from the array's corner, minus r; plane or spherical wave.
 
-    side, z: the point's coordinates along the array (m). No cancellation: a difference of squares over a sum.
+    side, z: the point's coordinates along the array (m). A difference of squares over a sum avoids cancellation.
     """
     if not spherical:
         return -(across * side + up * z) / r
@@ -64,16 +64,16 @@ def beyond(across, up, side, z, r, spherical):
 
 
 @LOOPS
-def routes(
+def one_way(
     places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, squint, shape, coefficient, gains,
     out, excess,
 ):  # fmt: skip
-    """Fill out (Q, N, L), one array's complex factors over one route at Q frequencies, and excess (N, L) (m).
+    """Fill out (Q, N, L), one array's complex factors over one path at Q frequencies, and excess (N, L) (m).
 
     places: (N, L, 3) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
     beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; shape: the array;
     coefficient: (N or 1, L or 1); gains: (Q, N, L) sums of `near_field` to use instead of the plane wave's, or empty.
-    excess: range beyond the reference's; with squint that of the array's middle, else of its corner.
+    excess: range minus the reference's; with squint the range of the array's middle, else of its corner.
     Returns 0, or n L + l + 1 where r = 0.
     """
     count = places.shape[1]
@@ -114,7 +114,7 @@ def routes(
             out[0, n, i] = coefficient[row, i % coefficient.shape[1]] * complex(
                 weight[i] * ct[i], weight[i] * (st[i] * turn[i])
             )
-        # The first frequency last, which holds what all share.
+        # Go through the frequencies in reverse: entry 0 holds the factor that all others need.
         for q in range(len(kappas) - 1, -1, -1):
             if spherical:
                 for i in range(count):

@@ -1,0 +1,53 @@
+"""Checks of a scene before any job starts: whether its effects fit its network, its noise and each other."""
+
+from typing import NamedTuple
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.effects.catalogue import called, providing
+from lowalt.effects.interface import Checks
+
+
+class CheckedScene(NamedTuple):
+    """The part of a scene's configuration that an effect's `check` may look at.
+
+    effects: the complete settings of every effect that is not idle, by name; snr_db: the set SNRs.
+    """
+
+    network: Network
+    effects: dict[str, dict]
+    snr_db: tuple[float, ...]
+
+
+def check(config: dict) -> CheckedScene:
+    """Return the scene of a configuration whose effects fit together.
+
+    Raises: InputError naming the effect, the value and what was expected, before any job starts.
+    """
+    effects = called(config["effects"])
+    scene = CheckedScene(
+        Network.from_settings(config["network"]),
+        {effect.name: effect.settings for effect in effects},
+        tuple(float(snr) for snr in config["noise"]["snr_db"]),
+    )
+    noisy = [snr for snr in scene.snr_db if snr != float("inf")]
+    if "receiver_noise" in scene.effects and noisy:
+        raise InputError(
+            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
+            "or set SNRs, not both"
+        )
+    if "canceller" in scene.effects and "clutter" not in scene.effects:
+        raise InputError("effects.canceller: there is no clutter to cancel, expected effects.clutter in the same scene")
+    for effect in providing(effects, Checks):
+        effect.module.check(effect.settings, scene)
+    return scene
+
+
+def above_ground(effect: str, network: Network) -> None:
+    """Raise InputError naming `effect` for a station in or below the ground z = 0."""
+    for station in network.stations:
+        if station.position_m[2] <= 0:
+            raise InputError(
+                f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
+                "ground z = 0"
+            )

@@ -1,0 +1,133 @@
+"""The interface of an effect: the names that its module must offer, and those that it may offer.
+
+An effect is a module, `effects/{place}/{name}.py`. It must offer everything in `Effect` and the working function of one
+of the protocols for its place below. `Checks` and `Amplifies` are optional. The chain asks by `isinstance`.
+
+N symbols, L points, P parts, M subcarriers. Arrays are complex128 or float64. `settings` holds every key of `DEFAULTS`.
+`rng` is the stream (seed, "effect", name, subtype, model[, station]), so no effect moves another effect's draws.
+Only type declarations belong here.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from lowalt.effects.checks import CheckedScene
+    from lowalt.effects.response import ImagePath
+    from lowalt.effects.view import View
+    from lowalt.effects.waveform import Frame
+    from lowalt.motion.poses import Perturbation
+    from lowalt.targets.cloud import Cloud
+
+
+@runtime_checkable
+class Effect(Protocol):
+    """The names that every effect's module offers."""
+
+    SOURCE: str
+    """Where the model comes from; `lowalt explain` prints it."""
+    DEFAULTS: dict
+    """Every parameter with its default; a scene's values replace them."""
+
+    def idle(self, settings: dict) -> bool:
+        """Return whether these settings change nothing; the effect is then dropped, and every bit stays."""
+
+
+@runtime_checkable
+class Checks(Protocol):
+    """Optional: an effect whose settings can contradict the rest of the scene."""
+
+    def check(self, settings: dict, scene: CheckedScene) -> None:
+        """Raise InputError that names the effect, the value and what was expected."""
+
+
+@runtime_checkable
+class Amplifies(Protocol):
+    """Optional, receiver and detection: an effect that can make an error of its input larger."""
+
+    def amplifies(self, settings: dict) -> float:
+        """Return the largest factor on an error: on its 2-norm (receiver), or summed over symbols (detection).
+
+        math.inf where the effect is not continuous. An effect without this function has the factor 1.
+        """
+
+
+@runtime_checkable
+class PerturbsMotion(Protocol):
+    """Motion: an effect that moves the target or its parts; all stations see the same motion."""
+
+    def perturb(
+        self, settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator
+    ) -> Perturbation:
+        """Return the angles, offsets (m) and tilts (rad) added to the motion of `row` at `times_s` (N,)."""
+
+
+@runtime_checkable
+class WeighsPoints(Protocol):
+    """Channel: an effect that changes the points' amplitudes (occlusion, aspect)."""
+
+    def visible(self, settings: dict, view: View) -> np.ndarray:
+        """Return the real factor (N, L) on every point's two-way amplitude."""
+
+
+@runtime_checkable
+class AddsPaths(Protocol):
+    """Channel: an effect that opens further one-way paths between the station and the points."""
+
+    def paths(self, settings: dict, view: View) -> list[ImagePath]:
+        """Return the further paths; `response` forms every pair of a path out and a path back."""
+
+
+@runtime_checkable
+class AddsEchoes(Protocol):
+    """Channel: an effect that adds echoes of something other than the target (clutter)."""
+
+    def scatter(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+        """Return a frequency response (N, M) in the units of the target's, sqrt(W) a subcarrier."""
+
+
+@runtime_checkable
+class BoundsItself(Protocol):
+    """Channel: physics beyond Eq. 7 that is left out where its bound allows it; `response` and `chain` compute it."""
+
+    def bound(self, settings: dict, view: View, others: frozenset[str]) -> np.ndarray:
+        """Return the largest change of any range cell relative to each part's peak amplitudes, (N, P) or (N, 1).
+
+        others: the other physics by need of the scene, each of which may be computed or left out.
+        """
+
+
+@runtime_checkable
+class ChangesSamples(Protocol):
+    """Receiver: an effect on the time samples of the useful part of each OFDM symbol."""
+
+    def receive(self, settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return the samples (N, M) after the effect."""
+
+
+@runtime_checkable
+class FiltersCells(Protocol):
+    """Detection: an effect on all range cells before the strongest is chosen (canceller)."""
+
+    def process(self, settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return the range cells (N, M) after the effect."""
+
+
+@runtime_checkable
+class ChoosesCells(Protocol):
+    """Detection: an effect on the choice of the range cell."""
+
+    def choose(self, settings: dict, chosen: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return the chosen cells (N,) int64, given those chosen so far and all cells (N, M)."""
+
+
+WORK = {
+    "motion": (PerturbsMotion,),
+    "channel": (WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
+    "receiver": (ChangesSamples,),
+    "detection": (FiltersCells, ChoosesCells),
+}
+"""The protocols of each place; an effect's module satisfies exactly one of its place's."""
