@@ -10,13 +10,13 @@ import pytest
 import lowalt
 from lowalt.common.jit import _DigestCache, digest
 from lowalt.echo.fast.driver import run
-from lowalt.effects.rays import routes
+from lowalt.effects.response_loops import one_way
 
 PROGRAM = """
 from lowalt.common.jit import digest
 from lowalt.echo.fast.driver import run
-from lowalt.effects.rays import routes
-print(digest(run.py_func), digest(routes.py_func))
+from lowalt.effects.response_loops import one_way
+print(digest(run.py_func), digest(one_way.py_func))
 """
 
 
@@ -72,6 +72,6 @@ def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
         def magic_tuple(self):
             return ("processor",)
 
-    for compiled in (run, routes):
+    for compiled in (run, one_way):
         key = compiled._cache._index_key(("signature",), Codegen())
         assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key
