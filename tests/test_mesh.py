@@ -1,7 +1,9 @@
 """Users' meshes: every real one becomes a cloud of the published size, bad ones are refused by file and reason."""
 
+import json
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +12,10 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets import mesh
+from lowalt.targets.__main__ import make
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from lowalt.targets.records import load_table, merge, read_records
 from real_inputs import FOLDER, needs_inputs
@@ -121,7 +124,8 @@ def merged_files(record: dict) -> list[str]:
 def test_inches_given_as_metres_are_caught_by_the_published_size():
     record = REAL["BYD Song L EV 2024"] | {"unit": "m"}
     with pytest.raises(
-        InputError, match=r"BYD Song L EV 2024: the mesh of body measures 157.5 m where 4.8 m is published.*unit 'm'"
+        InputError,
+        match=r"BYD Song L EV 2024: parts.front left wheel.region .* 65.2362, 61.2816. m; is the unit 'm'",
     ):
         made("BYD Song L EV 2024", FOLDER, **record)
 
@@ -132,14 +136,14 @@ def test_inches_given_as_metres_are_caught_by_the_published_size():
 def test_places_senses_and_sizes_are_those_of_the_record(quad):
     cloud = made("DJI Mini 2", quad, **quad_record())
     factor = 0.2192 / np.hypot(0.2, 0.2)
-    assert cloud.names[1:] == ("front right", "rear right", "rear left", "front left")
+    assert cloud.names[1:] == ("front left", "front right", "rear left", "rear right")
     # The file's x is the front, so its -y is the right.
-    assert np.allclose(cloud.hinges[1, :2], np.array([0.1, 0.1]) * factor, atol=5e-4)
-    assert np.allclose(cloud.axes[1:, 2], [1, -1, 1, -1], atol=1e-3)
+    assert np.allclose(cloud.hinges[2, :2], np.array([0.1, 0.1]) * factor, atol=5e-4)
+    assert np.allclose(cloud.axes[1:, 2], [-1, 1, 1, -1], atol=1e-3)
     assert np.ptp(cloud.points[cloud.part == 0], axis=0) == pytest.approx(
         np.array([0.12, 0.2, 0.06]) * factor, rel=3e-3
     )
-    assert cloud.record["points_by_part"]["front right"] == np.sum(cloud.part == 1)
+    assert cloud.record["points_by_part"]["front right"] == np.sum(cloud.part == 2)
     assert np.sum(cloud.part > 0) / 171 == pytest.approx(cloud.record["moving_share"], abs=0.02)
 
 
@@ -150,7 +154,7 @@ def test_found_hinge_and_axis_are_those_given(quad):
     record["parts"]["front left"]["meshes"] = [{"file": "prop.stl", "turn": tilt, "move": [0.1, 0.1, 0.04]}]
     cloud = made("DJI Mini 2", quad, **record)
     # Turned by 20 degrees about y, the file's z leans to its x, the front; clockwise turns the axis round.
-    assert np.allclose(cloud.axes[4], -np.array([0, np.sin(np.radians(20)), np.cos(np.radians(20))]), atol=2e-3)
+    assert np.allclose(cloud.axes[1], -np.array([0, np.sin(np.radians(20)), np.cos(np.radians(20))]), atol=2e-3)
 
 
 @given(up=st.sampled_from(["x", "-x", "y", "-y", "z", "-z"]), front=st.sampled_from(["x", "-x", "y", "-y", "z", "-z"]))
@@ -187,10 +191,22 @@ def test_every_format_and_unit_gives_the_same_size(suffix, unit, metres, tmp_pat
     assert np.ptp(found.vertices, axis=0) == pytest.approx([0.1, 0.2, 0.05], rel=1e-6)
 
 
-def test_a_unit_other_than_the_file_states_is_refused(tmp_path):
+def test_a_record_s_unit_overrides_the_file_s_with_a_warning(tmp_path):
     (tmp_path / "box.glb").write_bytes(box((1, 1, 1)).export(file_type="glb"))
-    with pytest.raises(InputError, match=r"box.glb: the file says its unit is m, the record says in"):
-        read_mesh(tmp_path / "box.glb", "in")
+    with pytest.warns(InputWarning, match=r"box.glb: the file states a unit of 1 m, the record says in"):
+        found = read_mesh(tmp_path / "box.glb", "in")
+    assert np.ptp(found.vertices, axis=0) == pytest.approx([0.0254] * 3)
+    plain_dae = box((100, 200, 50)).export(file_type="dae")
+    stating = plain_dae.replace(b"<asset>", b'<asset><unit name="half" meter="0.5"/>')
+    (tmp_path / "box.dae").write_bytes(stating)
+    with pytest.warns(InputWarning, match=r"box.dae: the file states a unit of 0.5 m, the record says 0.001"):
+        found = read_mesh(tmp_path / "box.dae", 0.001)
+    assert np.ptp(found.vertices, axis=0) == pytest.approx([0.1, 0.2, 0.05])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read_mesh(tmp_path / "box.dae", 0.5)
+        (tmp_path / "plain.dae").write_bytes(plain_dae)
+        read_mesh(tmp_path / "plain.dae", "in")
 
 
 def test_equal_record_and_seed_give_equal_bytes(quad, tmp_path):
@@ -252,7 +268,7 @@ def test_wings_are_cut_in_two_and_a_positive_angle_raises_the_tip(bird):
     assert cloud.record["flap"]["amplitude_deg"] == 40
     assert np.ptp(cloud.points[:, 2]) == pytest.approx(0.04 * scale, rel=0.02)  # the stand is dropped
     for part in range(1, 5):
-        points, sign = cloud.points[cloud.part == part], 1 if part < 3 else -1
+        points, sign = cloud.points[cloud.part == part], -1 if part < 3 else 1
         low, high = (0.021, 0.08) if part % 2 else (0.08, 0.15)
         assert (points[:, 0] * sign >= low * scale * 0.999).all() and (
             points[:, 0] * sign <= high * scale * 1.001
@@ -305,12 +321,129 @@ def test_regions_take_whole_components_only_where_asked(tmp_path):
         region = {"cylinder": cylinder, "whole": whole}
         parts = {
             "body": {"kind": "body", "meshes": [{"file": "body.stl"}]},
-            "r": {"kind": "rotor", "region": region, "hinge": [0, 0, 0.2], "axis": [0, 0, 2]},
+            "r": {"kind": "rotor", "region": region, "hinge": [0.3, 0, 0.2], "axis": [0, 0, 2]},
         }
         cloud = made("DJI Mini 2", tmp_path, **plain("", parts=parts))
         taken = cloud.points[cloud.part == 1]
         assert bool((taken[:, 0] - taken[:, 0].max() < -0.4).any()) is tall  # the tall post is cut, not whole inside
         assert np.array_equal(cloud.axes[1], [0, 0, 1])
+
+
+# --- the order of parts, and parts that cannot be what they are called ---
+
+
+@pytest.mark.parametrize("names", [("front right", "body"), ("arm 1", "zebra"), ("back left wheel", "Aaa"), ("1", "0")])
+def test_the_order_and_the_names_of_parts_mean_nothing(names, quad):
+    """Settings reach a job with sorted keys, so a record must give the same cloud however its parts are sorted."""
+    first, body = names
+    record = quad_record()
+    given_parts = {first: record["parts"].pop("front right"), body: record["parts"].pop("body"), **record.pop("parts")}
+    if body != "body":
+        given_parts[body] = given_parts[body] | {"kind": "body"}
+    merged = merge(TABLE["DJI Mini 2"], {"source": "mesh", **record, "parts": given_parts}, "own")
+    found = [
+        make(json.loads(json.dumps(settings, sort_keys=keys)), quad, 1)
+        for settings, keys in ((merged, False), (merged, True), (merged | {"parts": given_parts}, False))
+    ]
+    assert found[0].kinds == ("body", "rotor", "rotor", "rotor", "rotor")
+    assert found[0].names == (body, *sorted(set(given_parts) - {body}))
+    for other in found[1:]:
+        assert other.names == found[0].names
+        np.testing.assert_array_equal(other.points, found[0].points)
+
+
+def test_a_child_may_sort_before_its_parent(bird):
+    folder, record = bird
+    renamed = {"right inner": "right wing", "right outer": "right outer wing"}
+    parts = {renamed.get(name, name): dict(part) for name, part in reversed(record["parts"].items())}
+    parts["right outer wing"]["parent"] = "right wing"
+    cloud = make(json.loads(json.dumps(merge(TABLE["Crow"], {"source": "mesh", **record, "parts": parts}, "own"),
+                                       sort_keys=True)), folder, 1)  # fmt: skip
+    assert cloud.names == ("body", "left inner", "left outer", "right wing", "right outer wing")
+    assert cloud.parents.tolist() == [-1, -1, 1, -1, 3]
+
+
+def test_parents_in_a_circle_two_bodies_and_none_are_refused(bird):
+    folder, record = bird
+    for change, words in (
+        ({"right inner": {"parent": "right outer"}}, "parent is 'right outer', which hangs on 'right inner' itself"),
+        ({"right inner": {"kind": "body"}}, "2 of kind body"),
+        ({"body": {"kind": "wing"}}, "0 of kind body"),
+    ):
+        parts = {name: part | change.get(name, {}) for name, part in record["parts"].items()}
+        with pytest.raises(InputError, match=words):
+            made("Crow", folder, **record | {"parts": parts})
+
+
+def test_regions_that_take_the_same_surface_are_refused_whatever_their_order(bird):
+    folder, record = bird
+    wide = {"box": [[0.03, None, -0.01], [None, None, 0.01]]}
+    for order in (1, -1):
+        parts = dict(list(record["parts"].items())[::order])
+        parts["right outer"] = parts["right outer"] | {"region": wide}
+        with pytest.raises(InputError, match="parts 'right inner' and 'right outer' take the same surface"):
+            made("Crow", folder, **record | {"parts": parts})
+
+
+def wheeled(tmp_path, axis=0, centre=0.33, count=4) -> dict:
+    """Write a car with separate wheels whose thin direction is `axis` and return its record."""
+    box((1.8, 4.5, 1.0), (0, 0, 0.9)).export(tmp_path / "car.obj")
+    turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0] if axis == 0 else [1, 0, 0])
+    shape = trimesh.creation.cylinder(radius=0.33, height=0.2, sections=64)
+    shape.apply_transform(turn)
+    shape.export(tmp_path / "wheel.obj")
+    record = car_record()
+    places = (("fl", -0.8, 1.4), ("fr", 0.8, 1.4), ("rl", -0.8, -1.4), ("rr", 0.8, -1.4))[:count]
+    body = record["parts"]["body"]
+    record["parts"] = {
+        name: {"kind": "wheel", "meshes": [{"file": "wheel.obj", "move": [x, y, centre]}]} for name, x, y in places
+    } | {"body": body}
+    return record
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"centre": 1.3}, "fl: its centre lies 0.9 m above the lowest point of a body 1 m high.*is `up` reversed"),
+        ({"axis": 1}, "fl: it measures 0.66 m along its axis and 0.2 x 0.66 m across"),
+    ],
+)
+def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):
+    made("Audi A6L 2019", tmp_path, **wheeled(tmp_path))
+    with pytest.raises(InputError, match=words):
+        made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, **changes))
+
+
+def test_a_wheel_axis_along_the_car_is_refused(tmp_path):
+    record = wheeled(tmp_path)
+    record["parts"]["rr"]["axis"] = [0, 1, 0]
+    with pytest.raises(InputError, match=r"rr: its axis is .*1.0, 0.0. .right, front, up., expected right or left"):
+        made("Audi A6L 2019", tmp_path, **record)
+
+
+def test_a_car_on_two_wheels_is_made_with_a_warning_that_its_cloud_keeps(tmp_path):
+    with pytest.warns(InputWarning, match="2 wheels, expected at least 3"):
+        cloud = made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, count=2))
+    assert cloud.record["warnings"] == ["Audi A6L 2019: 2 wheels, expected at least 3"]
+    assert "warnings" not in made("Audi A6L 2019", tmp_path, **wheeled(tmp_path)).record
+
+
+def test_a_hub_far_from_its_blades_and_a_rotor_of_a_millimetre_are_refused(quad):
+    record = quad_record()
+    record["parts"]["front left"]["hinge"] = [5.0, 0.1, 0.04]
+    with pytest.raises(InputError, match=r"front left: its hinge lies 4.9 m from the middle of its surface"):
+        made("DJI Mini 2", quad, **record)
+    box((0.012, 0.002, 0.001)).export(quad / "prop.stl")
+    with pytest.raises(InputError, match=r"rotor front left has a diameter of 0.0095 m at the final size"):
+        made("DJI Mini 2", quad, **quad_record())
+
+
+def test_wings_hinged_at_the_tip_or_on_one_side_only(bird):
+    folder, record = bird
+    parts = {name: dict(part) for name, part in record["parts"].items()}
+    parts["right inner"]["hinge"] = [0.2, 0, 0]
+    with pytest.raises(InputError, match=r"right inner: its hinge lies 0.2 m and its surface 0.05 m right"):
+        made("Crow", folder, **record | {"parts": parts})
 
 
 # --- bad ones ---
@@ -379,7 +512,7 @@ def test_a_machine_without_pymeshlab_is_told_what_to_install(quad, monkeypatch):
         (["parts", "body", "meshes", 0, "file"], "../body.stl", "inside the folder"),
         (["parts", "body", "meshes", 0, "geometry"], ["seat"], "geometry .'seat'. is not in it"),
         (["parts", "body", "meshes", 0, "unit"], "furlong", "furlong"), (["points"], 4, "leave none for the body"),
-        (["unit"], "in", "43.* times off; is the unit 'in'"),
+        (["unit"], "in", "part front left measures 0.00508 m in a mesh of 0.205 m.* is the unit"),
         (["parts", "front right", "meshes", 0, "unit"], "in", "part front right measures .* is the unit"),
         (["parts", "front right"], {"kind": "body"}, "front right"),
     ],

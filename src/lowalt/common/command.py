@@ -8,10 +8,11 @@ import argparse
 import json
 import resource
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import existing
 from lowalt.common.memory import keep_freed_memory
 
@@ -62,8 +63,13 @@ def pick(block: dict, *keys: str) -> list:
 
 
 def run(main: Callable[[list[str]], None]) -> None:
-    """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2."""
+    """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2, an
+    InputWarning one line."""
     keep_freed_memory()
+    usual = warnings.formatwarning
+    warnings.formatwarning = lambda message, category, *place, **more: (
+        f"warning: {message}\n" if issubclass(category, InputWarning) else usual(message, category, *place, **more)
+    )
     try:
         main(sys.argv[1:])
     except InputError as error:

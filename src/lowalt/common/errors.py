@@ -7,3 +7,7 @@ class InputError(ValueError):
 
 class BelowFloor(InputError):
     """A tolerance smaller than the error bound that float64 arithmetic can prove for a sample."""
+
+
+class InputWarning(UserWarning):
+    """The user's input is used as it is, although something in it looks wrong; the message says what and where."""

@@ -7,9 +7,10 @@ from pathlib import Path
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
+from lowalt.targets.cloud import MOST_TURNING_PARTS
 
-PHASES = 16
-"""Most moving parts with a phase of their own (EH216-S flown as coaxial pairs has 16 rotors)."""
+PHASES = MOST_TURNING_PARTS
+"""Columns for phases: one each for the most turning parts that a cloud may have."""
 
 TEXTS = ("subtype", "category", "group")
 NUMBERS = (

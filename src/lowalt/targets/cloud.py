@@ -30,6 +30,8 @@ from lowalt.common.files import existing, replacing
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
 """The four classes; their order is the label order everywhere."""
+MOST_TURNING_PARTS = 16
+"""Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs has 16 rotors)."""
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,13 @@ The steps of the paper's Fig. 4. Files are read in `mesh_files`, parts cut in `m
 `mesh_record`; here parts become a target of the right size and count. Body axes: x right, y front, z up, metres.
 """
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import sha256
 from lowalt.common.streams import stream
 from lowalt.targets import bird, vehicle
@@ -17,8 +18,9 @@ from lowalt.targets.assemble import Part, allot, sample_part
 from lowalt.targets.builtin import checksum
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.mesh_files import Mesh, joined, read_mesh
-from lowalt.targets.mesh_parts import Pool, cut, hinged, placed, pool_of
-from lowalt.targets.mesh_record import ALL_AXES, check_record, record_files
+from lowalt.targets.mesh_parts import Pool, cut, hinged, placed, pool_of, refuse_shared
+from lowalt.targets.mesh_record import ALL_AXES, check_record, ordered_parts, record_files
+from lowalt.targets.plausible import refuse_implausible
 from lowalt.targets.sampling import thin
 
 __all__ = ["check_record", "mesh_cloud", "record_files"]
@@ -34,6 +36,9 @@ FEWEST_SAMPLES = 100
 
 SMALLEST_PART = 25
 """A moving part this many times smaller than the target has a wrong unit."""
+
+SMALLEST_ROTOR_M = 0.01
+"""Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
 
 
 def _vector(axis: str) -> np.ndarray:
@@ -59,9 +64,15 @@ def _published_m(record: dict) -> np.ndarray:
     return np.full(3, table["size_m"])
 
 
+def _wheel_size(part: dict) -> tuple[float, float]:
+    """Diameter and width (m) of a made wheel."""
+    return part["wheel"]["diameter_m"], part["wheel"]["width_m"]
+
+
 def _made_wheels(record: dict, rng: np.random.Generator) -> dict[tuple, tuple[np.ndarray, np.ndarray]]:
     """Return points and normals (N, 3) of each size of wheel the record wants made: right ones, at the origin."""
-    sizes = {tuple(part["wheel"].values()): part["wheel"] for part in record["parts"].values() if "wheel" in part}
+    parts = ordered_parts(record["parts"]).values()
+    sizes = {_wheel_size(part): part["wheel"] for part in parts if "wheel" in part}
     count = max(FEWEST_SAMPLES, round(record["points"] * record["moving_share"]))
     return {
         key: sample_part(Part("wheel", "wheel", vehicle.wheel(size["diameter_m"], size["width_m"])), count, rng)
@@ -98,22 +109,25 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
     frame = np.stack([np.cross(front, up), front, up])
     where = record["subtype"]
     dense = DENSE * record["points"]
-    (body_name, body_part), *moving = record["parts"].items()
+    (body_name, body_part), *moving = ordered_parts(record["parts"]).items()
     mesh = _surface(body_part, record, inputs_dir)
-    # Twice the limit: the body alone is not what the published size measures. Regions in metres need the unit right.
-    limit = 2 * record["scale_limit"]
-    largest = float(np.ptp(mesh.vertices, axis=0).max())
-    _refuse_size(record, f"the mesh of {body_name}", largest, _published_m(record).max(), 1 / limit, limit)
     body, found, wheels = pool_of(mesh, dense, rng), {}, _made_wheels(record, rng)
+    refuse_shared(body, mesh, {name: part["region"] for name, part in moving if "region" in part}, where)
     for name, part in moving:
         if "region" in part:
             pool, body = cut(body, mesh, part["region"])
         elif "wheel" in part:
-            pool = _made_wheel(part, wheels[tuple(part["wheel"].values())], frame)
+            pool = _made_wheel(part, wheels[_wheel_size(part)], frame)
         else:
             pool = pool_of(_surface(part, record, inputs_dir), dense // 4, rng)
         if not len(pool.points):
-            raise InputError(f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface")
+            low, high = (
+                np.round(limit, 4).tolist() for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+            )
+            raise InputError(
+                f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
+                f"reaches from {low} to {high} m; is the unit {record['unit']!r} right?"
+            )
         found[name] = hinged(pool, part, up, front, f"{where}: parts.{name}")
     for region in record["drop"]:
         body = cut(body, mesh, region)[1]
@@ -167,9 +181,14 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit)
     for axis in range(3):
         _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis], 1 / limit, limit)
+    whole = float((high - low).max())
     for name, pool in parts.items():
         extent = float(np.ptp(pool.points, axis=0).max())
-        _refuse_size(record, f"part {name}", extent, wanted.max(), 1 / limit, SMALLEST_PART)
+        if kinds[name] != "body" and extent < whole / SMALLEST_PART:
+            raise InputError(
+                f"{record['subtype']}: part {name} measures {extent:.3g} m in a mesh of {whole:.3g} m, expected at "
+                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
+            )
     ratio = wanted / size
     scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[record["scale"]]
     return scale, {"mesh_extent_m": (high - low).tolist(), "scale_factors": scale.tolist()}
@@ -202,6 +221,11 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
             points = (pool.points - pool.hinge) * (diameter / raw) + hinge
             result[name] = replace(pool, points=points, hinge=hinge)
             facts["wheel_diameter_m"] = diameter
+        if kinds[name] == "rotor" and 2 * _turned_radius(result[name]) < SMALLEST_ROTOR_M:
+            raise InputError(
+                f"{record['subtype']}: rotor {name} has a diameter of {2 * _turned_radius(result[name]):.2g} m at the "
+                f"final size, expected at least {SMALLEST_ROTOR_M} m"
+            )
     low, high = _bounds(result)
     middle = (low + high) / 2
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
@@ -237,9 +261,18 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     Raises: InputError naming the file or the part and the reason.
     """
     rng = stream(seed, "cloud", record["subtype"])
+    record = record | {"parts": ordered_parts(record["parts"])}
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
-    raw, closed = pools(record, Path(inputs_dir), rng)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", InputWarning)
+        raw, closed = pools(record, Path(inputs_dir), rng)
+        hung = {name: part["parent"] for name, part in record["parts"].items() if "parent" in part}
+        refuse_implausible(raw, kinds, hung, record["subtype"])
     parts, facts = sized(record, raw, kinds)
+    for warning in caught:
+        warnings.warn(warning.message, warning.category, stacklevel=2)
+    doubts = list(dict.fromkeys(str(warning.message) for warning in caught if warning.category is InputWarning))
+    facts |= {"warnings": doubts} if doubts else {}
     wanted = [Part(name, kinds[name], (), weight=pool.area) for name, pool in parts.items()]
     try:
         counts = allot(wanted, record["points"], record["moving_share"])

@@ -5,6 +5,10 @@ their names); pymeshlab repairs, since its filters keep two million triangles wi
 sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
 """
 
+import logging
+import math
+import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,15 +16,18 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import existing
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+HEADER_BYTES = 1 << 20
+"""Bytes at the start of a file in which its unit and its extensions stand."""
 LARGEST_TRIANGLES = 20_000_000
 """Above this a file is refused: its arrays alone would take over two gigabytes."""
 
-_SAME_UNIT = {"meters": "m", "centimeters": "cm", "millimeters": "mm", "inches": "in", "feet": "ft"}
+SAME_UNIT = 1e-6
+"""Relative difference up to which two units are the same."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +58,46 @@ def joined(meshes: list[Mesh]) -> Mesh:
     )
 
 
-def _triangles(path: Path, unit: str, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:
+def metres(unit: str | float) -> float:
+    """Return the metres of a unit: one of UNITS_M by name, or the metres themselves."""
+    return UNITS_M[unit] if isinstance(unit, str) else float(unit)
+
+
+def stated_unit_m(path: Path) -> float | None:
+    """Return the metres that a mesh file says its unit has, None where it says nothing.
+
+    Only COLLADA has a statement of its own (`<unit meter="...">`); a GLB is in metres by its standard; STL, OBJ and
+    PLY have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    """
+    if path.suffix.lower() == ".glb":
+        return 1.0
+    if path.suffix.lower() != ".dae":
+        return None
+    with path.open("rb") as file:
+        found = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']", file.read(HEADER_BYTES))
+    try:
+        value = float(found[1]) if found else math.nan
+    except ValueError:
+        value = math.nan
+    return value if 0 < value < math.inf else None
+
+
+def _compressed(path: Path) -> bool:
+    """Whether a GLB needs the Draco decoder, which trimesh does not have."""
+    with path.open("rb") as file:
+        return path.suffix.lower() == ".glb" and b"KHR_draco_mesh_compression" in file.read(HEADER_BYTES)
+
+
+def _triangles(path: Path, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:
     """Return vertices (V, 3) in file units and faces (F, 3) of a file, or of the named geometries of its scene."""
     import trimesh  # only records with a mesh pay for the import
 
+    # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
+    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
+    if _compressed(path):
+        raise InputError(f"{path}: is compressed by Draco, expected a plain GLB: export it without compression")
     try:
         scene = trimesh.load_scene(path, process=False)
-        found = {_SAME_UNIT.get(str(scene.units)) for scene in [scene]} - {None}
         names = sorted(scene.geometry)
         parts = []
         for node in sorted(scene.graph.nodes_geometry):
@@ -74,8 +114,6 @@ def _triangles(path: Path, unit: str, geometry: list[str] | None) -> tuple[np.nd
         raise InputError(
             f"{path}: geometry {sorted(set(geometry) - set(names))} is not in it, expected some of {names}"
         )
-    if found and found != {unit}:
-        raise InputError(f"{path}: the file says its unit is {found.pop()}, the record says {unit}, expected the same")
     if not parts:
         raise InputError(f"{path}: has no triangle, expected a surface")
     starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts[:-1]])
@@ -144,25 +182,30 @@ def _outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> 
     return np.where(inverted[component][:, None], faces[:, ::-1], faces), closed
 
 
-def read_mesh(path: str | Path, unit: str, geometry: list[str] | None = None) -> Mesh:
+def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = None) -> Mesh:
     """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own axes.
 
-    `unit` is the length unit of the file's numbers (m, cm, mm, in, ft), `geometry` the names of the scene's
-    geometries to take (all by default). Open surfaces stay open: they are sampled as triangle soup.
+    `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry` the names of the
+    scene's geometries to take (all by default). Open surfaces stay open: they are sampled as triangle soup.
     Raises: InputError naming the file and the reason: no such file, another format, unreadable, no or fewer than four
-    triangles, no area, NaN or infinite vertices, too many triangles, a unit other than the file states.
+    triangles, no area, NaN or infinite vertices, too many triangles.
+    Warns: InputWarning where the file states another unit than `unit`.
     """
     path = existing(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
         raise InputError(f"{path}: format {path.suffix!r}, expected one of {SUFFIXES}")
-    vertices, faces = _triangles(path, unit, geometry)
+    vertices, faces = _triangles(path, geometry)
+    stated = stated_unit_m(path)
+    if stated is not None and abs(stated / metres(unit) - 1) > SAME_UNIT:
+        text = f"{path}: the file states a unit of {stated:g} m, the record says {unit}; the record is followed"
+        warnings.warn(text, InputWarning, stacklevel=2)
     if len(faces) > LARGEST_TRIANGLES:
         raise InputError(f"{path}: {len(faces)} triangles, expected at most {LARGEST_TRIANGLES}")
     # By a mark a vertex, not a copy of every corner: millions of corners would double the memory.
     finite = np.isfinite(vertices).all(axis=1)
     if faces.min() < 0 or faces.max() >= len(vertices) or not finite[faces].all():
         raise InputError(f"{path}: a triangle has a NaN, infinite or missing vertex, expected finite ones")
-    vertices *= UNITS_M[unit]
+    vertices *= metres(unit)
     vertices, faces = _repaired(vertices, faces)
     if len(faces) < 4:
         raise InputError(f"{path}: {len(faces)} triangles with an area, expected a surface of at least 4")

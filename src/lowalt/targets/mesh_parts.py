@@ -5,6 +5,7 @@ large the target is comes later. Pure functions over arrays.
 """
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from lowalt.common.errors import InputError
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation
+
+SHARED_LIMIT = 0.01
+"""Share of its samples that a region may have in common with another's: regions that touch share their border."""
 
 
 @dataclass(frozen=True)
@@ -77,19 +81,39 @@ def inside(points: np.ndarray, region: dict) -> np.ndarray:
     return (np.hypot(*across.T) <= cylinder["radius"]) & (abs(away[:, axis]) <= cylinder["half_length"])
 
 
-def cut(pool: Pool, mesh: Mesh, region: dict) -> tuple[Pool, Pool]:
-    """Return what of a body's pool lies in the region, and the rest.
+def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
+    """Return whether a region takes each sample (N,) of a body's pool.
 
-    With `whole: true` only connected components of `mesh` (the body's) all of whose vertices are inside.
+    With `whole: true` it takes only connected components of `mesh` (the body's) all of whose vertices are inside.
     """
-    if region.get("whole"):
-        outside = ~inside(mesh.vertices, region)[mesh.faces].all(axis=1)
-        partly = np.zeros(len(mesh.closed), bool)
-        partly[mesh.component[outside]] = True
-        mask = ~partly[pool.component]
-    else:
-        mask = inside(pool.points, region)
+    if not region.get("whole"):
+        return inside(pool.points, region)
+    outside = ~inside(mesh.vertices, region)[mesh.faces].all(axis=1)
+    partly = np.zeros(len(mesh.closed), bool)
+    partly[mesh.component[outside]] = True
+    return ~partly[pool.component]
+
+
+def cut(pool: Pool, mesh: Mesh, region: dict) -> tuple[Pool, Pool]:
+    """Return the part of a body's pool that the region takes (see `taken`), and the rest."""
+    mask = taken(pool, mesh, region)
     return pool.picked(mask), pool.picked(~mask)
+
+
+def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) -> None:
+    """Refuse regions (by part) that take the same surface: which part got it would depend on the order of parts.
+
+    Two regions may touch: a share of SHARED_LIMIT of the smaller one's samples is no fault.
+    Raises: InputError naming `where` and the two parts.
+    """
+    masks = {name: taken(pool, mesh, region) for name, region in regions.items()}
+    for (one, left), (other, right) in combinations(masks.items(), 2):
+        shared, smaller = int((left & right).sum()), min(int(left.sum()), int(right.sum()))
+        if shared > SHARED_LIMIT * smaller:
+            raise InputError(
+                f"{where}: the regions of parts {one!r} and {other!r} take the same surface ({shared} of {smaller} "
+                "samples), expected disjoint regions"
+            )
 
 
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:

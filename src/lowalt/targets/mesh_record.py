@@ -1,8 +1,10 @@
 """What a mesh record may say, checked before any file is opened.
 
-All places are in metres along the axes of the mesh file (after `unit`, before scaling). Keys:
+All places are in metres along the axes of the mesh file (after `unit`, before scaling). The order of keys and parts
+means nothing. Keys:
 
-unit         of the file's numbers: m, cm, mm, in, ft; a mesh may have its own
+unit         of the file's numbers: m, cm, mm, in, ft, or the metres that 1.0 in the file stands for (any positive
+             number); a mesh may have its own. It overrides a unit that the file states, with a warning
 up, front    the file's axis that points up and to the front: x, -x, y, -y, z or -z
 size_is      what the published size measures: motor diagonal, length (along the front), width, height or
              largest extent; for vehicles the table has all three
@@ -11,10 +13,11 @@ scale        published (UAV and bird by `size_is`; a vehicle axis by axis, wheel
 scale_limit  largest factor either way between mesh and published size; a wrong unit is caught by it (2.5)
 wheel_size   published (wheels get the table's diameter) or mesh (they are scaled like the car)
 moving_share share of the points on moving parts; flap: as for built-in birds
-parts        by name, the body first; each part has a kind and one of
+parts        by name, one of them of kind body; each part has a kind and one of
   meshes:    [{file, unit, geometry: [names], mirror: axis, turn: {axis, deg}, move: [x, y, z]}], in that order
-  region:    taken out of the body's surface: {box: [[low], [high]]} (null: unbounded) or {cylinder: {centre, axis,
-             radius, half_length}}; with `whole: true` only connected components that lie inside as a whole
+  region:    taken out of the body's surface, disjoint from the regions of other parts: {box: [[low], [high]]}
+             (null: unbounded) or {cylinder: {centre, axis, radius, half_length}}; with `whole: true`
+             only connected components that lie inside as a whole
   wheel:     {diameter_m, width_m}: a wheel is made and added at the hinge
   and hinge: [x, y, z] or found (centre of its surface); axis: [x, y, z] or found (its thinnest direction; not for
              wings); by default a rotor's is found, a wheel's sideways, a wing's the front line; sense: ccw or cw
@@ -24,12 +27,12 @@ drop         regions of what is then left of the body that are no part of the ta
 licence, attribution, where (a user gets the files), note: words, kept in the cloud's record
 """
 
-from pathlib import Path
-
 import jsonschema
 
 from lowalt.common.errors import InputError
 from lowalt.targets import bird, uav, vehicle
+from lowalt.targets.cloud import MOST_TURNING_PARTS
+from lowalt.targets.input_files import check_file_name
 from lowalt.targets.mesh_files import UNITS_M
 
 AXES = ("x", "-x", "y", "-y", "z", "-z")
@@ -59,10 +62,11 @@ _REGION = _object(
     cylinder=_CYLINDER,
     whole={"type": "boolean"},
 ) | {"oneOf": [{"required": ["box"]}, {"required": ["cylinder"]}]}
+_UNIT = {"anyOf": [{"enum": list(UNITS_M)}, _POSITIVE | {"maximum": 1e6}]}
 _MESH = _object(
     ["file"],
     file=_TEXT,
-    unit={"enum": list(UNITS_M)},
+    unit=_UNIT,
     geometry={"type": "array", "items": _TEXT, "minItems": 1},
     mirror=_PLAIN,
     turn=_object(["axis", "deg"], axis=_PLAIN, deg={"type": "number"}),
@@ -82,7 +86,7 @@ _PART = _object(
 _FLAP = _object([], **{key: {"type": "number"} for key in bird.FLAP})
 SCHEMA = _object(
     ["unit", "up", "front", "parts"],
-    unit={"enum": list(UNITS_M)},
+    unit=_UNIT,
     up={"enum": list(AXES)},
     front={"enum": list(AXES)},
     size_is={"enum": [*SIZES, ALL_AXES]},
@@ -108,11 +112,35 @@ def _schema_fault(extra: dict, where: str) -> None:
         raise InputError(f"{where}: {place}: {fault.message}")
 
 
-def _part_fault(name: str, part: dict, earlier: list[str], category: str) -> str | None:
+def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
+    """Return a record's parts in the one order that all stages use: the body, then the others by name, each part after
+    its parent.
+
+    A record loses the order of its keys on its way through the workflow's settings, so the order as written must not
+    matter. `parts` are those of a record that `check_record` has passed.
+    """
+    body = [name for name, part in parts.items() if part["kind"] == "body"]
+    result, waiting = dict.fromkeys(body), sorted(set(parts) - set(body))
+    while waiting:
+        ready = next(name for name in waiting if parts[name].get("parent") not in waiting)
+        waiting.remove(ready)
+        result[ready] = None
+    return {name: parts[name] for name in result}
+
+
+def _ancestors(name: str, parts: dict[str, dict]) -> list[str]:
+    """The parent of a part, the parent's parent and so on; it ends at a name that stands there already."""
+    found = [name]
+    while (parent := parts.get(found[-1], {}).get("parent")) is not None:
+        found.append(parent)
+        if found.count(parent) > 1:
+            break
+    return found[1:]
+
+
+def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) -> str | None:
     """What is wrong with one part beyond its form, or None."""
     kind = part["kind"]
-    if (kind == "body") != (not earlier):
-        return "expected exactly one body, named first"
     if kind == "body":
         return None if "meshes" in part and len(part) == 2 else "a body has a kind and meshes, nothing else"
     if kind != MOVING_KIND[category]:
@@ -123,8 +151,12 @@ def _part_fault(name: str, part: dict, earlier: list[str], category: str) -> str
         return "a wing needs a hinge in metres, and its axis is given or the front line"
     if "sense" in part and kind != "rotor":
         return "sense is for rotors"
-    if "parent" in part and part["parent"] not in earlier[1:]:
-        return f"parent is {part['parent']!r}, expected an earlier moving part"
+    if "parent" in part:
+        moving = sorted(other for other, found in parts.items() if found["kind"] != "body" and other != name)
+        if part["parent"] not in moving:
+            return f"parent is {part['parent']!r}, expected one of {moving}"
+        if name in _ancestors(name, parts):
+            return f"parent is {part['parent']!r}, which hangs on {name!r} itself, expected no circle"
     if isinstance(part.get("axis"), list) and not any(part["axis"]):
         return "axis is zero, expected a direction"
     return None
@@ -142,9 +174,14 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     _schema_fault(extra, where)
     if merged["up"][-1] == merged["front"][-1]:
         raise InputError(f"{where}: up {merged['up']} and front {merged['front']}, expected two different axes")
-    names = list(merged["parts"])
-    for index, (name, part) in enumerate(merged["parts"].items()):
-        fault = _part_fault(name, part, names[:index], category)
+    bodies = [name for name, part in merged["parts"].items() if part["kind"] == "body"]
+    if len(bodies) != 1:
+        raise InputError(f"{where}: parts: {len(bodies)} of kind body {bodies}, expected exactly one body")
+    turning = sum(part["kind"] in ("rotor", "wheel") for part in merged["parts"].values())
+    if turning > MOST_TURNING_PARTS:
+        raise InputError(f"{where}: parts: {turning} rotors or wheels, expected at most {MOST_TURNING_PARTS}")
+    for name, part in merged["parts"].items():
+        fault = _part_fault(name, part, merged["parts"], category)
         if fault:
             raise InputError(f"{where}: parts.{name}: {fault}")
     sizes = (ALL_AXES,) if category == "Vehicle" else SIZES
@@ -152,11 +189,11 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     if size not in sizes:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
     result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | merged | {"size_is": size}
+    result["parts"] = ordered_parts(merged["parts"])
     if category == "Vehicle":
         result.setdefault("wheel_size", "published")
     for name in record_files(result):
-        if Path(name).is_absolute() or ".." in Path(name).parts:
-            raise InputError(f"{where}: file is {name!r}, expected a path inside the folder of inputs")
+        check_file_name(name, f"{where}: file")
     return result
 
 

@@ -11,6 +11,7 @@ from lowalt.common.streams import stream
 from lowalt.targets import mesh, vehicle
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut, inside
+from lowalt.targets.mesh_record import ordered_parts
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
 from lowalt.targets.sampling import face_normals
 from lowalt.targets.surfaces import Surface, merged
@@ -94,6 +95,7 @@ def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface],
     `record` is a merged record that `mesh_record.check_record` has passed.
     Raises: InputError naming the file or the part and the reason.
     """
+    record = record | {"parts": ordered_parts(record["parts"])}
     cloud = mesh.mesh_cloud(record, inputs, seed)
     raw, _ = mesh.pools(record, inputs, stream(seed, "cloud", record["subtype"]))
     kinds = {name: part["kind"] for name, part in record["parts"].items()}

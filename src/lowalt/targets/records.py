@@ -19,6 +19,9 @@ SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = ("source", "points", "rcs_m2_per_point")
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
+MOST_POINTS = 20_000
+"""Most points of a cloud: spreading them evenly takes a time that grows with their square (a minute at this count)."""
+
 _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
 _NUMBERS = (
@@ -111,8 +114,8 @@ def merge(row: dict, record: dict, where: str) -> dict:
         "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
     }  # fmt: skip
     points, rcs = merged["points"], merged["rcs_m2_per_point"]
-    if isinstance(points, bool) or not isinstance(points, int) or points < 1:
-        raise InputError(f"{where}: points is {points!r}, expected a positive whole number")
+    if isinstance(points, bool) or not isinstance(points, int) or not 1 <= points <= MOST_POINTS:
+        raise InputError(f"{where}: points is {points!r}, expected a whole number from 1 to {MOST_POINTS}")
     if isinstance(rcs, bool) or not isinstance(rcs, (int, float)) or not (math.isfinite(rcs) and rcs >= 0):
         raise InputError(f"{where}: rcs_m2_per_point is {rcs!r}, expected square metres >= 0")
     extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}

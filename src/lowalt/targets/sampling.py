@@ -84,5 +84,5 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator, keep: np.ndar
             away += (column - column[index]) ** 2
         np.minimum(nearest, away, out=nearest)
         # Below every distance: a chosen point is never chosen again, even among coinciding ones.
-        nearest[chosen[: step + 1]] = -1.0
+        nearest[index] = -1.0
     return chosen
