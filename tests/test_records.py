@@ -53,7 +53,7 @@ def test_a_later_file_replaces_whole_records(tmp_path, written):
     [
         ({"source": "clay"}, r"Crow: source is 'clay', expected one of"),
         ({"colour": "black"}, r"Crow: unknown keys \['colour'\], expected some of"),
-        ({"points": 0}, r"Crow: points is 0, expected a positive whole number"),
+        ({"points": 0}, r"Crow: points is 0, expected a whole number from 1 to 20000"),
         ({"points": 12.5}, r"Crow: points is 12\.5"),
         ({"points": True}, r"Crow: points is True"),
         ({"rcs_m2_per_point": -1}, r"Crow: rcs_m2_per_point is -1, expected square metres >= 0"),
