@@ -11,13 +11,14 @@ import tarfile
 import numpy as np
 import pytest
 import webdataset
+import yaml
 from PIL import Image
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.motion import COLUMNS, write_table
-from lowalt.shards import ShardSet, faults
+from lowalt.shards import ShardSet, card, faults
 from lowalt.shards.__main__ import main
 from lowalt.shards.record import geometry, record, sample_key, snr_label
 from lowalt.shards.size import main as size_main
@@ -71,6 +72,14 @@ def build(folder, kind):
     return folder
 
 
+def publish(folder, target):
+    """A copy of a data set without its inputs, with its data card."""
+    copied = shutil.copytree(folder, target, ignore=shutil.ignore_patterns("seen.*", "unseen.*"))
+    (target.parent / "config.yaml").write_text(yaml.safe_dump({"run": "trial"}))
+    card.write(copied / "index.json", target.parent / "config.yaml")
+    return copied
+
+
 @pytest.fixture(scope="module")
 def images(tmp_path_factory):
     return build(tmp_path_factory.mktemp("images"), "image")
@@ -83,8 +92,8 @@ def signals(tmp_path_factory):
 
 @pytest.fixture
 def copy(images, tmp_path):
-    """A copy of the image shards to do harm to."""
-    return shutil.copytree(images, tmp_path / "copy")
+    """A copy of the image shards, published with a data card, to do harm to."""
+    return publish(images, tmp_path / "copy")
 
 
 def test_tar_bytes_are_those_of_webdatasets_writer(images):
@@ -229,8 +238,8 @@ def test_both_kinds_give_the_same_images(images, signals):
         by_signal.png(0)
 
 
-def test_verify_is_silent_on_whole_shards(images, capsys):
-    main(["verify", "--index", str(images / "index.json")])
+def test_verify_is_silent_on_whole_shards(copy, capsys):
+    main(["verify", "--index", str(copy / "index.json")])
     assert capsys.readouterr().out == ""
 
 

@@ -1,4 +1,4 @@
-"""The data card: README.md, samples.csv and croissant.json beside the index; the folder can be published as it is.
+"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS beside the index; the folder can be published.
 
 A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
 """
@@ -18,6 +18,7 @@ from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
+from lowalt.shards import sums
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.read import ShardSet
 
@@ -147,7 +148,8 @@ shards = ShardSet("index.json", groups=["seen"], folds=["train"])
 images, label = shards.images(0, size=224), shards.labels[0]  # (9, 224, 224) uint8
 ```
 
-`python -m lowalt.shards verify --index index.json` checks every byte and names what is damaged.
+`python -m lowalt.shards verify --index index.json` checks every byte of every file and names what is damaged;
+`sha256sum --check SHA256SUMS` does the same without this package, file by file.
 
 **Protocols.** *seen*: train, val and test folds of both groups. *unseen*: folds of the `seen` group, and all folds
 of the `unseen` group as the test on subtypes that training has not met.
@@ -174,7 +176,7 @@ The exact configuration, which makes the same bytes again with these versions:
 
 
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv and croissant.json beside an index.
+    """Write README.md, samples.csv and croissant.json beside an index, and the checksums of all of it.
 
     facts: what Croissant should say besides, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
@@ -195,6 +197,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+    sums.write(index_path, shards.index)
 
 
 def main(arguments: list[str]) -> None:

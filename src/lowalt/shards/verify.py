@@ -1,4 +1,4 @@
-"""Finding damage: every byte of every shard and table against the index, each fault named."""
+"""Finding damage: every byte of every file of a data set, each fault named."""
 
 import hashlib
 from collections.abc import Iterator
@@ -8,25 +8,31 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
+from lowalt.shards import sums
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.tar import BLOCK
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
-    """Yield one line a fault of a data set: the shard, the sample where it lies in one, and what is wrong.
+    """Yield one line a fault of a published data set: the file, the sample where it lies in one, and what is wrong.
 
-    A shard whose SHA-256 is right has no fault; otherwise its samples are checked one by one.
+    First the shards and their tables against the index, then all other files of the folder against SHA256SUMS. A file
+    that no checksum covers is a fault too.
     Raises: InputError where the index itself cannot be read.
     """
     index = load(index_path)
     folder = Path(index_path).parent
     for entry in index["shards"]:
         yield from shard_faults(folder / entry["path"], entry)
+    yield from sums.faults(index_path, index)
 
 
 def shard_faults(path: Path, entry: dict) -> Iterator[str]:
-    """Yield the faults of one shard and its table against the shard's entry of the index."""
+    """Yield the faults of one shard and its table against the shard's entry of the index.
+
+    A shard whose SHA-256 is right has no fault; otherwise its samples are checked one by one.
+    """
     table = table_path(path)
     if not table.is_file():
         yield f"{table.name}: missing"

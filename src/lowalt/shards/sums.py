@@ -1,0 +1,73 @@
+"""SHA256SUMS beside the index: one line for every other file of a data set, in the form of `sha256sum`.
+
+Each checksum stands in a file that is written later: a sample's in its shard's table, the tables' and shards' in the
+index, the index's and the data card's here. SHA256SUMS itself needs none: its text follows from the files it names,
+so a changed byte of it contradicts one of them.
+"""
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from lowalt.common.files import replacing, sha256
+from lowalt.shards.table import table_path
+
+NAME = "SHA256SUMS"
+CARD = ("README.md", "croissant.json", "samples.csv")
+LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
+
+
+def _of_index(index: dict) -> dict[str, str]:
+    """Checksums that the index already states: path relative to the index's folder -> SHA-256."""
+    sums = {}
+    for entry in index["shards"]:
+        sums[entry["path"]] = entry["sha256"]
+        sums[table_path(entry["path"]).as_posix()] = entry["table_sha256"]
+    return sums
+
+
+def _text(sums: dict[str, str]) -> str:
+    return "".join(f"{checksum}  {name}\n" for name, checksum in sorted(sums.items()))
+
+
+def write(index_path: str | Path, index: dict) -> None:
+    """Write SHA256SUMS beside an index whose data card is complete.
+
+    The shards are not read again: their checksums are those of the index.
+    """
+    folder = Path(index_path).parent
+    own = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
+    with replacing(folder / NAME) as temporary:
+        temporary.write_text(_text(_of_index(index) | own))
+
+
+def faults(index_path: str | Path, index: dict) -> Iterator[str]:
+    """Yield one line a fault of the index's and the data card's bytes, of SHA256SUMS, and of files that do not belong.
+
+    The bytes of shards and tables are not read here; `verify.shard_faults` checks them against the index.
+    """
+    folder = Path(index_path).parent
+    path = folder / NAME
+    if not path.is_file():
+        yield f"{NAME}: missing, so the data card cannot be checked"
+        return
+    stated = _of_index(index)
+    text = path.read_bytes().decode(errors="replace")
+    found = {name: checksum for checksum, name in LINE.findall(text)}
+    if text != _text(found):
+        yield f"{NAME}: damaged, expected lines of a SHA-256, two spaces and a name, sorted by name"
+    own = (*CARD, Path(index_path).name)
+    for name in sorted({*stated, *own, *found}):
+        if name not in found:
+            yield f"{NAME}: no line for {name}"
+        elif name in stated:
+            if found[name] != stated[name]:
+                yield f"{NAME}: its line for {name} differs from the index"
+        elif name not in own:
+            yield f"{NAME}: a line for {name}, which is no part of the data set"
+        elif not (folder / name).is_file():
+            yield f"{name}: missing"
+        elif sha256(folder / name) != found[name]:
+            yield f"{name}: damaged (SHA-256 differs from its line in {NAME})"
+    present = (file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir())
+    yield from (f"{name}: no part of the data set" for name in sorted({*present} - {*stated, *own, NAME}))

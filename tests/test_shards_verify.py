@@ -1,0 +1,110 @@
+"""Verification of a whole data set: damage of any kind to any of its files is found, and named by the file."""
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.shards import faults
+from lowalt.shards.__main__ import main
+from test_shards import build, publish
+
+
+@pytest.fixture(scope="module")
+def published(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("verify")
+    (folder / "made").mkdir()
+    return publish(build(folder / "made", "signal"), folder / "published")
+
+
+@pytest.fixture
+def copy(published, tmp_path):
+    return shutil.copytree(published, tmp_path / "copy")
+
+
+def names(published):
+    return sorted(path.name for path in published.iterdir())
+
+
+def lines(folder):
+    """The faults that `verify` finds; an index that cannot be read is one."""
+    try:
+        return list(faults(folder / "index.json"))
+    except InputError as error:
+        return [str(error)]
+
+
+def test_an_undamaged_data_set_has_no_fault(published):
+    assert len(names(published)) == 2 * 6 + 5
+    assert lines(published) == []
+    main(["verify", "--index", str(published / "index.json")])
+
+
+def test_sha256sum_agrees_and_reads_every_file(published):
+    listed = (published / "SHA256SUMS").read_text().split()[1::2]
+    assert sorted([*listed, "SHA256SUMS"]) == names(published)
+    subprocess.run(["sha256sum", "--check", "--strict", "--quiet", "SHA256SUMS"], cwd=published, check=True)
+
+
+def test_a_flipped_bit_anywhere_in_any_file_is_found(copy):
+    rng = np.random.default_rng(5)
+    for name in names(copy):
+        path = copy / name
+        whole = path.read_bytes()
+        # The first and last byte, and bytes drawn at random; white space of the JSON files is among them.
+        for place in [0, len(whole) - 1, *rng.integers(len(whole), size=10).tolist()]:
+            damaged = bytearray(whole)
+            damaged[place] ^= 1 << int(rng.integers(8))
+            path.write_bytes(damaged)
+            found = lines(copy)
+            assert any(name in line for line in found), (name, place, found)
+        path.write_bytes(whole)
+    assert lines(copy) == []
+
+
+@pytest.mark.parametrize("harm", ["truncated", "emptied", "extended", "missing"])
+def test_a_file_of_another_length_is_found(copy, harm):
+    for name in names(copy):
+        path = copy / name
+        whole = path.read_bytes()
+        if harm == "missing":
+            path.unlink()
+        else:
+            path.write_bytes({"truncated": whole[:-1], "emptied": b"", "extended": whole + b"\0"}[harm])
+        assert any(name in line for line in lines(copy)), name
+        path.write_bytes(whole)
+    assert lines(copy) == []
+
+
+def test_files_that_do_not_belong_are_named(copy):
+    (copy / "seen-train-00001.tar").write_bytes((copy / "seen-train-00000.tar").read_bytes())
+    (copy / "notes").mkdir()
+    (copy / "notes/mine.txt").write_text("mine")
+    assert lines(copy) == ["notes/mine.txt: no part of the data set", "seen-train-00001.tar: no part of the data set"]
+    with pytest.raises(SystemExit, match="1"):
+        main(["verify", "--index", str(copy / "index.json")])
+
+
+def test_a_checksum_line_more_or_less_or_for_another_file_is_found(copy):
+    sums = copy / "SHA256SUMS"
+    text = sums.read_text()
+    first, *rest = text.splitlines(keepends=True)
+    for changed, words in [
+        ("".join(rest), "SHA256SUMS: no line for README.md"),
+        (text + f"{'0' * 64}  zebra.txt\n", "SHA256SUMS: a line for zebra.txt, which is no part of the data set"),
+        ("".join([*rest, first]), "SHA256SUMS: damaged"),
+        (text + first, "SHA256SUMS: damaged"),
+    ]:
+        sums.write_text(changed)
+        assert any(line.startswith(words) for line in lines(copy)), words
+
+
+def test_exchanged_files_are_found(copy):
+    """Equal lengths and valid formats do not hide that a file is another's."""
+    one, other = copy / "seen-val-00000.npz", copy / "seen-test-00000.npz"
+    before = one.read_bytes(), other.read_bytes()
+    one.write_bytes(before[1])
+    other.write_bytes(before[0])
+    assert {line.partition(":")[0] for line in lines(copy)} == {one.name, other.name}

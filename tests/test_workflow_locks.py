@@ -1,0 +1,198 @@
+"""Locks: a dead owner's is taken over, a living one's refused by name, and of many at once exactly one wins."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from lowalt.workflow.locks import guarded, holders, numbers, take, take_over
+from lowalt.workflow.owner import TOKEN, Owner, started
+
+ROOT = Path(__file__).parent.parent
+KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
+# The process id of a process that has ended, and whose number the system has not given to another.
+GONE = replace(Owner.current(), pid=2**22 + 1, token="gone")
+
+SNAKEFILE = """
+from lowalt.workflow.locks import install
+
+install()
+
+rule all:
+    output: "out.txt"
+    shell: "echo $$ > worker.pid; while [ ! -e go ]; do sleep 0.05; done; touch {output}"
+"""
+
+
+def takers(locks):
+    return [Owner.read(locks / f"{number}.owner.json") for number in numbers(locks)]
+
+
+def test_this_process_lives_and_is_known_by_more_than_its_number():
+    owner = Owner.current()
+    assert owner.here and owner.alive
+    assert not replace(owner, started=owner.started - 1).alive
+    assert not replace(owner, boot="another").alive
+    assert not GONE.alive
+    child = subprocess.Popen(["cat"], stdin=subprocess.PIPE)
+    assert started(child.pid) is not None
+    child.stdin.close()
+    # It ends, but nobody asks for its status: a zombie holds no lock.
+    stop = time.monotonic() + 10
+    while started(child.pid) is not None:
+        assert time.monotonic() < stop
+    child.wait()
+
+
+def test_only_the_same_host_and_namespace_can_tell_who_lives():
+    owner = Owner.current()
+    assert not replace(owner, host="elsewhere").here
+    assert not replace(owner, namespace="pid:[1]").here
+    # Namespaces are numbered anew at every start of the machine; what ran before is dead whatever its namespace was.
+    assert replace(owner, namespace="pid:[1]", boot="another").here
+
+
+def test_a_record_read_back_is_the_owner_and_a_damaged_one_is_none(tmp_path):
+    path = tmp_path / "0.owner.json"
+    Owner.current().write(path)
+    assert Owner.read(path) == Owner.current()
+    whole = path.read_text()
+    for text in ("", whole[:-5], "{}", "[1]", whole.replace("pid", "pit")):
+        path.write_text(text)
+        assert Owner.read(path) is None
+    assert Owner.read(tmp_path / "none") is None
+
+
+def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
+    elsewhere = replace(GONE, host="elsewhere")
+    for owner in (GONE, Owner.current(), elsewhere, replace(GONE, boot="before the power loss")):
+        take(tmp_path, owner, KEYS)
+    (tmp_path / "7.output.lock").write_text("out.txt\n")
+    said = []
+    take_over(tmp_path, said.append)
+    assert numbers(tmp_path) == [1, 2, 7]
+    assert takers(tmp_path)[:2] == [Owner.current(), elsewhere]
+    assert len(said) == 2 and all(str(GONE.pid) in line for line in said)
+    text = holders(tmp_path)
+    assert f"process {os.getpid()} of {Owner.current().host} is running" in text
+    assert "host elsewhere, which cannot be seen from here" in text
+    assert "7.output.lock: no record of its owner" in text and "--unlock" in text
+
+
+def test_jobs_that_outlived_their_run_are_ended(tmp_path):
+    command = "import signal, time; signal.signal(signal.SIGTERM, signal.SIG_IGN); print(1, flush=True); time.sleep(60)"
+    jobs = [
+        subprocess.Popen([sys.executable, "-c", line], env=os.environ | {TOKEN: token}, stdout=subprocess.PIPE)
+        for line, token in [(command.replace("SIG_IGN", "SIG_DFL"), "gone"), (command, "another")]
+    ]
+    for job in jobs:
+        job.stdout.readline()
+    assert GONE.left_behind() == [jobs[0].pid]
+    take(tmp_path, GONE, KEYS)
+    said = []
+    take_over(tmp_path, said.append)
+    assert str(jobs[0].pid) in said[0] and "ending its 1 processes" in said[0]
+    assert jobs[0].wait(5) == -signal.SIGTERM and jobs[1].poll() is None
+    jobs[1].kill()
+    jobs[1].wait()
+
+
+RACE = """
+import sys, time
+from dataclasses import replace
+from pathlib import Path
+from lowalt.workflow.locks import guarded, numbers, take, take_over
+from lowalt.workflow.owner import Owner
+
+folder, start = Path(sys.argv[1]), float(sys.argv[2])
+time.sleep(start - time.time())
+with guarded(folder):
+    take_over(folder / "locks", lambda line: None)
+    if not numbers(folder / "locks"):
+        time.sleep(0.02)
+        take(folder / "locks", Owner.current(), {"input": [], "output": ["out.txt"]})
+        print("won")
+sys.stdin.read()
+"""
+
+
+def test_of_many_that_find_a_dead_owner_at_the_same_moment_one_wins(tmp_path):
+    take(tmp_path / "locks", GONE, KEYS)
+    start = str(time.time() + 1.5)
+    command = [sys.executable, "-c", RACE, str(tmp_path), start]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    racers = [subprocess.Popen(command, **pipes) for _ in range(6)]
+    time.sleep(2.2)
+    said = [racer.communicate("")[0] for racer in racers]
+    assert sorted(said) == [""] * 5 + ["won\n"]
+
+
+def test_a_process_that_dies_inside_the_guard_lets_go(tmp_path):
+    line = "import os, sys; from pathlib import Path; from lowalt.workflow.locks import guarded\n"
+    line += f"with guarded(Path({str(tmp_path)!r})): os.kill(os.getpid(), 9)"
+    assert subprocess.run([sys.executable, "-c", line]).returncode == -signal.SIGKILL
+    with guarded(tmp_path):
+        pass
+
+
+def start(folder, *arguments):
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--rerun-incomplete", *arguments]
+    output = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    return subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, **output)
+
+
+def wait_for(path):
+    stop = time.monotonic() + 30
+    while not path.exists() or not path.read_text().strip():
+        assert time.monotonic() < stop, path
+        time.sleep(0.02)
+    return path.read_text()
+
+
+@pytest.mark.workflow
+def test_snakemake_refuses_a_living_owner_and_takes_over_a_killed_one(tmp_path):
+    pytest.importorskip("snakemake")
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+    first = start(tmp_path)
+    worker = int(wait_for(tmp_path / "worker.pid"))
+    second = start(tmp_path)
+    text = second.communicate(timeout=60)[0]
+    assert second.returncode != 0
+    assert f"process {first.pid} of {Owner.current().host} is running" in text and "Traceback" not in text
+    # A refused run takes nothing from the one that runs.
+    assert takers(tmp_path / ".snakemake/locks")[0].pid == first.pid
+    assert f"process {first.pid}" in start(tmp_path, "--dry-run").communicate(timeout=60)[0]
+    first.kill()
+    # Its job lives on and holds the pipe of its output open.
+    first.wait()
+    assert started(worker) is not None
+    (tmp_path / "worker.pid").unlink()
+    third = start(tmp_path)
+    assert int(wait_for(tmp_path / "worker.pid")) != worker and started(worker) is None
+    (tmp_path / "go").touch()
+    text = third.communicate(timeout=60)[0]
+    assert third.returncode == 0, text
+    assert f"took over the lock of the dead process {first.pid}" in text
+    assert (tmp_path / "out.txt").exists() and numbers(tmp_path / ".snakemake/locks") == []
+
+
+@pytest.mark.workflow
+def test_snakemake_never_takes_over_the_lock_of_another_host(tmp_path):
+    pytest.importorskip("snakemake")
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+    (tmp_path / "go").touch()
+    take(tmp_path / ".snakemake/locks", replace(GONE, host="elsewhere"), KEYS)
+    before = json.loads((tmp_path / ".snakemake/locks/0.owner.json").read_text())
+    run = start(tmp_path)
+    text = run.communicate(timeout=60)[0]
+    assert run.returncode != 0 and "host elsewhere" in text and "--unlock" in text
+    assert json.loads((tmp_path / ".snakemake/locks/0.owner.json").read_text()) == before
+    assert start(tmp_path, "--unlock").wait(60) == 0
+    assert start(tmp_path).wait(60) == 0
