@@ -76,7 +76,7 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
 
 
 def end(owner: Owner) -> list[int]:
-    """End the processes that a dead run left behind, which would write its files beside the next run; return their ids."""
+    """End the processes that a dead run left behind, since they would write the next run's files; return their ids."""
     ended = owner.left_behind()
     for number, wait_s in ((signal.SIGTERM, GRACE_S), (signal.SIGKILL, GRACE_S)):
         for pid in owner.left_behind():
