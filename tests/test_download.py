@@ -6,6 +6,7 @@ import pytest
 
 from lowalt.common.errors import InputError
 from lowalt.targets import download
+from real_inputs import FOLDER, needs_inputs
 
 
 @pytest.fixture
@@ -51,6 +52,32 @@ def test_unknown_and_missing_files_are_named(served, tmp_path):
     with pytest.raises(InputError, match=r"nowhere/02/02.asf: download failed"):
         download.fetch("02/02.asf", tmp_path, served.replace("subjects", "nowhere"))
     assert not any(path.is_file() for path in (tmp_path / "cmu").rglob("*"))
+
+
+def test_line_ends_do_not_matter_and_one_bad_file_does_not_stop_the_others(served, tmp_path, monkeypatch, capsys):
+    (tmp_path / "subjects/02/02.asf").write_bytes(b"two\r\nlines\r\n")
+    pinned = {"02/02_02.amc": "0" * 64, **download.SHA256, "02/02.asf": hashlib.sha256(b"two\nlines\n").hexdigest()}
+    monkeypatch.setattr(download, "SHA256", pinned)
+    with pytest.raises(InputError, match="1 of 3 files could not be fetched"):
+        download.main(["--out", str(tmp_path / "inputs"), "--base", served])
+    out, err = capsys.readouterr()
+    assert "02_02.amc: download failed" in err and out.count("fetched") == 2
+    assert (tmp_path / "inputs/cmu/02/02.asf").read_bytes() == b"two\r\nlines\r\n"
+
+
+def test_only_the_pinned_bytes_of_a_file_count(served, tmp_path, monkeypatch):
+    monkeypatch.setattr(download, "PINNED_BYTES", {"02/02_01.amc": 6})
+    (tmp_path / "subjects/02/02_01.amc").write_bytes(b"motion and its end")
+    assert download.fetch("02/02_01.amc", tmp_path, served)
+    (tmp_path / "subjects/02/02_01.amc").write_bytes(b"moti")
+    (tmp_path / "cmu/02/02_01.amc").unlink()
+    with pytest.raises(InputError, match="SHA-256"):
+        download.fetch("02/02_01.amc", tmp_path, served)
+
+
+@needs_inputs
+def test_the_recordings_that_the_project_was_made_with_have_the_pinned_checksums():
+    assert {name: download.checksum(name, FOLDER / "cmu" / name) for name in download.SHA256} == download.SHA256
 
 
 def test_every_pinned_name_is_a_file_of_its_subject():

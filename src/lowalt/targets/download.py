@@ -6,14 +6,16 @@ Run `python -m lowalt.targets.download --out FOLDER`; FOLDER is then what LOWALT
 """
 
 import argparse
+import hashlib
 import shutil
+import sys
 import urllib.error
 import urllib.request
 from pathlib import Path
 
 from lowalt.common.command import run
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, sha256
+from lowalt.common.files import replacing
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
 TIMEOUT_S = 60
@@ -23,26 +25,36 @@ SHA256 = {
     "02/02_01.amc": "e196f67e5cee0bb575e2ed105082231166a13f81f6ff7b460f6078ed66c8e43a",
     "02/02_02.amc": "c0905969083149ff73b52a26d2121c889081a6b19aa743173dd1d575e31ec697",
     "02/02_03.amc": "a79e7127adfefb15566093a02d3e030cb67cd6c9e9773be95cc26c66b908aad0",
-    "05/05.asf": "bbdd4ba5c6807a5c036ebd2e4e23028c6097d36f557cb30a3f49d158aad07aa1",
-    "05/05_01.amc": "f8eb4d873cd81bf421dbeefc0aa6b47b8911d20d0f08d9d41076ea1ac211b37c",
+    "05/05.asf": "a4c6127051f30c90b758ccb81f471b7375fc15b92d82ba6bf3e0d2e2d224dd90",
+    "05/05_01.amc": "7e2270ccdbbe313861cd38d957a02ee1d90561589e0745cc713230d4558f3fe7",
     "07/07.asf": "f1fbd8abcd9073d24189d5f33b7220974b0ac4b5223fabbb0cc07799ec7a93b3",
     "07/07_01.amc": "97cdb8296c5a9a37a2eaca7ce214b9dbaef49016f7e28c22c5b74688fcd8e0e3",
     "07/07_02.amc": "8cd7cbba57ed6675dd647c9427ba6f7b676d514c4e7e4ad6d27c7d10a665df68",
     "07/07_03.amc": "f4a74d4239d54c33ab773079a0759e2a7d61ae15074d2af2e33b4025d7bd44d1",
-    "07/07_12.amc": "2c4c70bdf47d68a0a7e12e44239bfd24a1286d05e11b4104e1078a3483e95bb2",
+    "07/07_12.amc": "45bcfde7b24708406d90d53aff7eb1bdd20dcb52fa7979aa0216379042b60746",
     "09/09.asf": "cc3aab1866fe8149dda70fbbee7cfe2d45506ea38bef31122ac97f94505a33ce",
     "09/09_01.amc": "8ce3d9e2b0e12db6650810177f75afc34fa64c8aa79f2fe4bddaec35e7b71ad2",
     "09/09_02.amc": "74f2a66e16e800abd98e1c7894c0bcbdd5b7f0ee80665fc2ebff4c16dfe256c5",
     "09/09_06.amc": "00e5ba506ae51456f75a46037a05e8a1ed60b07d0ae9539f43f2e543044121a3",
     "09/09_07.amc": "5e6b06e6b9f89182edcd8cf41eacb7668385df255f2be5683719a9398c8941fd",
     "09/09_10.amc": "487d4a5a2ba915952d78220ecf6b1cd572cb8a7b06fb59836eae574df2d5c360",
-    "35/35.asf": "2a8e2eda3c0d7d828566b2a9a8ab36b2b8b3864110574e8b73c8f069fded416c",
-    "35/35_01.amc": "0743f4ea48e7e199cd56b2810b5ce81f8ede08d32ff79aa4e363c44cc4fe33aa",
+    "35/35.asf": "9b4888836cbd13cdab14a86c53a6b7765ccae48ddc7075d8c5e03ac34bc08364",
+    "35/35_01.amc": "efe882ca211915da0c70d7a1ac565660c75e373171f64e199ede283b921850d3",
     "131/131.asf": "0dee16ca41ae3d9363a53b05096e96ae00132ab9a9b7aaa002f986318a4e4dfd",
-    "131/131_01.amc": "930470d1979a42880dd01a6b6fe205028de69ebb142f84e32e0e83efe8447931",
+    "131/131_01.amc": "6abb97090d6ca328ea5b92099f8433bbe2a3892e98f749dd13362f86362125f9",
 }
-"""Checksums of the files this project was made with, by subject and name (07_12.amc as its known copies have it:
-without the end of its last frame)."""
+"""SHA-256 of the files this project was made with, by subject and name, with line ends as LF: copies of the database
+differ in their line ends."""
+
+PINNED_BYTES = {"07/07_12.amc": 187_672}
+"""Of these files only so many bytes are pinned: the known copy of 07_12.amc ends within its last frame, frame 245."""
+
+
+def checksum(name: str, path: Path) -> str:
+    """Return the SHA-256 (64 hexadecimal digits) of a recording's file as it is pinned: line ends as LF, and only the
+    bytes that are pinned."""
+    content = path.read_bytes().replace(b"\r\n", b"\n")
+    return hashlib.sha256(content[: PINNED_BYTES.get(name)]).hexdigest()
 
 
 def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
@@ -54,7 +66,7 @@ def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
     if name not in SHA256:
         raise InputError(f"{name}: no pinned checksum, expected one of {sorted(SHA256)}")
     target = folder / "cmu" / name
-    if target.is_file() and sha256(target) == SHA256[name]:
+    if target.is_file() and checksum(name, target) == SHA256[name]:
         return False
     address = f"{base}/{name}"
     with replacing(target) as temporary:
@@ -63,21 +75,32 @@ def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
                 shutil.copyfileobj(source, file)
         except (urllib.error.URLError, OSError, ValueError) as error:
             raise InputError(f"{address}: download failed ({error})") from None
-        found = sha256(temporary)
+        found = checksum(name, temporary)
         if found != SHA256[name]:
             raise InputError(f"{address}: SHA-256 is {found}, expected {SHA256[name]}; nothing was kept")
     return True
 
 
 def main(arguments: list[str]) -> None:
-    """Fetch the named files, all by default."""
+    """Fetch the named files, all by default; a file that fails does not stop the others.
+
+    Raises: InputError with the count of files that failed, after each was named on standard error.
+    """
     line = argparse.ArgumentParser(prog="python -m lowalt.targets.download", description=__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder of inputs; files go to its cmu/")
     line.add_argument("--base", default=OFFICIAL, help="address of the folder of subjects")
     line.add_argument("names", nargs="*", help="SS/SS.asf or SS/SS_TT.amc; all by default")
     given = line.parse_args(arguments)
-    for name in given.names or SHA256:
-        print(name, "fetched" if fetch(name, given.out, given.base) else "already there")
+    names = given.names or list(SHA256)
+    failed = 0
+    for name in names:
+        try:
+            print(name, "fetched" if fetch(name, given.out, given.base) else "already there")
+        except InputError as error:
+            failed += 1
+            print(f"failed: {error}", file=sys.stderr)
+    if failed:
+        raise InputError(f"{failed} of {len(names)} files could not be fetched (named above), the others are there")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
+from lowalt.targets.input_files import check_file_name
 from lowalt.targets.mocap_files import Skeleton, read_motion, read_skeleton
 from lowalt.targets.skeleton import NODES, PARENTS, forward_kinematics, node_cloud, rotation, stature_m
 
@@ -25,6 +26,12 @@ FADE_S = 0.15
 
 SHORTEST_S = 0.5
 """Shortest cycle looked for: two steps of the fastest sprinters take about that."""
+
+SHORTEST_GAIT_S = 0.3
+"""A recording whose cycle is shorter than this holds no gait: half of the shortest stride."""
+
+BLOCK = 256
+"""Starts of a cycle that are compared with all ends at once."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +91,19 @@ def refuse_glitches(positions: np.ndarray, rate_hz: float, limit_mps2: float, wh
         )
 
 
+def refuse_short(frames: int, rate_hz: float, where: str) -> None:
+    """Raise InputError naming `where` if so few frames hold no cycle of SHORTEST_GAIT_S.
+
+    The shortest cycle looked for is half of a short recording (see `find_cycle`).
+    """
+    needed = math.ceil(2 * SHORTEST_GAIT_S * rate_hz)
+    if frames < needed:
+        raise InputError(
+            f"{where}: {frames} frames, {frames / rate_hz:.3g} s, expected at least {needed} "
+            f"({2 * SHORTEST_GAIT_S:g} s at {rate_hz:g} Hz) for a cycle of a walk or run"
+        )
+
+
 def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and metres.
 
@@ -99,18 +119,39 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     positions[..., :2] -= positions[:, :1, :2]
     velocity = np.gradient(positions, axis=0) * fade
     state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
+    place = motion.root_m[:, :2]
+    # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take gigabytes.
+    blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
+    fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
+    least, candidates = np.inf, []
+    for starts in blocks:
+        distance = _mismatches(state, starts)
+        distance[_speeds(place, starts, shortest, fade) < max(fastest / 2, 0.0)] = np.inf
+        least = min(least, float(distance.min()))
+        row, end = np.nonzero(distance <= 1.5 * least)
+        candidates.append(np.stack([starts[row], end, distance[row, end]], axis=1))
+    start, end, distance = np.concatenate(candidates).T
+    good = distance <= 1.5 * least
+    longest = (end - start)[good].max()
+    best = np.flatnonzero(good & (end - start == longest))
+    best = best[np.argmin(distance[best])]
+    found = int(start[best]), int(end[best])
+    return *found, fade, float(np.sqrt(((state[found[0]] - state[found[1]]) ** 2).sum() / len(NODES)))
+
+
+def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
+    """Horizontal speed (S, F) in metres a frame from each start to each end; -1 where there is no cycle from one to the
+    other: it would be shorter than `shortest` frames, or fewer than `fade` frames would follow it."""
+    ends = np.arange(len(place))[None]
+    length = ends - starts[:, None]
+    way = np.linalg.norm(place[None] - place[starts, None], axis=2)
+    return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
+
+
+def _mismatches(state: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Root mean square distance (S, F) over the nodes between the states at each start and at each end."""
     square = (state**2).sum(axis=1)
-    distance = np.sqrt(np.maximum(square[:, None] + square - 2 * state @ state.T, 0) / len(NODES))
-    way = np.linalg.norm(motion.root_m[None, :, :2] - motion.root_m[:, None, :2], axis=2)
-    length = np.arange(frames)[None] - np.arange(frames)[:, None]
-    allowed = (length >= shortest) & (np.arange(frames)[None] + fade <= frames)
-    speed = np.divide(way, length, out=np.zeros_like(way), where=allowed)
-    allowed &= speed >= speed.max() / 2
-    distance[~allowed] = np.inf
-    good = distance <= 1.5 * distance.min()
-    longest = np.where(good, length, 0).max()
-    start, end = np.unravel_index(np.where(good & (length == longest), distance, np.inf).argmin(), distance.shape)
-    return int(start), int(end), fade, float(distance[start, end])
+    return np.sqrt(np.maximum(square[starts, None] + square - 2 * state[starts] @ state.T, 0) / len(NODES))
 
 
 def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
@@ -143,14 +184,15 @@ def front(motion: Motion, direction: np.ndarray) -> Motion:
     return Motion(root - root.mean(axis=0), spin @ motion.turned, motion.bones_m, motion.rate_hz)
 
 
-KEYS = ("skeleton", "motion", "first_frame", "last_frame", "rate_hz", "scale", "max_acceleration_mps2", "licence",
-        "attribution", "where", "note")  # fmt: skip
+KEYS = ("skeleton", "motion", "first_frame", "last_frame", "rate_hz", "scale", "max_acceleration_mps2",
+        "max_mismatch_m", "licence", "attribution", "where", "note")  # fmt: skip
 """Keys of a recording's record, beside those every record has; `where` says where a user gets the files."""
 
 
 def check_record(merged: dict, extra: dict, where: str) -> dict:
-    """Return the merged record of a recording, checked, with its defaults (120 Hz, scaled to the published height,
-    at most 1500 m/s2). `first_frame` and `last_frame` count from 1, inclusive; None is the recording's own end.
+    """Return the merged record of a recording, checked, with its defaults: 120 Hz, scaled to the published height, at
+    most 1500 m/s2, a cycle that closes to 0.15 m. `first_frame` and `last_frame` count from 1, inclusive; None is the
+    recording's own end.
 
     `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
@@ -166,11 +208,11 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
         "rate_hz": 120,
         "scale": "published",
         "max_acceleration_mps2": 1500,
+        "max_mismatch_m": 0.15,
     }
     result = defaults | merged | {"points": len(NODES)}
     for key in ("skeleton", "motion"):
-        if not isinstance(result[key], str) or Path(result[key]).is_absolute():
-            raise InputError(f"{where}: {key} is {result[key]!r}, expected a path inside the folder of inputs")
+        check_file_name(result[key], f"{where}: {key}")
     first, last = result["first_frame"], result["last_frame"]
     if not (isinstance(first, int) and first >= 1 and (last is None or (isinstance(last, int) and last > first))):
         raise InputError(
@@ -179,6 +221,9 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     for key in ("rate_hz", "max_acceleration_mps2"):
         if isinstance(result[key], bool) or not isinstance(result[key], (int, float)) or not 1 <= result[key] <= 1e5:
             raise InputError(f"{where}: {key} is {result[key]!r}, expected a number from 1 to 100000")
+    mismatch = result["max_mismatch_m"]
+    if isinstance(mismatch, bool) or not isinstance(mismatch, (int, float)) or not 0 < mismatch <= 10:
+        raise InputError(f"{where}: max_mismatch_m is {mismatch!r}, expected metres, more than 0 and at most 10")
     if result["scale"] not in ("published", "none"):
         raise InputError(f"{where}: scale is {result['scale']!r}, expected published or none")
     return result
@@ -202,8 +247,20 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     first = record["first_frame"]
     motion = posed(skeleton, read_motion(paths[1], skeleton, first, record["last_frame"]), record["rate_hz"])
     refuse_glitches(nodes_m(motion), motion.rate_hz, record["max_acceleration_mps2"], str(paths[1]), first)
+    refuse_short(len(motion.root_m), motion.rate_hz, str(paths[1]))
     start, end, fade, mismatch = find_cycle(motion)
+    if mismatch > record["max_mismatch_m"]:
+        raise InputError(
+            f"{paths[1]}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
+            f"(root mean square over the nodes), expected at most max_mismatch_m = {record['max_mismatch_m']} m: "
+            "choose first_frame and last_frame around a steady gait"
+        )
     cycle, drift = closed(motion, start, end, fade)
+    looped = nodes_m(cycle)
+    seam = np.concatenate([looped, looped[:2]])
+    refuse_glitches(
+        seam, motion.rate_hz, record["max_acceleration_mps2"], f"{paths[1]} (its closed cycle)", first + start
+    )
     speed = float(np.hypot(*drift))
     if speed < 0.05:
         raise InputError(f"{paths[1]}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")

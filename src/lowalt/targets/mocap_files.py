@@ -84,6 +84,8 @@ def read_skeleton(path: str | Path) -> Skeleton:
         for name in LIMBS:
             block, index = named[name], NODES.index(name)
             direction = np.array([float(word) for word in block["direction"]])
+            if float(block["length"][0]) < 0:
+                raise InputError(f"{path}: length of {name} is {block['length'][0]}, expected at least 0")
             bones[index] = direction / np.linalg.norm(direction) * float(block["length"][0])
             if block["axis"][3].upper() != "XYZ":
                 raise InputError(f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ")
@@ -91,6 +93,9 @@ def read_skeleton(path: str | Path) -> Skeleton:
             dofs[name] = tuple(word.lower() for word in block.get("dof", []))
     except (KeyError, IndexError, ValueError, ZeroDivisionError) as error:
         raise InputError(f"{path}: missing or no number: {error}, expected an ASF skeleton") from None
+    order = root.get("axis", ["xyz"])[0].upper()
+    if order != "XYZ":
+        raise InputError(f"{path}: axis order of root is {order!r}, expected XYZ")
     wrong = {name: dof for name, dof in dofs.items() if not set(dof) <= set(_DOF[0 if name == "root" else 3 :])}
     if wrong or len(dofs["root"]) != 6 or any(fixed):
         raise InputError(f"{path}: root order, offset or dof not as in CMU's files ({wrong or fixed or dofs['root']})")
@@ -119,6 +124,18 @@ def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
     return result
 
 
+def in_radians(path: Path) -> bool:
+    """Return whether a motion file says before its first frame that its angles are in radians."""
+    with path.open(errors="replace") as file:
+        for line in file:
+            word = line.split()[:1]
+            if word and word[0].upper() == ":RADIANS":
+                return True
+            if word and word[0].isdigit():
+                return False
+    return False
+
+
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
     expected = len(skeleton.dofs.get(words[0], ()))
     try:
@@ -135,7 +152,8 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
 def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None) -> dict[str, np.ndarray]:
     """Return the channels (F, channels) of each node that has any, frames `first` to `last` (1-based, inclusive).
 
-    Values in file units and degrees. Frames outside first..last are not checked, so a record can trim known faults.
+    Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside first..last are not
+    checked, so a record can trim known faults.
     Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a value that is no
     finite number, an all-zero root, a frame equal to the one before it, fewer than two frames left.
     """
@@ -148,6 +166,12 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     if count < 2 or (last is not None and max(frames) < last):
         found = f"frames up to {max(frames)}" if frames else "no frame in that range"
         raise InputError(f"{path}: {found}, expected frames {first} to {last or 'the end'}, at least two")
+    if in_radians(path):
+        turns = {name: [dof[0] == "r" for dof in dofs] for name, dofs in skeleton.dofs.items()}
+        for values in frames.values():
+            for name, row in values.items():
+                pairs = zip(row, turns[name], strict=True)
+                values[name] = [math.degrees(value) if turn else value for value, turn in pairs]
     needed = [name for name, dofs in skeleton.dofs.items() if dofs]
     for frame in range(first, first + count):
         lacking = [name for name in needed if name not in frames.get(frame, {})]

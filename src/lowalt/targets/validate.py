@@ -15,11 +15,14 @@ def summary(cloud: Cloud) -> str:
     kinds = [f"{len(cloud.parts_of(kind))} {kind}" for kind in dict.fromkeys(cloud.kinds)]
     extent = " x ".join(f"{value:.3f}" for value in np.ptp(cloud.points, axis=0))
     normals = np.isfinite(cloud.normals).all(1).mean()
+    loop = cloud.record.get("loop_mismatch_m")
+    closes = f"cycle closes to {loop:.3f} m, " if loop is not None else ""
+    doubts = "".join(f", warning: {text}" for text in cloud.record.get("warnings", []))
     published = cloud.record.get("published", {}).get("points_in_published_cloud_approx", "unknown")
     return (
         f"{cloud.subtype} ({cloud.category}, {cloud.record['source']}): {len(cloud.points)} points "
         f"(published: {published}), {extent} m, "
-        f"{', '.join(kinds)}, normals on {normals:.0%}, checksum {cloud.record['checksum'][:12]}"
+        f"{', '.join(kinds)}, {closes}normals on {normals:.0%}, checksum {cloud.record['checksum'][:12]}{doubts}"
     )
 
 
