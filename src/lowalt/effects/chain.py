@@ -23,6 +23,11 @@ from lowalt.effects.response import ImagePath, response
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
 
+COARSEST = 0.1
+"""Largest error of interpolation, relative to the sum of peak amplitudes."""
+EXACT = 1e-13
+"""Error of interpolation, relative to the sum of peak amplitudes, where nothing is approximated."""
+
 
 class Outcome(NamedTuple):
     """Signal (N,), chosen cells (N,), and by how much the strongest cell leads (N,)."""
@@ -36,8 +41,8 @@ class Chain:
     """Computes one sample at one station; effects: all but motion's, in the chain's order.
 
     draws: returns the stream of an effect for this sample and station, from its start at every call; power: mean
-    |Y_bin|^2 of the target's echo alone (W); error: largest error of interpolation over frequencies and over instants,
-    each relative to the sum of peak amplitudes.
+    |Y_bin|^2 of the target's echo alone (W). `error` is the largest error of interpolation over frequencies and over
+    instants, each relative to the sum of peak amplitudes; it is that of rounding unless `limit` allows more.
     """
 
     def __init__(
@@ -46,9 +51,8 @@ class Chain:
         view: View,
         draws: Callable[[str], np.random.Generator],
         power: float,
-        error: float,
     ):
-        self.view, self.draws, self.power, self.error = view, draws, power, error
+        self.view, self.draws, self.power, self.error = view, draws, power, EXACT
         self.by_need = {effect.name: effect for effect in providing(effects, BoundsItself)}
         self.channel, self.receiver, self.detection = (
             placed(effects, place) for place in ("channel", "receiver", "detection")
@@ -61,12 +65,27 @@ class Chain:
         for effect in providing(self.channel, WeighsPoints):
             self.factor = self.factor * effect.module.visible(effect.settings, view)
 
+    @cached_property
+    def peaks(self) -> np.ndarray:
+        """Largest sum of amplitudes (N, P) that each part can have in a range cell of the result."""
+        amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
+        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor)) * self.amplification
+
+    def interpolation(self) -> float:
+        """Return how far interpolation over frequencies and instants may put a range cell off (units of the signal)."""
+        return (2.0 if "symbol_motion" in self.by_need else 1.0) * self.error * float(self.peaks.sum(axis=1).max())
+
+    def limit(self, allowed: float) -> None:
+        """Set the error of interpolation so that no range cell errs by more than `allowed`, or by rounding alone."""
+        self.error = EXACT
+        self.error = min(max(EXACT, EXACT * allowed / self.interpolation()), COARSEST)
+
     def bounds(self, names: frozenset[str]) -> dict[str, float]:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
-        amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
-        peaks = need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor)) * self.amplification
         return {
-            name: float((effect.module.bound(effect.settings, self.view) * peaks).sum(axis=1).max())
+            name: float(
+                (effect.module.bound(effect.settings, self.view, names - {name}) * self.peaks).sum(axis=1).max()
+            )
             for name, effect in self.by_need.items()
             if name in names
         }
@@ -95,8 +114,10 @@ class Chain:
     def patched(self, outcome: Outcome, contested: np.ndarray, everything: frozenset[str]) -> Outcome:
         """Return the outcome with contested symbols computed with everything on.
 
-        Receiver and detection effects reach over symbols, so with any of them the whole sample is computed again.
+        Interpolation is then to rounding. Receiver and detection effects reach over symbols, so with any of them the
+        whole sample is computed again.
         """
+        self.error = EXACT
         if self.receiver or self.detection:
             return self.run(everything)
         whole = self.run(everything, contested)
@@ -105,11 +126,15 @@ class Chain:
             values[contested] = new
         return merged
 
-    def _echo(self, view: View, on: frozenset[str], factor: np.ndarray | float) -> np.ndarray:
-        """The target's subcarriers (N, M), summed over all paths."""
+    def _echo(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, paths: list[ImagePath] | None = None
+    ) -> np.ndarray:
+        """The target's subcarriers (N, M), summed over all paths; `paths` where they are not those of `view`."""
+        if paths is None:
+            paths = self._paths if view is self.view else self._paths_of(view)
         return response(
             view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m,
-            paths=self._paths if view is self.view else self._paths_of(view), factor=factor, squint="squint" in on,
+            paths=paths, factor=factor, squint="squint" in on,
             wavefront="wavefront" in on, error=self.error,
         )  # fmt: skip
 
@@ -117,9 +142,14 @@ class Chain:
         """Subcarriers (N, M) of a target that moves while a symbol lasts, interpolated from a few instants of it."""
         sent = self._sent[rows]
         delays, weights = self.by_need["symbol_motion"].module.instants(view, self.error)
+        # Visibility and reflection coefficients stay during a symbol; only places move.
+        held = self._paths if view is self.view else self._paths_of(view)
         samples = 0.0
         for delay, weight in zip(delays, weights, strict=True):
-            samples = samples + weight * waveform.transmit(self._echo(view.at(view.times_s + delay), on, factor), sent)
+            later = view.at(view.times_s + delay)
+            moved = self._paths_of(later) if held else []
+            paths = [ImagePath(new.places, old.coefficient) for new, old in zip(moved, held, strict=True)]
+            samples = samples + weight * waveform.transmit(self._echo(later, on, factor, paths), sent)
         return waveform.demodulate(samples, sent)
 
     def _received(self, spectrum: np.ndarray) -> np.ndarray:

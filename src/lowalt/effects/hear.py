@@ -16,11 +16,14 @@ from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
-from lowalt.effects.chain import Chain, Outcome
+from lowalt.effects.chain import EXACT, Chain, Outcome
 from lowalt.effects.interface import AddsPaths
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
+
+INTERPOLATION = 0.04
+"""Share of what may be left out that interpolation over frequencies and instants may err by."""
 
 
 @dataclass(frozen=True)
@@ -68,21 +71,27 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     power = rms(own.signal.astype(np.complex64)) ** 2
     if not beyond:
         return Heard(own.signal, own.cell, power, [])
-    error = 1e-13
-    if share is not None:
-        # Interpolation over frequencies and over instants may each err by a fiftieth of the tolerance.
-        peaks = float(need.part_amplitudes(view).sum(axis=1).max())
-        error = max(0.02 * share * float(abs(own.signal).max()) / peaks, error)
-    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power, error)
-    if share is None or not asked or math.isinf(chain.amplification):
+    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
+    if share is None or math.isinf(chain.amplification):
         outcome = chain.run(frozenset(asked))
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
-    else:
-        # Where the scene names only physics by need, the engine's echo is the outcome without any of it.
-        alone = len(asked) == len(beyond)
-        trial = Outcome(own.signal, own.cell, own.gap) if alone else chain.run(frozenset())
-        outcome, notes = settle(chain, asked, share, trial)
+        return Heard(outcome.signal, outcome.cell, power, notes)
+    largest = float(abs(own.signal).max())
+    chain.limit(INTERPOLATION * share * largest)
+    # Where the scene names only physics by need, the engine's echo is the outcome without any of it.
+    alone = len(asked) == len(beyond)
+    trial = Outcome(own.signal, own.cell, own.gap) if alone else chain.run(frozenset())
+    # A canceller may leave much less than the echo before it: the tolerance holds against what is left.
+    while not alone and chain.error > EXACT and chain.interpolation() > INTERPOLATION * share * largest_of(trial):
+        chain.limit(0.5 * INTERPOLATION * share * largest_of(trial))
+        trial = chain.run(frozenset())
+    outcome, notes = settle(chain, asked, share, trial)
     return Heard(outcome.signal, outcome.cell, power, notes)
+
+
+def largest_of(outcome: Outcome) -> float:
+    """Return the largest magnitude of an outcome's signal (its units)."""
+    return float(abs(outcome.signal).max())
 
 
 def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:
@@ -104,11 +113,12 @@ def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tupl
     with none of it computed. Symbols whose strongest cell the physics left out could change are computed with all.
     """
     everything = frozenset(asked)
-    largest = float(abs(trial.signal).max())
+    largest = largest_of(trial)
     bounds = chain.bounds(everything)
     left, spent = need.leave_out(bounds, share, largest)
     outcome = trial if len(left) == len(asked) else chain.run(everything - set(left))
-    contested = outcome.gap <= 2.0 * spent
-    if left and contested.any():
+    # The choice of cell is safe where its lead exceeds twice all that a cell may be off.
+    contested = outcome.gap <= 2.0 * (spent + chain.interpolation())
+    if contested.any():
         outcome = chain.patched(outcome, contested, everything)
     return outcome, need.decisions(asked, bounds, left, share, largest)

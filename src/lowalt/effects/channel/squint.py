@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.effects.elements import distances_m, farthest_m
 from lowalt.effects.view import View
 
 SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 (phase-steered arrays over a bandwidth)"
@@ -14,17 +16,27 @@ def idle(settings: dict) -> bool:
 
 
 def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
-    """Return a bound of squint's change of any range cell, relative to the sum of peak amplitudes; shape (N, 1).
+    """Return a bound (N, P) of squint's change of any range cell, relative to each part's peak amplitudes.
 
     Element i of a row sees pi i x (kappa_m - kappa_k) more phase; averaged over elements that is half the row's end,
-    and out and back add. Direction cosines are bounded by the target's own and its extent.
+    and out and back add. Direction cosines are bounded by the target's own and its extent. Where elements see spherical
+    waves, the path of one at distance D from the corner is up to D^2 / (2 (r - D)) longer than the plane wave's, and
+    squint acts on that too; amplitudes are then up to 1 + D / (r - D) times the plane wave's.
     """
     network = view.network
-    span = (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
+    band = (network.subcarriers - 1) * network.subcarrier_spacing_hz
     across, up = _cosines(view)
     wide = 0.5 * (network.transmit[0] + network.receive[0] - 2)
     high = 0.5 * (network.transmit[1] + network.receive[1] - 2)
-    return np.pi * span * (wide * across + high * up)[:, None]
+    plane = np.pi * band / network.carrier_hz * (wide * across + high * up)[:, None]
+    if "wavefront" not in others:
+        return plane
+    distances = [distances_m(network, shape) for shape in (network.transmit, network.receive)]
+    room = np.maximum(view.nearest_m() - farthest_m(network), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        longer = sum(float((distance**2).mean()) for distance in distances) / (2.0 * room)
+        louder = (1.0 + farthest_m(network) / room) ** 2
+        return np.nan_to_num(louder * (plane + 2 * np.pi * band / SPEED_OF_LIGHT * longer), nan=np.inf)
 
 
 def _cosines(view: View) -> tuple[np.ndarray, np.ndarray]:

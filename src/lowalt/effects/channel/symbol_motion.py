@@ -1,15 +1,26 @@
-"""Motion inside a symbol: points move while an OFDM symbol lasts, so their subcarriers leak into each other."""
+"""Motion inside a symbol: points move while an OFDM symbol lasts, so their subcarriers leak into each other.
+
+A symbol is interpolated between a few instants. A recording is linear between its frames; a symbol in which a frame
+begins is interpolated as if the motion were smooth there.
+"""
 
 import numpy as np
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects import interpolation
+from lowalt.effects.elements import farthest_m, mean_distance_m
+from lowalt.effects.speeds import Speeds
 from lowalt.effects.view import View
 
 SOURCE = (
-    "Robertson and Kaiser, The effects of Doppler spreads in OFDM(A) mobile radio systems, Proc. IEEE VTC Fall, 1999"
+    "Robertson and Kaiser, The effects of Doppler spreads in OFDM(A) mobile radio systems, Proc. IEEE VTC Fall, 1999; "
+    "number of instants: Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2"
 )
 DEFAULTS: dict[str, float] = {}
+
+ELLIPSES = 1.0 + 2.0 ** np.arange(-3.0, 14.0)
+"""Sums of the semi-axes of the ellipses in complex time on which a symbol's response is bounded."""
 
 
 def idle(settings: dict) -> bool:
@@ -22,52 +33,53 @@ def duration_s(view: View) -> float:
     return 1.0 / view.network.subcarrier_spacing_hz
 
 
-def travel(view: View) -> np.ndarray:
-    """Return a bound (N, P) of how far any point of each part moves within one symbol (m).
-
-    The chord between a symbol's two ends, lengthened by 2 %: an arc of less than 0.3 rad a symbol is that close to
-    its chord up to a factor of 1.004. A difference of two turns about one axis stretches by its norm over sqrt(2).
-    """
-    later = view.at(view.times_s + duration_s(view))
-    step = np.linalg.norm(later.middles - view.middles, axis=2)
-    if not view.nodes:
-        turned = np.linalg.norm(later.motion.rotation - view.motion.rotation, axis=(2, 3)) / np.sqrt(2.0)
-        step = step + turned * view.radii
-    return 1.02 * step
-
-
 def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
     """Return a bound (N, P) of the motion's change of any range cell, relative to each part's peak amplitudes.
 
-    The largest phase a point gains within the symbol, 2 pi times turns a metre times its travel, and its amplitude's
-    change. Sent data of unit modulus and the transforms keep the 2-norm, so no range cell gains more than that.
+    A point's path to every element changes by at most the point's travel, in the plane-wave model by 1 + D / r times
+    as much, D being the element's distance from the corner. The phase at the band's centre and the amplitude change all
+    subcarriers alike; sent data of unit modulus and the transforms keep the 2-norm, so no range cell changes by more.
+    The rest of the phase, up to half the band away, enters by its power series, which gives expm1.
     """
-    turns = radar(view.network, view.station).turns
-    path = travel(view)
+    network, radio = view.network, radar(view.network, view.station)
+    path = Speeds(view).travel_m(duration_s(view))
+    spherical = "wavefront" in others
+    near = np.maximum(view.nearest_m() - path - (farthest_m(network) if spherical else 0.0), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        near = np.maximum(view.nearest_m() - path, 0.0)
-        stretch = (2.0 + beam_change(view)) * path / near
-    return 2 * np.pi * turns * path + np.nan_to_num(stretch, nan=np.inf)
-
-
-def beam_change(view: View) -> float:
-    """Return a bound of the gain's change per unit of direction cosine, relative to its peak (both arrays)."""
-    kappa = view.station.frequency_hz / view.network.carrier_hz
-    return float(np.pi * kappa * sum(count - 1 for count in (*view.network.transmit, *view.network.receive)))
+        oblique = 1.0 + sum(mean_distance_m(network, shape) for shape in (network.transmit, network.receive)) / near
+        phase = np.minimum(2 * np.pi * radio.turns * path * oblique, 2.0)
+        edge = np.expm1(np.minimum(2 * np.pi * radio.bandwidth_hz / SPEED_OF_LIGHT * path * oblique, 50.0))
+        stretch = (1.0 + path / near) ** 2 - 1.0
+        louder = (1.0 + farthest_m(network) / near) ** 2 if spherical else 1.0
+        return np.nan_to_num(louder * ((1.0 + stretch) * (phase + edge) + stretch), nan=np.inf)
 
 
 def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
-    """Return Chebyshev instants (Q,) s within a symbol and their Lagrange weights (Q, M) at its M samples.
+    """Return instants (Q,) s within a symbol and their interpolation weights (Q, M) at its M samples.
 
-    Q follows from the phase a point gains within a symbol, as interpolation of exp(j B x) on [-1, 1] errs by at most
-    4 sum over p >= Q of |J_p(B)|, below `error`.
+    Q Chebyshev points keep every range cell to `error`, relative to the sum of peak amplitudes: the interpolation of a
+    function bounded by B on an ellipse of semi-axes' sum rho errs by at most 4 B rho^(1-Q) / (rho - 1). Where that
+    needs more points than samples, the instants are the samples themselves, which is exact.
     """
-    band = np.pi * radar(view.network, view.station).turns * float(travel(view).max()) * 1.05
-    # |J_p(B)| <= (B / 2)^p / p!
-    count, term = 2, (0.5 * band) ** 2 / 2.0
-    while 8.0 * term > error or count < band + 2:
-        count += 1
-        term *= 0.5 * band / count
-    samples = view.network.subcarriers
+    samples, half = view.network.subcarriers, 0.5 * duration_s(view)
+    speeds, radio = Speeds(view), radar(view.network, view.station)
+    near = view.nearest_m().min(axis=0)
+    farthest = farthest_m(view.network)
+    wave = 2 * np.pi * (2 * radio.centre_hz + radio.bandwidth_hz) / SPEED_OF_LIGHT
+    travel, count = speeds.travel_m(1.0), samples
+    for rho in ELLIPSES:
+        wide, high = 0.5 * (rho + 1.0 / rho), 0.5 * (rho - 1.0 / rho)
+        beyond = speeds.imaginary_m(high * half)
+        # Real times reach a half-symbol times `wide` from its middle; positions also swell by the imaginary turn.
+        moved = travel * (1.0 + wide) * half + 2.0 * beyond + farthest
+        if not (near > 4.0 * moved).all():
+            break
+        # |Im d| is below a third of |Re d|, so |Im r| <= 1.07 |Im d|; elements add their distance over the range.
+        growth = wave * 1.07 * beyond * (1.0 + 2.5 * farthest / (near - moved))
+        largest = float((growth - 2.0 * np.log1p(-moved / near)).max())
+        need = 1.0 + (np.log(4.0 * np.sqrt(samples) / (error * (rho - 1.0))) + largest) / np.log(rho)
+        count = min(count, max(int(np.ceil(need)), 1))
+    if count >= samples:
+        return np.arange(samples) * (2 * half / samples), np.eye(samples)
     weights = interpolation.weights(count, 2.0 * np.arange(samples) / samples - 1.0)
-    return 0.5 * duration_s(view) * (interpolation.points(count) + 1.0), weights.T
+    return half * (interpolation.points(count) + 1.0), weights.T

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.effects.elements import distances_m
 from lowalt.effects.view import View
 
 SOURCE = "Balanis, Antenna Theory, 4th ed., 2016, section 4.4.1 (phase error of the far-field approximation)"
@@ -21,14 +22,12 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     D^2 / (2 (r - D)) and an amplitude by D / (r - D); averaged over elements, out and back multiply.
     """
     network = view.network
-    spacing = SPEED_OF_LIGHT / (2 * network.carrier_hz)
     wave = 2 * np.pi * (view.station.frequency_hz + network.subcarriers * network.subcarrier_spacing_hz)
     wave /= SPEED_OF_LIGHT
     r = view.nearest_m()
     grown = np.ones_like(r)
-    for wide, high in (network.transmit, network.receive):
-        i, j = np.meshgrid(np.arange(wide), np.arange(high))
-        distance = spacing * np.hypot(i, j).ravel()
+    for shape in (network.transmit, network.receive):
+        distance = distances_m(network, shape)
         with np.errstate(divide="ignore", invalid="ignore"):
             room = np.where(r > distance.max(), r - distance.max(), np.nan)
         square, length = float((distance**2).mean()), float(distance.mean())
