@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -81,6 +81,9 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
+
+space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/tiny results/default' (finished, small to large)
+	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) --out results/reference/space.csv
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/default/$$table.csv results/reference/tables-$$table.csv; done

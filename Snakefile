@@ -33,6 +33,14 @@ localrules:
     effects,
 
 
+onstart:
+    space_check.before(workflow, PLAN, config)
+
+
+onerror:
+    space_check.after()
+
+
 rule all:
     default_target: True
     input:

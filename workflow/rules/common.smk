@@ -13,7 +13,7 @@ from lowalt.common.network import Network
 from lowalt.common.files import slug
 from lowalt.common.plan import Plan
 from lowalt.recognition.schemes import named
-from lowalt.workflow import locks
+from lowalt.workflow import locks, space_check
 from lowalt.workflow.sources import sources
 from lowalt.spectra import Spectra
 from lowalt.targets.records import load_records, missing_inputs, source_files

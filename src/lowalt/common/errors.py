@@ -9,5 +9,9 @@ class BelowFloor(InputError):
     """A tolerance smaller than the error bound that float64 arithmetic can prove for a sample."""
 
 
+class SpaceError(InputError):
+    """A disk or memory is too small; the message names the file or run, what it needs, and what is free."""
+
+
 class InputWarning(UserWarning):
     """The user's input is used as it is, although something in it looks wrong; the message says what and where."""

@@ -1,27 +1,70 @@
 """Files at the edges of the stages: nothing half-written stays behind, every file has a checksum and a plain name."""
 
 import contextlib
+import errno
 import hashlib
 import os
 import re
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, SpaceError
+
+FULL = (errno.ENOSPC, errno.EDQUOT)
+NEARLY_FULL_BYTES = 1 << 20
+"""An error without a number of its own, as numpy and torch raise them, means a full disk where less than this is free."""
 
 
 @contextlib.contextmanager
-def replacing(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that takes its place only if the block ends without an error."""
+def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place only if the block ends without an error.
+
+    size: bytes that the file has at least, where they are known before it is written.
+    Raises: SpaceError naming the file, what it needs and what is free where the disk is too small or becomes full.
+    """
     path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
     # The suffix stays, since many writers choose the format by it.
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if size is not None and size > free_bytes(path):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         yield temporary
+        # A C library that buffers can lose the last bytes without an error.
+        if size is not None and temporary.stat().st_size < size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         temporary.replace(path)
+    except (OSError, RuntimeError) as error:
+        if not _is_full(error, path):
+            raise
+        written = temporary.stat().st_size if temporary.exists() else 0
+        needed = f"{_megabytes(size)}" if size is not None else f"more than the {_megabytes(written)} written so far"
+        free = _megabytes(free_bytes(path) + written)
+        raise SpaceError(f"{path}: the disk is full; the file needs {needed}, {free} are free without it") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        # A folder that could not be made holds no file either.
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def free_bytes(path: str | Path) -> int:
+    """Return the bytes that this user may still write on the disk of `path`, which itself need not exist."""
+    path = Path(path).absolute()
+    while not path.exists():
+        path = path.parent
+    return shutil.disk_usage(path).free
+
+
+def _is_full(error: Exception, path: Path) -> bool:
+    if isinstance(error, OSError) and error.errno is not None:
+        return error.errno in FULL
+    # numpy's "N requested and M written" has no number of its own, torch's writer raises a RuntimeError.
+    return free_bytes(path) < NEARLY_FULL_BYTES
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:.1f} MB"
 
 
 def sha256(path: str | Path) -> str:

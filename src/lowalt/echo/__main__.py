@@ -65,7 +65,7 @@ def main(arguments: list[str]) -> None:
         with replacing(given.explain) as temporary:
             temporary.write_text("\n".join(notes))
     for path, found in zip(given.out, result, strict=True):
-        with replacing(path) as temporary:
+        with replacing(path, found.nbytes) as temporary:
             np.save(temporary, found)
         print(f"{path}: {len(found)} signals", file=sys.stderr)
 

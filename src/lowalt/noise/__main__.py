@@ -59,7 +59,7 @@ def main(arguments: list[str]) -> None:
         if powers.shape != (len(stations), len(rows)):
             raise InputError(f"--powers: shape {powers.shape}, expected ({len(stations)}, {len(rows)})")
     result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers)
-    with replacing(given.out) as temporary:
+    with replacing(given.out, result.nbytes) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {result.shape[0] * result.shape[1]} samples", file=sys.stderr)
 

@@ -122,5 +122,5 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
 
 def write(path: str | Path, views: np.ndarray, facts: Facts) -> None:
     """Write a cache file; equal samples give equal bytes."""
-    with replacing(path) as temporary:
+    with replacing(path, views.nbytes) as temporary:
         np.savez(temporary, views=views, **{name: getattr(facts, name) for name in FACTS})

@@ -1,0 +1,75 @@
+"""The check of disk and memory at the edge: what Snakemake plans and what the machine has go into `space.py`.
+
+The Snakefile calls `before` when a run starts and `after` when it has failed.
+"""
+
+import os
+from pathlib import Path
+
+from lowalt.common.errors import InputError, SpaceError
+from lowalt.common.files import free_bytes
+from lowalt.common.plan import Plan
+from lowalt.workflow import space
+
+TABLE = "results/reference/space.csv"
+VARIABLE = "LOWALT_SPACE"
+CHOICES = ("refuse", "warn", "off")
+FULL_BYTES = 1 << 20
+
+
+def check(jobs: list[space.Job], plan: Plan, config: dict, cores: int | None, table: Path, folder: Path) -> list[str]:
+    """Return what a person should know about disk and memory before these jobs start.
+
+    cores: of this machine, or None where jobs run elsewhere, whose memory is then not looked at. folder: where results
+    go. The environment variable LOWALT_SPACE chooses what happens where a run cannot fit: refuse (default), warn, off.
+    Raises: SpaceError with figures where the run cannot fit; InputError where the variable has another value.
+    """
+    choice = os.environ.get(VARIABLE, "refuse")
+    if choice not in CHOICES:
+        raise InputError(f"{VARIABLE}: {choice!r}, expected one of {CHOICES}")
+    if choice == "off" or not table.is_file():
+        return []
+    found = space.need(jobs, space.read(table), plan, config, cores or 1)
+    free, total = space.memory() if cores else (float("inf"), float("inf"))
+    stop, warn = space.verdicts(found, free_bytes(folder), free, total)
+    if stop and choice == "refuse":
+        raise SpaceError(f"{'; '.join(stop)} (start anyway: {VARIABLE}=warn)")
+    return [*stop, *warn]
+
+
+def before(workflow: object, plan: Plan, config: dict) -> None:
+    """Compare what a run of Snakemake needs with what there is, before its first job.
+
+    Raises: WorkflowError with figures where the run cannot fit.
+    """
+    from snakemake.exceptions import WorkflowError
+    from snakemake.logging import logger
+
+    jobs = [
+        space.Job(
+            job.rule.name,
+            dict(job.wildcards_dict),
+            sum(path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file()),
+            job.threads,
+        )
+        for job in workflow.dag.needrun_jobs()
+    ]
+    cores = workflow.cores if workflow.local_exec else None
+    try:
+        lines = check(jobs, plan, config, cores, Path(workflow.basedir) / TABLE, Path.cwd() / "results")
+    except InputError as error:
+        raise WorkflowError(str(error)) from None
+    for line in lines:
+        logger.warning(f"warning: {line}")
+
+
+def after(folder: Path = Path()) -> None:
+    """Say in one line that the disk is full, where it is: a failed job's own message may not have found room."""
+    from snakemake.logging import logger
+
+    free = free_bytes(folder / "results")
+    if free < FULL_BYTES:
+        logger.error(
+            f"error: the disk of {(folder / 'results').resolve()} is full ({free / 1e6:.1f} MB free); "
+            "make room, then start the same command again: it goes on where it stopped"
+        )

@@ -1,0 +1,108 @@
+"""`python -m lowalt.workflow.space_measured`: what jobs wrote and held in finished runs, as lines in their size.
+
+Bytes are those of the files a run left, peak memory is what each job wrote into its log.
+"""
+
+import argparse
+import json
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.command import run
+from lowalt.common.config import load_yaml
+from lowalt.common.csv_tables import write_csv
+from lowalt.common.errors import InputError
+from lowalt.common.plan import Plan
+from lowalt.targets.records import load_records
+from lowalt.workflow.space import COLUMNS, units
+
+OUTPUTS = {
+    "cloud": "clouds/{subtype}.npz",
+    "motion": "motion/{group}-{part}.csv",
+    "echo": "echo/{group}-{part}/{station}.npy",
+    "noise": "noisy/{group}-{part}.npy",
+    "tiles": "shards/{group}-*-{part}.tar",
+    "shard": "shards/{group}-{fold}-{part}.*",
+    "views": "views/{size}/{group}-{fold}-{part}.npz",
+    "train": "models/{protocol}/{scheme}/{train_seed}/*",
+    "evaluate": "predictions/{protocol}/{scheme}/{train_seed}.*",
+}
+"""Files of a run that one job of a rule leaves. Tiles are gone at the end; the shards hold the same images."""
+TEMPORARY = ("tiles",)
+ROUNDING = 1e-6
+"""Share of the largest value below which what a slope adds is rounding."""
+PEAK = re.compile(r"peak memory (\d+) MiB")
+
+
+def line(points: list[tuple[float, float]]) -> tuple[float, float]:
+    """Return base and slope of a line that no measured (units, value) lies above; neither is negative.
+
+    The slope is the least-squares one; the base lifts the line to the highest point.
+    """
+    size, value = np.array(points, float).T
+    spread = size - size.mean()
+    slope = max(0.0, float(spread @ (value - value.mean()) / (spread @ spread))) if spread.any() else 0.0
+    if slope * size.max() < ROUNDING * value.max():
+        slope = 0.0
+    base = float(np.max(value - slope * size))
+    if base < 0:
+        return 0.0, float(np.max(value / size))
+    return base, slope
+
+
+def jobs(folder: Path) -> list[tuple[str, float, float, float]]:
+    """Return (rule, units, bytes of its outputs, peak memory in bytes) of every job of a finished run.
+
+    Raises: InputError naming the folder where it holds no benchmarks.
+    """
+    config = load_yaml(folder / "config.yaml")
+    records = load_records(config["targets"]["table"], config["targets"]["records"])
+    plan = Plan.of(config, {name: record["published"] for name, record in records.items()})
+    found = []
+    for path in sorted((folder / "benchmarks").rglob("*.jsonl")):
+        row = json.loads(path.read_text().splitlines()[-1])
+        rule, wildcards = row["rule_name"], row["wildcards"]
+        log = (folder / "logs" / path.relative_to(folder / "benchmarks")).with_suffix(".log")
+        peaks = PEAK.findall(log.read_text()) if log.is_file() else []
+        memory = 2**20 * (float(peaks[-1]) if peaks else float(row["max_rss"]))
+        names = defaultdict(lambda: "*", wildcards)
+        pattern = OUTPUTS.get(rule)
+        size = sum(file.stat().st_size for file in folder.glob(pattern.format_map(names))) if pattern else 0
+        found.append((rule, units(rule, wildcards, plan, config), float(size), memory))
+    if not found:
+        raise InputError(f"{folder}: no benchmarks of finished jobs")
+    return found
+
+
+def measure(folders: list[Path]) -> list[dict]:
+    """Return a row of COLUMNS for every rule of finished runs; two runs of different size tell base and slope apart."""
+    disk, memory, runs = defaultdict(list), defaultdict(list), defaultdict(set)
+    for folder in folders:
+        for rule, size, written, held in jobs(folder):
+            disk[rule].append((size, written))
+            memory[rule].append((size, held))
+            runs[rule].add(folder.name)
+    rows = []
+    for rule in sorted(disk):
+        (disk_base, disk_slope), (memory_base, memory_slope) = line(disk[rule]), line(memory[rule])
+        figures = (disk_base, disk_slope, memory_base / 2**20, memory_slope)
+        texts = [f"{value:.6g}" for value in figures]
+        temporary = "yes" if rule in TEMPORARY else "no"
+        rows.append(dict(zip(COLUMNS, [rule, " ".join(sorted(runs[rule])), *texts, temporary], strict=True)))
+    return rows
+
+
+def main(arguments: list[str]) -> None:
+    """Measure the disk and memory of the jobs of finished runs and write the table of figures."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.workflow.space_measured", description=main.__doc__)
+    options.add_argument("--runs", nargs="+", required=True, type=Path, help="folders of finished runs, small to large")
+    options.add_argument("--out", required=True, help="table to write (.csv)")
+    given = options.parse_args(arguments)
+    write_csv(given.out, COLUMNS, measure(given.runs))
+
+
+if __name__ == "__main__":
+    run(main)
