@@ -13,7 +13,7 @@ from lowalt.common.errors import InputError, SpaceError
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 NEARLY_FULL_BYTES = 1 << 20
-"""An error without a number of its own, as numpy and torch raise them, means a full disk where less than this is free."""
+"""An error without a number, as numpy and torch raise them, means a full disk where less than this is free."""
 
 
 @contextlib.contextmanager
