@@ -29,7 +29,7 @@ from lowalt.measure.echo_cost import hardware
 
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48
-PRICES = ((refine.TRYING, pose_series.WORTH), (-np.inf, 1))
+PRICES = ((refine.PROBE_COST, pose_series.INTERPOLATION_COST), (-np.inf, 1))
 """What a shortcut must save to be taken: as shipped, and nothing at all."""
 NEAR_TIE = 1e-12
 
@@ -80,8 +80,8 @@ def examine(seed: int, index: int) -> list[dict]:
         }  # fmt: skip
         try:
             with (
-                patch.object(refine, "TRYING", PRICES[index % 2][0]),
-                patch.object(pose_series, "WORTH", PRICES[index % 2][1]),
+                patch.object(refine, "PROBE_COST", PRICES[index % 2][0]),
+                patch.object(pose_series, "INTERPOLATION_COST", PRICES[index % 2][1]),
             ):
                 result = echo_signal(network, station, motion, rcs, aim, tolerance, sample=f"scene {index}")
         except BelowFloor:

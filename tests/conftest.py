@@ -6,10 +6,10 @@ import pytest
 
 
 @pytest.fixture
-def cheap_at_any_price(monkeypatch):
-    """Let the echo engine use what a tolerance allows even where the exact mode would be as fast."""
+def always_approximate(monkeypatch):
+    """Let the echo use the cheap plan of a tolerance even where the exact mode would be as fast."""
     from lowalt.echo import refine
     from lowalt.echo.slow_time import pose_series
 
-    monkeypatch.setattr(refine, "TRYING", -math.inf)
-    monkeypatch.setattr(pose_series, "WORTH", 1)
+    monkeypatch.setattr(refine, "PROBE_COST", -math.inf)
+    monkeypatch.setattr(pose_series, "INTERPOLATION_COST", 1)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import reference
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo import Path, Rigid, echo_signal, range_cells, subcarrier_matrix
+from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
 
 
 def network(**changes) -> Network:
@@ -75,7 +75,7 @@ def test_any_arrays_and_any_number_of_subcarriers(data):
     motion = cloud_in_motion(rng, 3, data.draw(st.integers(1, 8)), centre, 0.05 * away, 0.1 * away)
     rcs = rng.uniform(0.1, 2, len(motion.points))
     truth = reference.range_cells(net, seen, positions(motion), rcs, motion.translation[0, 0])
-    cells = range_cells(net, seen, motion, rcs, motion.translation[0, 0])
+    cells = echo_matrix(net, seen, motion, rcs, motion.translation[0, 0], "cells")
     # The direct sum's own plain phases are the coarser side: 2e-16 of the largest phase.
     noise = 1e-11 + 1e-14 * 4 * np.pi * 1.2 * net.carrier_hz / SPEED_OF_LIGHT * away
     assert relative(cells, truth) < noise
@@ -85,15 +85,15 @@ def test_any_arrays_and_any_number_of_subcarriers(data):
     assert np.allclose(abs(cells[np.arange(3), result.cell]), strongest, rtol=1e-12)
 
 
-def test_three_answers_agree_and_paths_add():
+def test_signal_cells_and_subcarriers_agree_and_paths_add():
     net = network(subcarriers=24)
     rng = np.random.default_rng(5)
     motion = cloud_in_motion(rng, 4, 7, (90.0, 40.0, 10.0))
     seen, rcs, aim = net.stations[0], np.ones(7), motion.translation[0, 0]
     paths = [Path(0.0, rng.normal(size=(4, 7))), Path(rng.uniform(0, 1e-6, (4, 1)), 0.3 - 0.4j)]
     truth = reference.subcarriers(net, seen, positions(motion), rcs, aim, paths)
-    assert relative(subcarrier_matrix(net, seen, motion, rcs, aim, paths), truth) < 1e-9
-    cells = range_cells(net, seen, motion, rcs, aim, paths)
+    assert relative(echo_matrix(net, seen, motion, rcs, aim, "subcarriers", paths), truth) < 1e-9
+    cells = echo_matrix(net, seen, motion, rcs, aim, "cells", paths)
     assert relative(cells, np.fft.ifft(truth, axis=1)) < 1e-9
     result = echo_signal(net, seen, motion, rcs, aim, paths=paths)
     assert (result.cell == abs(cells).argmax(axis=1)).all()

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.echo import Path, Rigid, echo_signal
-from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cells
+from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
 from test_echo import cloud_in_motion, network, relative
 
@@ -20,7 +20,7 @@ def kernel(x, count):
 @pytest.mark.parametrize("count", [11, 64, 256])
 @pytest.mark.parametrize("deep, error", [(0.02, 1e-3), (0.4, 1e-6), (1.3, 1e-9), (2.0, 1e-14)])
 def test_tabulated_kernels_keep_their_error(count, deep, error):
-    table = cells(count, deep, error)
+    table = cell_polynomials(count, deep, error)
     assert table.error <= error
     v = np.linspace(-1, 1, 31)
     powers = v[:, None] ** np.arange(table.kernels.shape[2])
@@ -34,8 +34,8 @@ def test_tabulated_kernels_keep_their_error(count, deep, error):
 
 
 def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
-    assert cells(256, 2.4, 1e-6) is not None and cells(256, 2.6, 1e-6) is None
-    assert cells(2 * SIDE + 3, 0.2, 1e-6) is not None and cells(2 * SIDE + 2, 0.2, 1e-6) is None
+    assert cell_polynomials(256, 2.4, 1e-6) is not None and cell_polynomials(256, 2.6, 1e-6) is None
+    assert cell_polynomials(2 * SIDE + 3, 0.2, 1e-6) is not None and cell_polynomials(2 * SIDE + 2, 0.2, 1e-6) is None
 
 
 @settings(max_examples=60, deadline=None)
@@ -45,7 +45,7 @@ def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
 )  # fmt: skip
 def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, side, error):
     rng = np.random.default_rng(seed)
-    table = cells(count, deep, error)
+    table = cell_polynomials(count, deep, error)
     v = rng.uniform(-deep, deep, points) / table.half
     z = rng.normal(size=points) + 1j * rng.normal(size=points)
     # Half of the cases all but cancel, where a bound by the sum of amplitudes would decide nothing.
@@ -64,17 +64,17 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 
-def test_ranges_by_roots_and_by_polynomials_agree(cheap_at_any_price):
+def test_ranges_by_roots_and_by_polynomials_agree(always_approximate):
     net = network(symbols=60)
     motion = cloud_in_motion(np.random.default_rng(2), 60, 300, (400.0, 30.0, 60.0), 0.3)
     arguments = (net, net.stations[0], motion, 1.0, motion.translation[0, 0])
     exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-5)
-    assert not exact.choice.near and loose.choice.near and loose.choice.cheap > 50
+    assert not exact.method.near and loose.method.near and loose.method.cheap > 50
     assert 1e-15 < relative(loose.signal, exact.signal) <= loose.bound <= 1e-5
     close = cloud_in_motion(np.random.default_rng(2), 60, 300, (20.0, 3.0, 30.0), 0.8)
     arguments = (net, net.stations[0], close, 1.0, close.translation[0, 0])
     exact, loose = echo_signal(*arguments), echo_signal(*arguments, 1e-7)
-    assert not loose.choice.near and relative(loose.signal, exact.signal) <= loose.bound <= 1e-7
+    assert not loose.method.near and relative(loose.signal, exact.signal) <= loose.bound <= 1e-7
 
 
 def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():

@@ -17,7 +17,7 @@ DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 @pytest.mark.parametrize("device", DEVICES)
 @pytest.mark.parametrize("change", [{}, {"subcarriers": 3, "transmit_array": [7, 3]}, {"subcarriers": 700}])
 def test_numbers_are_those_of_the_exact_mode(device, change, monkeypatch):
-    monkeypatch.setattr("lowalt.echo.device.ROOM", 50_000)
+    monkeypatch.setattr("lowalt.echo.device.LARGEST_ARRAY", 50_000)
     network = Network.from_settings(NETWORK | change)
     for model, place in enumerate(((200.0, 100.0, 60.0), (3.0, 2.0, 24.0), (40e3, 70e3, 300.0))):
         given = row(model) | dict(zip(("x_m", "y_m", "z_m"), place, strict=True))

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import Path, echo_signal, explain, range_cells
+from lowalt.echo import Path, echo_matrix, echo_signal, explain
 from lowalt.echo.fast import polynomials
+from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.pointwise.reference_range import reference as reference_ranges
 from lowalt.echo.radar import radar
 from test_echo import cloud_in_motion, network, positions, relative
@@ -33,17 +34,17 @@ def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tol
         assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
 
 
-def test_a_looser_tolerance_takes_shorter_polynomials(cheap_at_any_price):
+def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
     net = network()
     motion = cloud_in_motion(np.random.default_rng(2), 400, 100, (200.0, 30.0, 60.0), 0.3)
     orders = []
     for tolerance in (1e-2, 1e-4, 1e-7, 1e-9, None):
         result = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], tolerance)
-        orders.append(sum(result.choice.orders))
-        assert result.choice.cheap + result.choice.exact + result.choice.general == 400
+        orders.append(sum(result.method.orders))
+        assert result.method.cheap + result.method.exact + result.method.general == 400
     assert orders == sorted(orders) and orders[0] < orders[-1] - 8
     loose = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-2)
-    assert loose.choice.single and "float32" in explain(loose)
+    assert loose.method.single and "float32" in explain(loose)
 
 
 def test_points_in_parts_and_plain_positions_agree():
@@ -59,7 +60,7 @@ def test_points_in_parts_and_plain_positions_agree():
 def test_incoherent_clouds_are_certified_against_all_cells():
     net = network()
     motion = cloud_in_motion(np.random.default_rng(6), 120, 400, (150.0, -30.0, 60.0), 2.0, 30.0)
-    cells = abs(range_cells(net, net.stations[0], motion, 1.0, motion.translation[0, 0]))
+    cells = abs(echo_matrix(net, net.stations[0], motion, 1.0, motion.translation[0, 0], "cells"))
     result = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0])
     assert (result.cell == cells.argmax(axis=1)).all()
     assert len(set(result.cell)) > 2
@@ -109,15 +110,15 @@ def test_reference_ranges_hold_more_than_a_double(distance):
     net = network()
     radio = radar(net, net.stations[0])
     place = np.array([[0.6 * distance, -0.3 * distance, 25.0 + distance / 7]])
-    found = reference_ranges(place, radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo)[0]
+    found = reference_ranges(place, radio)[0]
     with mpmath.workdps(50):
         centre = mpmath.mpf(4.9e9) + mpmath.mpf(255) / 2 * 120000
         d = [mpmath.mpf(a) - mpmath.mpf(b) for a, b in zip(place[0], radio.station, strict=True)]
         r = mpmath.sqrt(sum(v * v for v in d))
         turn = 2 * centre * r / 299792458
-        off = turn - mpmath.nint(turn) - mpmath.mpf(found[4])
+        off = turn - mpmath.nint(turn) - mpmath.mpf(found[TURN])
         assert abs(off - mpmath.nint(off)) < 1e-15
-        assert abs(2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[5]) - mpmath.mpf(found[6])) < 1e-15
+        assert abs(2 * 256 * 120000 * r / 299792458 - mpmath.mpf(found[CELL]) - mpmath.mpf(found[REST])) < 1e-15
 
 
 @pytest.mark.parametrize("size, tolerance", [(0.4, None), (2.0, None), (2.0, 1e-2), (60.0, None)])
@@ -127,7 +128,7 @@ def test_the_gap_is_a_lower_bound_that_says_something(size, tolerance):
     motion = cloud_in_motion(np.random.default_rng(8), 60, 80, (150.0, -30.0, 60.0), size, 30.0)
     arguments = (net, seen, motion, 1.0, motion.translation[0, 0])
     result = echo_signal(*arguments, tolerance)
-    strengths = np.sort(abs(range_cells(*arguments)), axis=1)
+    strengths = np.sort(abs(echo_matrix(*arguments, "cells")), axis=1)
     truth = strengths[:, -1] - strengths[:, -2]
     assert (result.gap <= truth * (1 + 1e-9)).all() and (result.gap >= 0).all()
     # The bound on far cells seldom hides a clear lead, and so the gap is mostly all there is.

@@ -12,7 +12,7 @@ import reference_effects
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
-from lowalt.echo import echo_signal, subcarrier_matrix
+from lowalt.echo import echo_matrix, echo_signal
 from lowalt.echo.radar import radar
 from lowalt.effects import interface, need, waveform
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
@@ -107,7 +107,7 @@ def test_response_agrees_with_the_echo_kernel_at_any_range_and_size(count, range
     station, aim = radio.stations[0], np.array([range_m, 0.3 * range_m, 20.0])
     places = aim + rng.uniform(-min(size_m, range_m / 3), min(size_m, range_m / 3), (3, 6, 3))
     ours = response(radio, station, places, np.ones(6), aim)
-    assert relative(ours, subcarrier_matrix(radio, station, places, 1.0, aim)) < 1e-10
+    assert relative(ours, echo_matrix(radio, station, places, 1.0, aim, "subcarriers")) < 1e-10
 
 
 def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):

@@ -115,5 +115,7 @@ PLAIN = kernel()
 """Every operation is done as written."""
 LEAN = kernel(error_model="numpy", _nrt=False)
 """As written, without counted references: they took a quarter of the time. Such a function cannot allocate."""
+INLINED = kernel(error_model="numpy", _nrt=False, forceinline=True)
+"""As LEAN, and copied into its callers, so that bundles of arrays are not copied at each call."""
 VECTOR = kernel(error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""

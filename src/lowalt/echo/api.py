@@ -1,7 +1,7 @@
-"""The echo's public calls: input checked, reference ranges in double-double, one kernel, three answers."""
+"""The echo's public functions: the strongest cell's signal, all range cells, or all subcarriers of one station."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -11,16 +11,16 @@ from lowalt.echo import refine
 from lowalt.echo.pointwise import sums
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
-from lowalt.echo.radar import Radar, radar
-from lowalt.echo.refine import Choice
-from lowalt.echo.scene import Rigid, Scene, check, target
+from lowalt.echo.radar import radar
+from lowalt.echo.refine import Method
+from lowalt.echo.scene import EchoScene, Rigid, Target, check, target
 
 
 class Path(NamedTuple):
-    """One way of the wave to every point and back, beside or instead of the direct one.
+    """One propagation path of the wave to every point and back.
 
-    delay_s: extra delay (s), gain: complex factor, each a number or an array that broadcasts to (N, L).
-    The direct path is Path(0.0, 1.0).
+    delay_s: delay beyond the direct path's (s), gain: complex factor, each a number or an array that broadcasts to
+    (N, L). The direct path is Path(0.0, 1.0).
     """
 
     delay_s: float | np.ndarray = 0.0
@@ -30,9 +30,9 @@ class Path(NamedTuple):
 class EchoResult(NamedTuple):
     """Signal of one station.
 
-    signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: how
-    many symbols have a second cell within a relative 1e-12 (their arg max is a coin toss of rounding); bound: proved
-    bound of the error relative to max |signal|, inf where nothing can be said; choice: what was decided, and why;
+    signal: (N,) complex128, the strongest range cell's value; cell: (N,) int64, its index in 0..M-1; near_ties: number
+    of symbols in which a second cell is within a relative 1e-12, so that rounding decides between both; bound: proved
+    bound of the error relative to max |signal|, inf where nothing can be said; method: how it was computed, and why;
     gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
     totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included; where points were
     interpolated in slow time, a little above it.
@@ -42,7 +42,7 @@ class EchoResult(NamedTuple):
     cell: np.ndarray
     near_ties: int
     bound: float
-    choice: Choice
+    method: Method
     gap: np.ndarray
     totals: np.ndarray
 
@@ -50,8 +50,8 @@ class EchoResult(NamedTuple):
 def echo_signal(
     network: Network,
     station: Station,
-    motion: Rigid | np.ndarray,
-    rcs_m2: np.ndarray | float,
+    motion: Rigid | Target | np.ndarray,
+    rcs_m2: np.ndarray | float | None,
     aim_m: np.ndarray,
     tolerance: float | None = None,
     paths: Sequence[Path] | None = None,
@@ -59,50 +59,33 @@ def echo_signal(
 ) -> EchoResult:
     """Return the symbol-domain signal Y_bin of `station`: for each symbol the strongest of all M range cells.
 
-    motion: `Rigid`, positions (N, L, 3) in metres, or a `motion.Target` that was checked before, with rcs_m2 None;
+    motion: `Rigid`, positions (N, L, 3) in metres, or a `scene.Target` that was checked before, with rcs_m2 None;
     rcs_m2: (L,) m2 or one number; aim_m: (3,) m, where both beams point; tolerance: largest error allowed, relative to
-    the sample's max |Y_bin|, None for the exact closed form; paths: all ways of the wave (default: the direct one
+    the sample's max |Y_bin|, None for the exact closed form; paths: all propagation paths (default: the direct one
     alone); sample: a name for error messages.
     Raises: InputError naming the argument, its value and the sample; BelowFloor, a kind of it, for a tolerance smaller
     than the bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
     """
     _check_tolerance(tolerance, sample)
-    scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
-    found, again, choice = refine.climb(scene, radio, refs, aims, tolerance)
+    scene, radio, refs, aims, routes = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    found, left, method = refine.compute(scene, radio, refs, aims, tolerance)
     if paths is not None:
-        again = np.arange(len(refs))
-        choice = choice._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
-    if len(again):
+        left = np.arange(len(refs))
+        method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
+    if len(left):
         risks = np.zeros(len(refs))
-        fault = sums.signal(
-            scene,
-            radio,
-            refs,
-            again,
-            aims,
-            *ways,
-            found.values,
-            found.cells,
-            found.ties,
-            found.totals,
-            found.gaps,
-            risks,
-        )
-        _check_fault(fault, scene, station, sample)
-        share, direction = choice.general_share
-        found.bounds[again] = found.totals[again] * share + risks[again] * direction
-        found.gaps[again] = np.maximum(found.gaps[again] - 2 * found.bounds[again], 0.0)
+        _check_fault(sums.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
+        share, direction = method.pointwise_bound
+        found.bounds[left] = found.totals[left] * share + risks[left] * direction
+        found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
-        where = f"{sample}: " if sample else ""
         raise BelowFloor(
-            f"{where}tolerance is {tolerance}, below the floor of this sample: float64 can promise {bound:.1e} of its "
-            f"largest value, expected a larger tolerance or null"
+            f"{_named(sample)}tolerance is {tolerance}, below the floor of this sample: float64 promises {bound:.1e} "
+            f"of its largest value, expected a larger tolerance or null"
         )
-    return EchoResult(
-        found.values, found.cells, int(found.ties.sum()), bound, choice, found.gaps, found.totals
-    )  # fmt: skip
+    return EchoResult(found.values, found.cells, int(found.ties.sum()), bound, method, found.gaps, found.totals)
 
 
 def echo_signals(
@@ -115,7 +98,7 @@ def echo_signals(
 ) -> np.ndarray:
     """Return the symbol-domain signals of all the network's stations, complex128 (stations, symbols).
 
-    Arguments, errors and source as `echo_signal`, which also says how each was computed; the motion is checked once.
+    Arguments, errors and source as for `echo_signal`; the motion is checked once.
     """
     seen = target(motion, rcs_m2, sample)
     return np.stack([
@@ -126,77 +109,68 @@ def echo_signals(
 
 def explain(result: EchoResult) -> str:
     """Return in words how a signal was computed and which bounds allowed it."""
-    choice = result.choice
-    kind = "float32 after the phase" if choice.single else "float64"
-    aim = "exact mode" if choice.error is None else f"plan for {choice.error:.1e} of the sum of amplitudes"
+    method = result.method
+    kind = "float32 after the phase" if method.single else "float64"
+    aim = "exact mode" if method.error is None else f"plan for {method.error:.1e} of the sum of amplitudes"
     return "\n".join([
-        f"target radius {choice.size_m:.3g} m, at most {choice.spread:.3g} of the range",
-        f"{aim}: {kind}, ranges by {'polynomials' if choice.near else 'roots'}, orders of cosine {choice.orders[0]}, "
-        f"sine {choice.orders[1]}, cell kernel {choice.orders[2]}",
-        f"symbols: {choice.cheap} by that plan, {choice.exact} by the exact one, "
-        f"{choice.general} by the general kernel",
-        f"points interpolated in slow time: {choice.slow[0]}, from {choice.slow[1]} nodes",
+        f"target radius {method.size_m:.3g} m, at most {method.spread:.3g} of the range",
+        f"{aim}: {kind}, ranges by {'polynomials' if method.near else 'roots'}, orders of cosine {method.orders[0]}, "
+        f"sine {method.orders[1]}, cell kernel {method.orders[2]}",
+        f"symbols: {method.cheap} by that plan, {method.exact} by the exact one, "
+        f"{method.general} by the pointwise kernel",
+        f"points interpolated in slow time: {method.slow[0]}, from {method.slow[1]} nodes",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip
 
 
-def range_cells(
+def echo_matrix(
     network: Network,
     station: Station,
-    motion: Rigid | np.ndarray,
-    rcs_m2: np.ndarray | float,
+    motion: Rigid | Target | np.ndarray,
+    rcs_m2: np.ndarray | float | None,
     aim_m: np.ndarray,
+    columns: Literal["cells", "subcarriers"],
     paths: Sequence[Path] | None = None,
     sample: str = "",
 ) -> np.ndarray:
-    """Return all range cells Y_k,r (N, M) complex128; arguments and errors as `echo_signal`. Source: Eq. 25."""
-    return _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, True)
+    """Return (N, M) complex128: all range cells Y_k,r (Eq. 25), or all subcarriers Y_k, known symbol removed (Eq. 24).
+
+    Other arguments and errors as for `echo_signal`; InputError also for any other `columns`.
+    """
+    if columns not in ("cells", "subcarriers"):
+        raise InputError(f"columns is {columns!r}, expected 'cells' or 'subcarriers'")
+    scene, radio, refs, aims, routes = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    out = np.empty((len(refs), network.subcarriers), np.complex128)
+    fault = sums.matrix(scene, radio, refs, aims, routes, columns == "cells", out)
+    _check_fault(fault, scene, station, sample)
+    return out
 
 
-def subcarrier_matrix(
-    network: Network,
-    station: Station,
-    motion: Rigid | np.ndarray,
-    rcs_m2: np.ndarray | float,
-    aim_m: np.ndarray,
-    paths: Sequence[Path] | None = None,
-    sample: str = "",
-) -> np.ndarray:
-    """Return Y_k (N, M) complex128, the known symbol removed; arguments and errors as `echo_signal`. Source: Eq. 24."""
-    return _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, False)
+def _named(sample: str) -> str:
+    return f"{sample}: " if sample else ""
 
 
 def _check_tolerance(tolerance, sample: str) -> None:
     good = tolerance is None or (isinstance(tolerance, (int, float)) and 0 < tolerance < 1)
     if not good:
-        where = f"{sample}: " if sample else ""
-        raise InputError(f"{where}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
-
-
-def _matrix(network, station, motion, rcs_m2, aim_m, paths, sample, cells: bool) -> np.ndarray:
-    scene, radio, refs, aims, ways = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
-    out = np.empty((len(refs), network.subcarriers), np.complex128)
-    _check_fault(sums.matrix(scene, radio, refs, aims, *ways, cells, out), scene, station, sample)
-    return out
+        raise InputError(f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
 
 
 def _prepare(network, station, motion, rcs_m2, aim_m, paths, sample):
+    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines, paths)."""
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
-    radio: Radar = radar(network, station)
-    first = scene.part[0] if len(scene.part) else 0
-    refs = reference(
-        scene.translation[:, first], radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo
-    )
+    radio = radar(network, station)
+    refs = reference(scene.translation[:, scene.part[0] if len(scene.part) else 0], radio)
     aims = aim_cosines(scene.aim, radio.station, radio.sine, radio.cosine)
     points = len(scene.part) or scene.translation.shape[1]
-    return scene, radio, refs, aims, _ways(paths, (len(refs), points), sample)
+    return scene, radio, refs, aims, _paths(paths, (len(refs), points), sample)
 
 
-def _ways(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> tuple[np.ndarray, np.ndarray]:
-    """Delays and gains of all paths as (K, N or 1, L or 1) arrays; K = 0 for the direct path alone."""
+def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> sums.Paths:
+    """Return the checked delays and gains of all paths."""
     if paths is None:
-        return np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128)
-    where = f"{sample}: " if sample else ""
+        return sums.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
+    where = _named(sample)
     if len(paths) == 0:
         raise InputError(f"{where}paths is empty, expected at least one path")
     result = []
@@ -213,15 +187,14 @@ def _ways(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) -> 
                 ) from None
         widest = np.broadcast_shapes((1, 1), *(array.shape for array in arrays))
         result.append(np.stack([np.broadcast_to(array, widest) for array in arrays]))
-    return result[0], result[1]
+    return sums.Paths(*result)
 
 
-def _check_fault(fault: int, scene: Scene, station: Station, sample: str) -> None:
+def _check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
     if fault:
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741
-        where = f"{sample}: " if sample else ""
         raise InputError(
-            f"{where}position of point {l} at symbol {n} is {station.position_m}, the place of station {station.name} "
-            f"(r = 0), expected r > 0"
+            f"{_named(sample)}position of point {l} at symbol {n} is {station.position_m}, the place of station "
+            f"{station.name} (r = 0), expected r > 0"
         )

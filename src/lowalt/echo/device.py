@@ -1,7 +1,7 @@
-"""The cell signal on a torch device, in float64: the same numbers as the exact mode, all range cells looked at.
+"""The cell signal on a torch device, in float64: equal to the exact mode to rounding, with all range cells computed.
 
-The reference ranges come from `precise` on the processor (double-double, once a symbol); the rest is the general
-kernel of `terms` in arrays of (symbols, points), a few range cells at a time. Nothing here is fitted or bounded.
+The reference ranges are computed on the processor (double-double, once a symbol). The rest is the pointwise kernel of
+`terms` in arrays of (symbols, points), a few range cells at a time. It uses no polynomials and gives no error bound.
 """
 
 import math
@@ -10,17 +10,17 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, Station
-from lowalt.echo.pointwise.reference_range import reference
+from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
 from lowalt.echo.scene import check
 
-ROOM = 2**23
+LARGEST_ARRAY = 2**23
 """Most numbers in a work array; it sets how many cells are computed at a time."""
 
 
 def _dirichlet(torch, x, count: int):
-    """sin(pi count x) / sin(pi x) with its limits at whole x; both arguments are reduced before pi comes in."""
+    """Return sin(pi count x) / sin(pi x) with its limits at whole x; both arguments are reduced before pi comes in."""
     whole = torch.round(x)
     part = x - whole
     many = count * part
@@ -32,11 +32,11 @@ def _dirichlet(torch, x, count: int):
 
 
 def _terms(torch, radio: Radar, refs, e, root_rcs, aims: tuple[float, float]):
-    """Complex amplitudes z (N, L) and ranges u (N, L) in cells from each symbol's reference cell; see `terms.terms`."""
+    """Return amplitudes z (N, L) complex and ranges u (N, L) in cells from the reference's cell; see `terms.terms`."""
     d = refs[:, None, :3] + e
     square = (d * d).sum(dim=2)
     r = torch.sqrt(square)
-    more = (e * (2 * refs[:, None, :3] + e)).sum(dim=2) / (r + refs[:, None, 3])
+    more = (e * (2 * refs[:, None, :3] + e)).sum(dim=2) / (r + refs[:, None, RANGE])
     psi = (radio.cosine * d[..., 1] - radio.sine * d[..., 0]) / r - aims[0]
     omega = d[..., 2] / r - aims[1]
     gain = radio.scale * root_rcs / square
@@ -45,17 +45,17 @@ def _terms(torch, radio: Radar, refs, e, root_rcs, aims: tuple[float, float]):
             gain = gain * _dirichlet(torch, 0.5 * radio.kappa * cosine, count)
     turn = radio.kappa / 4 * (radio.transmit_h + radio.receive_h - 2) * psi
     turn = turn + radio.kappa / 4 * (radio.transmit_v + radio.receive_v - 2) * omega
-    turn = turn - refs[:, None, 4] - radio.turns * more
+    turn = turn - refs[:, None, TURN] - radio.turns * more
     angle = 2 * math.pi * (turn - torch.round(turn))
-    return torch.complex(gain * torch.cos(angle), gain * torch.sin(angle)), refs[:, None, 6] + radio.cells * more
+    return torch.complex(gain * torch.cos(angle), gain * torch.sin(angle)), refs[:, None, REST] + radio.cells * more
 
 
 def device_signal(
     network: Network, station: Station, motion, rcs_m2, aim_m, device: str = "cuda", sample: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return signal (N,) complex128 and range cell (N,) int64 of `station`, computed on the torch device named.
+    """Return signal (N,) complex128 and range cell (N,) int64 of `station`, computed on a torch device.
 
-    motion, rcs_m2, aim_m, sample: as for `echo_signal`. Memory: some (N, L) arrays and ROOM numbers.
+    motion, rcs_m2, aim_m, sample: as for `echo_signal`. Memory: some (N, L) arrays and LARGEST_ARRAY numbers.
     Raises: InputError as `echo_signal` does, and where torch or the device is missing. Source: Eqs. 7 and 22 to 25.
     """
     try:
@@ -68,7 +68,7 @@ def device_signal(
     scene, radio = check(network, station, motion, rcs_m2, aim_m, sample), radar(network, station)
     first = scene.part[0] if len(scene.part) else 0
     start = np.ascontiguousarray(scene.translation[:, first])
-    table = reference(start, radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo)
+    table = reference(start, radio)
     aims = aim_cosines(scene.aim, radio.station, radio.sine, radio.cosine)
     translation = torch.tensor(scene.translation - start[:, None], device=place)
     if scene.rotation.shape[0]:
@@ -86,7 +86,7 @@ def device_signal(
             f"{where}position of point {point} at symbol {n} is {station.position_m}, the place of station "
             f"{station.name} (r = 0), expected r > 0"
         )
-    cells, many = radio.subcarriers, max(1, ROOM // u.numel())
+    cells, many = radio.subcarriers, max(1, LARGEST_ARRAY // u.numel())
     best = torch.full((len(table),), -1.0, dtype=torch.float64, device=place)
     value = torch.zeros(len(table), dtype=torch.complex128, device=place)
     which = torch.zeros(len(table), dtype=torch.int64, device=place)
@@ -99,7 +99,7 @@ def device_signal(
         best = torch.where(better, largest, best)
         which = torch.where(better, row + low, which)
         value = torch.where(better, torch.gather(sums, 0, row[None])[0], value)
-    cell = which.cpu().numpy() + table[:, 5].astype(np.int64)
-    # The cell's own phase, in whole numbers until the last step.
+    cell = which.cpu().numpy() + table[:, CELL].astype(np.int64)
+    # The cell's own phase is reduced in whole numbers until the last step.
     turn = (cells - 1) * (cell % (2 * cells)) % (2 * cells) / (2 * cells)
     return value.cpu().numpy() * np.exp(2j * np.pi * turn), cell % cells

@@ -1,7 +1,7 @@
-"""The numbers of one station that the kernels need, as plain floats and double-doubles computed once.
+"""The constants of one station that the kernels need, as floats and double-doubles computed once.
 
-A double-double is the unevaluated sum of two doubles (about 32 digits); turns per metre are kept so, because at
-100 km and 4.9 GHz a phase of 2e7 rad leaves a plain double only eight digits of the turn.
+A double-double is the unevaluated sum of two doubles (about 32 digits). Turns per metre are stored so, because at
+100 km and 4.9 GHz the phase is 2e7 rad, and one double would leave only eight digits of the turn.
 """
 
 from fractions import Fraction
@@ -16,16 +16,16 @@ LIGHT = Fraction(int(SPEED_OF_LIGHT))
 
 
 class Radar(NamedTuple):
-    """Plain numbers of one station; `_lo` is the low half of a double-double."""
+    """Constants of one station; `_lo` is the low half of a double-double."""
 
     station: np.ndarray
-    """(3,) m, place of the arrays."""
+    """(3,) m, position of the arrays."""
     sine: float
     cosine: float
     """Of Theta_k: y'_k = (-sine, cosine, 0)."""
     turns: float
     turns_lo: float
-    """Turns of phase per metre of range at the effective carrier f_k + (M-1) df / 2."""
+    """Turns of phase per metre of range, at the effective carrier f_k + (M-1) df / 2."""
     cells: float
     cells_lo: float
     """Range cells per metre."""

@@ -1,61 +1,49 @@
-"""Bound, compute, compare, and compute finer where cancellation ate the margin: how a tolerance is kept."""
+"""How a tolerance is kept: bound the error, compute, compare, and compute finer where cancellation needs it."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.fast import driver, vector_loops
-from lowalt.echo.fast.cell_kernel import Cells, cells
-from lowalt.echo.fast.error_model import BLOCK, SINGLE, SPREAD_LIMIT, Plan, general_share, plan, round_up, rules
+from lowalt.echo.fast import driver
+from lowalt.echo.fast.cell_kernel import CellPolynomials, cell_polynomials
+from lowalt.echo.fast.error_model import (
+    SINGLE_ERROR,
+    SPREAD_LIMIT,
+    EchoPlan,
+    array_gains,
+    echo_plan,
+    pointwise_bound,
+    round_up,
+)  # fmt: skip
 from lowalt.echo.fast.layout import layout
 from lowalt.echo.fast.polynomials import folding
-from lowalt.echo.fast.range_bounds import SIZE, SPREAD, segments, spans
-from lowalt.echo.fast.strongest_cell import FINE
+from lowalt.echo.fast.range_bounds import SIZE, SPREAD, cut_segments, fill_extents
+from lowalt.echo.fast.strongest_cell import CERTAIN
+from lowalt.echo.fast.workspace import Approximation, Found, Symbols, workspace
+from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.radar import Radar
-from lowalt.echo.scene import Scene
-from lowalt.echo.slow_time import interpolation as interpolate
+from lowalt.echo.scene import EchoScene
 from lowalt.echo.slow_time import pose_series
+from lowalt.echo.slow_time.interpolation import NO_SLOW_POINTS, SlowParts, interpolated, slow_parts, subset
 
 LONGEST = 100
 """Most symbols of a segment."""
-
-
 PROBES = 8
-"""Symbols computed exactly first: their largest value bounds the sample's largest from below."""
-TRYING = 20_000
-"""What probes and a second pass cost, in points times symbols of the exact plan: less saved, and exact is cheaper."""
+"""Symbols computed exactly first: their largest value is a lower bound of the sample's largest."""
+PROBE_COST = 20_000
+"""Cost of the probes and of a second pass, in points x symbols of the exact plan. A cheaper plan must save more."""
 SAVED_SINGLE, SAVED = 0.4, 0.1
-"""Share of the exact plan's price that plans in float32 and in float64 save, as measured."""
+"""Share of the exact plan's cost that plans in float32 and in float64 save, as measured."""
 
 
-class Found(NamedTuple):
-    """What is known of every symbol, each (N,): see `driver.run`."""
+class Method(NamedTuple):
+    """How a sample was computed, and by which bounds.
 
-    values: np.ndarray
-    cells: np.ndarray
-    state: np.ndarray
-    totals: np.ndarray
-    bounds: np.ndarray
-    ties: np.ndarray
-    gaps: np.ndarray
-
-    @classmethod
-    def empty(cls, count: int) -> "Found":
-        """Return room for `count` symbols, none of them computed."""
-        return cls(
-            np.zeros(count, np.complex128), np.zeros(count, np.int64), np.ones(count, np.int64), np.zeros(count),
-            np.zeros(count), np.zeros(count, np.bool_), np.zeros(count),
-        )  # fmt: skip
-
-
-class Choice(NamedTuple):
-    """What was decided for a sample, and by which bounds.
-
-    error: what the cheap plan was to keep, relative to the sum of amplitudes (None: exact mode only); single: float32
-    after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials, not
-    roots; cheap, exact, general: symbols by kernel; slow: points interpolated in time, from how many nodes in all;
-    spread: largest target radius over range; size_m: largest radius (m); general_share: error bound of the general
-    kernel relative to its sums of amplitudes and of risks.
+    error: the error that the cheap plan had to keep, relative to the sum of amplitudes (None: exact mode only); single:
+    float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials,
+    not roots; cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; slow:
+    points interpolated in time, from how many nodes in all; spread: largest target radius over range; size_m: largest
+    radius (m); pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of risks.
     """
 
     error: float | None
@@ -68,137 +56,140 @@ class Choice(NamedTuple):
     slow: tuple[int, int]
     spread: float
     size_m: float
-    general_share: tuple[float, float]
+    pointwise_bound: tuple[float, float]
 
 
-def climb(scene: Scene, radar: Radar, refs: np.ndarray, aims, tolerance: float | None):
-    """Return (found, symbols left for the general kernel, choice): first cheap, then exact where a bound asks for it.
+def compute(
+    scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
+) -> tuple[Found, np.ndarray, Method]:
+    """Return (found, symbols left for the pointwise kernel, method): a cheap plan first, exact where bounds ask.
 
     A symbol is computed again where its bound exceeds the tolerance times the largest value, where its strongest cell
     is not certain to that bound, and where far cells could not be excluded.
     """
     sample = _Sample(scene, radar, refs, aims)
     found = Found.empty(len(refs))
-    everyone = np.arange(len(refs))
+    symbols = np.arange(len(refs))
     exact = sample.plan(0.0)
-    if not sample.spread < SPREAD_LIMIT or sample.table(exact) is None:
-        return found, everyone, sample.choice(None, exact, 0, 0, len(refs))
+    if not sample.spread < SPREAD_LIMIT or sample.cells(exact) is None:
+        return found, symbols, sample.method(None, exact, 0, 0, len(refs))
     chosen, error, cheap = exact, None, 0
-    if tolerance is not None and len(refs) > PROBES and sample.gain(tolerance) > TRYING:
-        probes = everyone[:: -(-len(refs) // PROBES)]
-        sample.run(probes, exact, True, found)
+    if tolerance is not None and len(refs) > PROBES and sample.saving(tolerance) > PROBE_COST:
+        probes = symbols[:: -(-len(refs) // PROBES)]
+        sample.compute(probes, exact, True, found)
         share = abs(found.values[probes]).max() / (found.totals[probes].max() + sample.peaks(probes).max())
         error = 0.5 * tolerance * share
         chosen = sample.plan(error)
-        if (chosen.fits[2].size < exact.fits[2].size or sample.halves) and sample.table(chosen) is not None:
-            sample.whole(chosen, error / 4, found)
-            good = (found.state == FINE) & (found.bounds <= tolerance * _floor_of_largest(found))
+        shorter = chosen.functions.cosine.size < exact.functions.cosine.size
+        if (shorter or sample.slow_parts) and sample.cells(chosen) is not None:
+            sample.compute_all(chosen, error / 4, found)
+            good = (found.state == CERTAIN) & (found.bounds <= tolerance * _least_largest(found))
             cheap = int(good.sum())
-            everyone = np.flatnonzero(~good)
+            symbols = np.flatnonzero(~good)
         else:
             chosen, error = exact, None
-    if len(everyone):
-        sample.run(everyone, exact, True, found)
+    if len(symbols):
+        sample.compute(symbols, exact, True, found)
     left = np.flatnonzero(found.state)
-    return found, left, sample.choice(error, chosen, cheap, len(everyone) - len(left), len(left))
+    return found, left, sample.method(error, chosen, cheap, len(symbols) - len(left), len(left))
 
 
-def _floor_of_largest(found: Found) -> float:
-    """What the largest |value| is at least, whatever the errors."""
-    done = found.state == FINE
+def _least_largest(found: Found) -> float:
+    """Return a lower bound of the largest |value|, whatever the errors."""
+    done = found.state == CERTAIN
     return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
 
 
 class _Sample:
-    """One sample's layout and spans, and the runs of the fast kernel on it."""
+    """One sample's layout and extents, and the calls of the fast kernel on it."""
 
-    def __init__(self, scene: Scene, radar: Radar, refs: np.ndarray, aims) -> None:
+    def __init__(self, scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float]) -> None:
         self.scene, self.radar, self.refs, self.aims = scene, radar, refs, aims
         self.peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         self.lay = layout(scene, self.peak)
-        self.span = np.empty((len(refs), 5))
+        self.extents = np.empty((len(refs), 4))
         self.first = int(scene.part[0]) if len(scene.part) else 0
-        self.halves: interpolate.Split | None = None
+        self.slow_parts: SlowParts | None = None
         self.slow, self.nodes = 0, 0
-        self.spread = spans(
-            scene.rotation, scene.translation, self.first, self.lay.parts, self.lay.centres, self.lay.radii, refs,
-            radar.sine, radar.cosine, self.span,
-        )  # fmt: skip
-        self.size_m = float(self.span[:, SIZE].max())
+        self.spread = fill_extents(scene, self.first, self.lay, refs, radar, self.extents)
+        self.size_m = float(self.extents[:, SIZE].max())
 
-    def plan(self, error: float) -> Plan:
-        """The plan that keeps `error` (0: the exact mode)."""
-        return plan(self.radar, min(self.spread, SPREAD_LIMIT), self.size_m, len(self.lay.amplitude), error)
+    def plan(self, error: float) -> EchoPlan:
+        """Return the plan that keeps `error` (0: the exact mode)."""
+        return echo_plan(self.radar, min(self.spread, SPREAD_LIMIT), self.size_m, len(self.lay.amplitude), error)
 
     def peaks(self, symbols: np.ndarray) -> np.ndarray:
-        """Sum of amplitudes at the arrays' peak gain, a bound for every symbol."""
-        return self.lay.total / (self.refs[symbols, 3] * (1 - self.span[symbols, SPREAD])) ** 2
+        """Return the sum of amplitudes at the arrays' peak gain, an upper bound for each of the symbols."""
+        return self.lay.total / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
 
-    def gain(self, tolerance: float) -> float:
-        """Price, in points times symbols of the exact plan, that a tolerance may save; finds the slow parts."""
-        self.halves = interpolate.split(self.scene, self.radar, self.lay)
+    def saving(self, tolerance: float) -> float:
+        """Return the cost that a tolerance may save, in points x symbols of the exact plan; finds the slow parts."""
+        self.slow_parts = slow_parts(self.scene, self.radar, self.lay)
         symbols = len(self.refs)
-        saved = (SAVED_SINGLE if 0.5 * tolerance > SINGLE else SAVED) * symbols * len(self.lay.amplitude)
-        return saved + (np.count_nonzero(self.halves.mask) * symbols - pose_series.WORTH if self.halves else 0)
+        saved = (SAVED_SINGLE if 0.5 * tolerance > SINGLE_ERROR else SAVED) * symbols * len(self.lay.amplitude)
+        if self.slow_parts is None:
+            return saved
+        return saved + (np.count_nonzero(self.slow_parts.mask) * symbols - pose_series.INTERPOLATION_COST)
 
-    def whole(self, chosen: Plan, allowed: float, found: Found) -> None:
-        """Compute all symbols into `found`, what moves slowly enough interpolated in time where `allowed`, an error
-        relative to the sum of peak amplitudes, permits it."""
-        halves, everyone = self.halves, np.arange(len(self.refs))
-        if halves is None:
-            self.run(everyone, chosen, False, found)
+    def compute_all(self, chosen: EchoPlan, allowed: float, found: Found) -> None:
+        """Compute all symbols into `found`, slow parts by interpolation where their error stays below `allowed`,
+        relative to the sum of peak amplitudes."""
+        slow, symbols = self.slow_parts, np.arange(len(self.refs))
+        if slow is None:
+            self.compute(symbols, chosen, False, found)
             return
-        quick = interpolate.subset(self.scene, ~halves.mask)
+        quick = subset(self.scene, ~slow.mask)
         rest = quick, layout(quick, self.peak)
-        finest = self.plan(0.0)
-        for symbols in np.array_split(everyone, -(-len(everyone) // pose_series.BLOCK)):
-            part = slice(symbols[0], symbols[-1] + 1)
+        exact = self.approximation(self.plan(0.0))._replace(cells=self.cells(chosen))
+        for block in np.array_split(symbols, -(-len(symbols) // pose_series.BLOCK)):
+            part = slice(block[0], block[-1] + 1)
             there = self.scene._replace(rotation=self.scene.rotation[part], translation=self.scene.translation[part])
-            carried = interpolate.interpolated(
-                there, self.radar, self.refs[part], self.aims, halves, self.table(chosen), finest,
-                (self.spread, self.size_m), allowed, self.peak,
+            carried = interpolated(
+                there, self.radar, self.refs[part], self.aims, slow, exact, (self.spread, self.size_m), allowed,
+                self.peak,
             )  # fmt: skip
             if carried is None:
-                self.run(symbols, chosen, False, found)
+                self.compute(block, chosen, False, found)
             else:
-                self.slow, self.nodes = int(halves.mask.sum()), self.nodes + carried[1]
-                self.run(symbols, chosen, False, found, rest, carried[0])
+                self.slow, self.nodes = int(slow.mask.sum()), self.nodes + carried[1]
+                self.compute(block, chosen, False, found, rest, carried[0])
 
-    def run(
-        self, symbols: np.ndarray, chosen: Plan, final: bool, found: Found, points=None, carried=interpolate.NOTHING
+    def approximation(self, chosen: EchoPlan) -> Approximation:
+        """Return everything that stands for a function in the plan chosen."""
+        return Approximation(chosen, array_gains(self.radar), self.cells(chosen), folding())
+
+    def compute(
+        self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found, points=None, slow=NO_SLOW_POINTS
     ) -> None:  # fmt: skip
-        """Compute `symbols` into `found` with the plan chosen; `final`: close calls between cells stand.
+        """Compute `symbols` into `found` by the plan chosen; `final`: leads that are not proved are accepted.
 
-        points: (scene, layout) of those to be computed, all unless said; carried: what the others add.
+        points: (scene, layout) of the points to compute (None: all); slow: what the others add at these symbols.
         """
         scene, lay = points or (self.scene, self.lay)
-        refs, span = self.refs, self.span
+        refs, extents = self.refs, self.extents
         if len(symbols) < len(refs):
-            refs, span = refs[symbols], span[symbols]
-        table = rules(self.radar)
-        segs = np.empty((len(symbols), 6))
-        count = segments(span, table[1][0], table[3][0], LONGEST, segs)
-        widest = max(len(rates) for rates in table[1::2])
-        kernels = self.table(chosen)
-        rooms, work, small = driver.rooms_for(widest, kernels.kernels.shape[2], lay.amplitude, chosen.single)
+            refs, extents = refs[symbols], extents[symbols]
+        approximation = self.approximation(chosen)
+        gains = approximation.gains
+        segments = np.empty((len(symbols), 6))
+        count = cut_segments(extents, gains.rates_h[0], gains.rates_v[0], LONGEST, segments)
         driver.run(
-            scene, lay, self.radar, self.first, refs, span, segs[:count], symbols, self.aims, table, tuple(kernels),
-            chosen.fits, folding(),
-            (chosen.fit, chosen.share, chosen.peak, 2.0**-24 if chosen.single else 2.0**-53,
-             BLOCK if chosen.single else vector_loops.TILE, chosen.near, float(final)),
-            tuple(carried), rooms, work, small, tuple(found),
+            scene, lay, self.radar, self.first, Symbols(symbols, refs, extents, segments[:count]), self.aims,
+            approximation, final, slow, workspace(approximation, lay.amplitude), found,
         )  # fmt: skip
 
-    def table(self, chosen: Plan) -> Cells | None:
-        """The cell kernel as the plan wants it; None where the target is too deep for it."""
-        return cells(self.radar.subcarriers, round_up(self.size_m * self.radar.cells, 6), chosen.fit)
+    def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
+        """Return the cell kernels as the plan needs them; None where the target is too deep for them."""
+        return cell_polynomials(self.radar.subcarriers, round_up(self.size_m * self.radar.cells, 6), chosen.fit)
 
-    def choice(self, error, chosen: Plan, cheap: int, exact: int, general: int) -> Choice:
-        """The record of what was done."""
-        share = general_share(self.radar, self.size_m, len(self.lay.amplitude))
-        table = self.table(chosen)
-        orders = (*(len(c) - 1 for c in chosen.fits[2:]), table.kernels.shape[2] - 1 if table else 0)
-        return Choice(
+    def method(self, error: float | None, chosen: EchoPlan, cheap: int, exact: int, general: int) -> Method:
+        """Return the record of how the sample was computed."""
+        bound = pointwise_bound(self.radar, self.size_m, len(self.lay.amplitude))
+        functions, cells = chosen.functions, self.cells(chosen)
+        orders = (
+            len(functions.cosine) - 1, len(functions.sine) - 1, cells.kernels.shape[2] - 1 if cells else 0,
+        )  # fmt: skip
+        return Method(
             error, chosen.single, orders, chosen.near, cheap, exact, general, (self.slow, self.nodes), self.spread,
-            self.size_m, share,
+            self.size_m, bound,
         )  # fmt: skip

@@ -1,6 +1,6 @@
-"""What the engine takes as motion, and its checks: rigid parts with their poses, or plain positions.
+"""The motions that the echo takes, and their checks: rigid parts with their poses, or plain positions.
 
-Rigid parts are the better form: no array of symbols x points ever exists, and slow motion can be seen as such.
+Rigid parts are the better form: no array of symbols x points ever exists, and slow parts can be interpolated in time.
 """
 
 import math
@@ -25,9 +25,9 @@ class Rigid(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A checked motion and the roots of its points' cross sections: what all stations that see it share.
+    """A checked motion and the square roots of its points' cross sections, which all stations share.
 
-    `rotation` (0, 0, 3, 3) says that `translation` (N, L, 3) holds positions.
+    Where `rotation` has shape (0, 0, 3, 3), `translation` (N, L, 3) holds positions.
     """
 
     rotation: np.ndarray
@@ -37,7 +37,7 @@ class Target(NamedTuple):
     root_rcs: np.ndarray
 
 
-class Scene(NamedTuple):
+class EchoScene(NamedTuple):
     """Checked input of the kernels: a `Target`'s fields, and where the beams point."""
 
     rotation: np.ndarray
@@ -60,7 +60,7 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # A sum is finite unless a term is not (or it overflows); only then is it worth looking for the place.
+    # A sum is finite unless a term is not, or it overflows: only then is the place searched for.
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")
@@ -68,7 +68,7 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
 
 
 def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
-    """Return the checked rotations, and whether they are one zero repeated, as nodes have it: those take no memory."""
+    """Return the checked rotations, and whether they are one zero repeated, as the poses of nodes are."""
     repeated = isinstance(value, np.ndarray) and value.ndim == 4 and value.size and not any(value.strides)
     if repeated and not _float("motion.rotation", value[:1, :1], ("N", "P", 3, 3), sample).any():
         return value, True
@@ -76,9 +76,11 @@ def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
 
 
 def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str = "") -> Target:
-    """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and cross sections (L,) m2 or one.
+    """Return the checked target of a motion, `Rigid` or positions (N, L, 3) m, and of its cross sections, (L,) m2 or
+    one number for all points.
 
-    Checking takes a twentieth of a signal's time: a caller with several stations checks once, and hands on the result.
+    Checking takes a twentieth of a signal's time: a caller with several stations calls this once, and passes the result
+    to each `echo_signal`.
     Raises: InputError naming the argument, its value and the sample for NaN, infinite, empty or wrongly shaped input,
     and for a negative cross section.
     """
@@ -111,7 +113,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     return Target(rotation, translation, points, part, np.sqrt(rcs))
 
 
-def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> Scene:
+def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoScene:
     """Return the checked scene of one motion seen by one station; rcs_m2 is None where a `Target` comes as motion.
 
     Raises: as `target`, and InputError for cross sections given twice or an aim at the station itself.
@@ -127,11 +129,11 @@ def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str
     if aim.tolist() == list(station.position_m):
         raise InputError(f"{where}aim_m is {aim_m}, the place of station {station.name}: no direction to aim at")
     check_station(network, station)
-    return Scene(*seen, aim)
+    return EchoScene(*seen, aim)
 
 
 def check_station(network: Network, station: Station) -> None:
-    """Raise InputError for a station whose place or frequency cannot be computed with."""
+    """Raise InputError where the station's numbers are not finite, or its frequency is not positive."""
     if not (np.isfinite(station.frequency_hz) and station.frequency_hz > 0):
         raise InputError(f"station {station.name}: frequency_hz is {station.frequency_hz}, expected a positive number")
     if np.shape(station.position_m) != (3,) or not all(map(math.isfinite, (*station.position_m, station.normal_rad))):

@@ -53,7 +53,7 @@ def response(
     Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion.
     """
     radio = radar(network, station)
-    refs = reference(places[:, 0], radio.station, radio.turns, radio.turns_lo, radio.cells, radio.cells_lo)
+    refs = reference(places[:, 0], radio)
     aims = aim_cosines(np.asarray(aim_m, np.float64), radio.station, radio.sine, radio.cosine)
     shared = network, station.name, radio, refs, places[:, 0], aims
     chosen = [_PathFactors(*shared, path) for path in (ImagePath(places), *paths)]

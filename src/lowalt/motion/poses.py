@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.double_double import two_product
 from lowalt.common.errors import InputError
 from lowalt.targets.cloud import Cloud
 
@@ -36,17 +37,9 @@ class Perturbation(NamedTuple):
 def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
     """Return the fraction of a turn, in [-1/2, 1/2], that rate_hz * times_s ends on; shape of `times_s`.
 
-    The product is carried in two doubles (Dekker 1971), so the fraction keeps full precision after 10^6 turns.
+    The product is a double-double, so the fraction keeps full precision after 10^6 turns.
     """
-    split = 134217729.0  # 2^27 + 1
-    product = rate_hz * times_s
-    a = split * rate_hz
-    a_high = a - (a - rate_hz)
-    a_low = rate_hz - a_high
-    b = split * times_s
-    b_high = b - (b - times_s)
-    b_low = times_s - b_high
-    error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+    product, error = two_product(rate_hz, times_s)
     return (product - np.rint(product)) + error
 
 

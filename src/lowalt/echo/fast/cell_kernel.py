@@ -15,14 +15,14 @@ from lowalt.echo.fast.polynomials import CELL_REACH, EXTRA, TOP, cell_rule, degr
 PLACES = 32
 """Places between two whole cells at which the kernel is tabulated."""
 SIDE = 4
-"""Cells either side of the nearest whole cell whose sums are at hand."""
+"""Cells on either side of the nearest whole cell whose sums the moments give."""
 
 
-class Cells(NamedTuple):
+class CellPolynomials(NamedTuple):
     """Kernels (PLACES + 1, 2 SIDE + 1, degree + 1) and sines of pi times the range (PLACES + 1, degree + 1).
 
-    half: what |v| = 1 is, in cells; error: bound of every polynomial's error on [-1, 1]; sizes: largest |c_0| and
-    |c_1| and largest sum of the other |c_k| of any kernel, which say how roundings of the moments add up.
+    half: the range in cells at |v| = 1; error: bound of every polynomial's error on [-1, 1]; sizes: largest |c_0| and
+    |c_1| and largest sum of the other |c_k| of any kernel: they weight the moments' roundings.
     """
 
     kernels: np.ndarray
@@ -32,8 +32,11 @@ class Cells(NamedTuple):
     sizes: tuple[float, float, float]
 
 
-def cells(count: int, deep: float, error: float) -> Cells | None:
-    """Return polynomials to `error` for targets within `deep` cells of their reference; None if they are too long."""
+def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials | None:
+    """Return polynomials to `error` for targets within `deep` cells of their reference; None if they are too long.
+
+    count: subcarriers M.
+    """
     half = deep + 0.5 / PLACES
     band = math.pi * half
     degree = degree_for(band, error)
@@ -41,11 +44,11 @@ def cells(count: int, deep: float, error: float) -> Cells | None:
     degree |= 3
     if degree > TOP or SIDE + 0.5 + half > CELL_REACH or count < 2 * SIDE + 3:
         return None
-    return _cells(count, half, degree)
+    return _cell_polynomials(count, half, degree)
 
 
 @lru_cache(maxsize=256)
-def _cells(count: int, half: float, degree: int) -> Cells:
+def _cell_polynomials(count: int, half: float, degree: int) -> CellPolynomials:
     weights, rates = cell_rule(count)
     places = np.arange(PLACES + 1) / PLACES - 0.5
     away = places[:, None] - np.arange(-SIDE, SIDE + 1)
@@ -53,11 +56,12 @@ def _cells(count: int, half: float, degree: int) -> Cells:
     sines = _expand(np.ones(1), np.array([np.pi]), -0.5 * np.pi, places, half, degree)
     size = np.abs(kernels)
     sizes = (float(size[..., 0].max()), float(size[..., 1].max()), float(size[..., 2:].sum(axis=-1).max()))
-    return Cells(kernels, sines, half, float(tail(np.pi * half, degree)), sizes)
+    return CellPolynomials(kernels, sines, half, float(tail(np.pi * half, degree)), sizes)
 
 
 def _expand(weights, rates, phase: float, centres, half: float, degree: int) -> np.ndarray:
-    """Coefficients (*centres, degree + 1) of sum w cos(rate x + phase) at x = centre + half v, as `fits.economised`."""
+    """Coefficients (*centres, degree + 1) of sum w cos(rate x + phase) at x = centre + half v; compare
+    `polynomials.economised`."""
     orders = np.arange(degree + EXTRA + 1)
     angle = np.asarray(centres)[..., None] * rates + phase
     # The p-th derivative of a cosine is the cosine p quarters of a turn on.

@@ -13,14 +13,14 @@ from numpy.polynomial import chebyshev
 from lowalt.common.jit import LEAN, VECTOR
 
 TOP = 40
-"""Highest degree of any polynomial here; a stretch that would need more goes to the general kernel."""
+"""Highest degree of any polynomial here; a stretch that would need more goes to the pointwise kernel."""
 EXTRA = 8
 """Taylor orders beyond the degree that are folded back into it (economisation)."""
 
 
 @LEAN
 def tail(band, degree):
-    """Bound of the error of `economised` for a sum of cosines with weights of sum 1 and phases up to `band` (rad)."""
+    """Return a bound of the error of `economised` for cosines with weights of sum 1 and phases up to `band` (rad)."""
     half = 0.5 * band
     term = 4.0
     for p in range(1, degree + 2):
@@ -37,7 +37,7 @@ def tail(band, degree):
 
 @LEAN
 def degree_for(band, error):
-    """Smallest degree whose `tail` is at most `error`; TOP + 1 where none is."""
+    """Return the smallest degree whose `tail` is at most `error`; TOP + 1 where none is."""
     for degree in range(TOP + 1):
         if tail(band, degree) <= error:
             return degree
@@ -46,7 +46,8 @@ def degree_for(band, error):
 
 @lru_cache(maxsize=1)
 def folding() -> np.ndarray:
-    """Weights (TOP + 1, EXTRA, TOP + 1): x^(d + 1 + j) on [-1, 1], truncated after T_d, as powers of x."""
+    """Return weights (TOP + 1, EXTRA, TOP + 1): row d, j holds x^(d + 1 + j) on [-1, 1], its Chebyshev series cut after
+    T_d, as powers of x."""
     top = TOP + EXTRA + 1
     # Powers to Chebyshev polynomials by x T_n = (T_{n+1} + T_{|n-1|}) / 2, and back by T_{n+1} = 2 x T_n - T_{n-1}.
     shares, powers = np.zeros((top + 1, top + 1)), np.zeros((TOP + 1, TOP + 1))
@@ -68,7 +69,7 @@ def folding() -> np.ndarray:
 def economised(weights, rates, phase, centre, half, degree, fold, room, out):
     """Fill out[: degree + 1] with powers-of-s coefficients of sum w cos(rate x + phase), x = centre + half s.
 
-    Rates are not negative; room: (3, at least as many as rates), overwritten.
+    Rates are not negative; room (3, at least as many as rates): work array.
     """
     count = len(weights)
     term, even, odd = room[0], room[1], room[2]
@@ -97,7 +98,7 @@ def economised(weights, rates, phase, centre, half, degree, fold, room, out):
 
 
 def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same sum of cosines with rates +-r joined: only rates >= 0, largest first."""
+    """Return the same sum of cosines with the rates r and -r joined: only rates >= 0, largest first."""
     order = np.argsort(-rates, kind="stable")
     weights, rates = weights[order], rates[order]
     keep = (len(rates) + 1) // 2
@@ -110,7 +111,7 @@ def _half(weights: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 @lru_cache(maxsize=64)
 def cell_rule(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Weights and rates (rad a cell) of a short cosine sum equal to the cell kernel of `count` subcarriers.
+    """Return weights and rates (rad a cell) of a short cosine sum equal to the cell kernel of `count` subcarriers.
 
     Gauss rule of the subcarriers' own uniform discrete measure (recurrence of the discrete Chebyshev polynomials):
     32 nodes are exact to degree 63, which leaves less than 1e-17 at seven cells' distance.
@@ -129,7 +130,7 @@ CELL_REACH = 7.0
 
 @lru_cache(maxsize=64)
 def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, np.ndarray]:
-    """Weights (of sum 1) and rates (rad per unit of direction cosine) of U_{T-1} U_{R-1} / (T R) as a cosine sum."""
+    """Return weights (of sum 1) and rates (rad per unit of cosine) of U_{T-1} U_{R-1} / (T R) as a cosine sum."""
     weights = np.convolve(np.ones(transmit), np.ones(receive)) / (transmit * receive)
     top = transmit + receive - 2
     return _half(weights, np.pi * kappa / 2 * (top - 2.0 * np.arange(top + 1)))
@@ -137,9 +138,10 @@ def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, n
 
 @lru_cache(maxsize=1)
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
-    """The 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
+    """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
 
-    Extended precision where the machine has it, so that the transform's own rounding does not look like a tail.
+    Computed in extended precision where the machine has it: else the transform's own rounding would look like
+    coefficients.
     """
     count = 96
     angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count) + np.longdouble(0.5)) / count
@@ -150,7 +152,7 @@ def _nodes() -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=1024)
 def _expansion(kind: str, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Chebyshev coefficients (96,) of a function of `smooth`, and for each degree the error of stopping there."""
+    """Return the Chebyshev coefficients (96,) of a function of `smooth`, and the error of stopping at each degree."""
     s, matrix = _nodes()
     if kind in ("cosine", "sine"):
         turn = 8 * np.arctan(np.longdouble(1)) * np.sqrt(reach / 2 + reach / 2 * s)
@@ -166,7 +168,7 @@ def _expansion(kind: str, reach: float) -> tuple[np.ndarray, np.ndarray]:
 
 @lru_cache(maxsize=1024)
 def smooth(kind: str, reach: float, degree: int) -> tuple[np.ndarray, float]:
-    """Coefficients of a polynomial of `degree` for one of the fixed functions on [-reach, reach], and its error bound.
+    """Return a polynomial of `degree` for one of four functions on [-reach, reach]: coefficients and error bound.
 
     kind "inverse": (1 + x)^(-1/2); "excess": (sqrt(1 + x) - 1) / x; both have their only singularity at x = -1.
     "cosine", "sine": cos(2 pi t), sin(2 pi t) / t as functions of x = t^2, from 0 to reach. The bound is the sum of the

@@ -5,22 +5,29 @@ import math
 import numpy as np
 
 from lowalt.common.jit import LEAN
+from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 
-PSI, OMEGA, CELL, SPREAD, SIZE = range(5)
-"""Columns of `spans`: direction cosines and range cell of the reference, largest |offset| / range, and in metres."""
+PSI, OMEGA, SPREAD, SIZE = range(4)
+"""Columns of the table of extents: direction cosines of the reference, and the largest distance of a point from the
+reference, over the range and in metres."""
+START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
+"""Columns of the table of segments: first symbol, end, centre and half-width of the points' direction cosines."""
 DRIFT = 1.0
-"""Radians of gain phase that a segment's directions may drift beyond what the target itself spans."""
+"""Radians of gain phase by which a segment may be wider than what the target itself spans."""
 
 
 @LEAN
-def spans(rotation, translation, first, parts, centres, radii, refs, sine, cosine, out):
-    """Fill out (N, 5) and return the largest SPREAD.
+def fill_extents(scene, first, lay, refs, radar, out):
+    """Fill the table of extents out (N, 4) and return its largest SPREAD.
 
-    A run's points lie within its radius, times a bound of its matrix's norm, of where its centre is taken.
+    first: the part (or point, without rotations) whose translation is the reference. Each point of a group is at most
+    radius x norm away from the group's moved centre, where `norm` bounds the norm of the part's matrix.
     """
+    rotation, translation = scene.rotation, scene.translation
+    parts, centres, radii = lay.parts, lay.centres, lay.radii
     worst = 0.0
     for n in range(len(refs)):
-        r = refs[n, 3]
+        r = refs[n, RANGE]
         size = 0.0
         if rotation.shape[0] == 0:
             for p in range(translation.shape[1]):
@@ -30,21 +37,20 @@ def spans(rotation, translation, first, parts, centres, radii, refs, sine, cosin
                 size = max(size, x * x + y * y + z * z)
             size = math.sqrt(size)
         else:
-            for run in range(len(parts)):
-                p = parts[run]
+            for group in range(len(parts)):
+                p = parts[group]
                 x = translation[n, p, 0] - translation[n, first, 0]
                 y = translation[n, p, 1] - translation[n, first, 1]
                 z = translation[n, p, 2] - translation[n, first, 2]
-                a, b, c = centres[run, 0], centres[run, 1], centres[run, 2]
+                a, b, c = centres[group, 0], centres[group, 1], centres[group, 2]
                 x += rotation[n, p, 0, 0] * a + rotation[n, p, 0, 1] * b + rotation[n, p, 0, 2] * c
                 y += rotation[n, p, 1, 0] * a + rotation[n, p, 1, 1] * b + rotation[n, p, 1, 2] * c
                 z += rotation[n, p, 2, 0] * a + rotation[n, p, 2, 1] * b + rotation[n, p, 2, 2] * c
-                reach = norm(rotation, n, p) * radii[run] if radii[run] > 0.0 else 0.0
+                reach = norm(rotation, n, p) * radii[group] if radii[group] > 0.0 else 0.0
                 size = max(size, math.sqrt(x * x + y * y + z * z) + reach)
         size *= 1.0 + 1e-12
-        out[n, PSI] = (cosine * refs[n, 1] - sine * refs[n, 0]) / r if r > 0.0 else 0.0
-        out[n, OMEGA] = refs[n, 2] / r if r > 0.0 else 0.0
-        out[n, CELL] = refs[n, 5] + refs[n, 6]
+        out[n, PSI] = (radar.cosine * refs[n, Y] - radar.sine * refs[n, X]) / r if r > 0.0 else 0.0
+        out[n, OMEGA] = refs[n, Z] / r if r > 0.0 else 0.0
         out[n, SPREAD] = size / r if r > 0.0 else np.inf
         out[n, SIZE] = size
         worst = max(worst, out[n, SPREAD])
@@ -53,7 +59,7 @@ def spans(rotation, translation, first, parts, centres, radii, refs, sine, cosin
 
 @LEAN
 def norm(rotation, n, p):
-    """Bound of the norm of rotation[n, p]: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
+    """Return a bound of the norm of rotation[n, p]: sqrt of the largest row sum of |m m^T| (1 for a rotation)."""
     rows = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for j in range(3):
         x, y, z = rotation[n, p, 0, j], rotation[n, p, 1, j], rotation[n, p, 2, j]
@@ -63,35 +69,38 @@ def norm(rotation, n, p):
 
 
 @LEAN
-def segments(span, rate_h, rate_v, longest, out):
-    """Cut the symbols into runs over which the array gains stay short polynomials.
+def cut_segments(extents, rate_h, rate_v, longest, out):
+    """Cut the symbols into segments over which the array gains stay short polynomials.
 
-    Fills out (N, 6): first symbol, end, centre and half-width of psi and of omega. Returns how many runs there are.
-    A single symbol may be wider than the limits; the plan looks at that.
+    Fills the table of segments out (N, 6) and returns how many segments there are. rate_h, rate_v: largest rate of the
+    gains (rad per unit of direction cosine); longest: most symbols of a segment. A single symbol may be wider than the
+    limits; fitting the gains then fails, and the pointwise kernel computes it.
     """
     count = 0
     n = 0
-    while n < len(span):
+    while n < len(extents):
         low_h, high_h, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
         end = n
         room_h, room_v = 0.0, 0.0
-        while end < len(span) and end - n < longest:
-            d = span[end, SPREAD]
+        while end < len(extents) and end - n < longest:
+            d = extents[end, SPREAD]
             turn = 2.0 * d / (2.0 - d) if d < 1.0 else 2.0
-            a, b = span[end, PSI], span[end, OMEGA]
+            a, b = extents[end, PSI], extents[end, OMEGA]
             l0, l1 = min(low_h, a - turn), min(low_v, b - turn)
             h0, h1 = max(high_h, a + turn), max(high_v, b + turn)
             if end == n:
-                # Room for drift: long runs of common polynomials against polynomials of low degree.
+                # Room for drift: long segments of common polynomials against polynomials of low degree.
                 room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
                 room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
             elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:
                 break
             low_h, low_v, high_h, high_v = l0, l1, h0, h1
             end += 1
-        out[count, 0], out[count, 1] = n, end
-        out[count, 2], out[count, 3] = 0.5 * (low_h + high_h), 0.5 * (high_h - low_h) * (1.0 + 1e-9) + 1e-9
-        out[count, 4], out[count, 5] = 0.5 * (low_v + high_v), 0.5 * (high_v - low_v) * (1.0 + 1e-9) + 1e-9
+        out[count, START], out[count, END] = n, end
+        out[count, PSI_CENTRE] = 0.5 * (low_h + high_h)
+        out[count, PSI_HALF] = 0.5 * (high_h - low_h) * (1.0 + 1e-9) + 1e-9
+        out[count, OMEGA_CENTRE] = 0.5 * (low_v + high_v)
+        out[count, OMEGA_HALF] = 0.5 * (high_v - low_v) * (1.0 + 1e-9) + 1e-9
         count += 1
         n = end
     return count

@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import LEAN, VECTOR
+from lowalt.common.jit import INLINED, LEAN, VECTOR
 from lowalt.echo.fast.cell_kernel import SIDE
-from lowalt.echo.pointwise.sums import NEAR_TIE
+from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 
-FINE, AGAIN = 0, 1
-"""State of a symbol: done, or to be computed again with the finest plan or the general kernel."""
+CERTAIN, UNCERTAIN = 0, 1
+"""State of a symbol: its strongest cell is proved, or it must be computed again by the exact plan or pointwise."""
 
 
 @VECTOR
 def cell_sums(kernels, place, moments, first, last, sums):
-    """Fill sums (2 SIDE + 1, 2) with the real and imaginary parts of cells first..last, counted from -SIDE."""
+    """Fill rows first..last of sums (2 SIDE + 1, 2), which start at cell -SIDE, with real and imaginary parts."""
     place = np.uint64(place)
     for j in range(np.uint64(first), np.uint64(last + 1)):
         re, im = 0.0, 0.0
@@ -26,7 +26,7 @@ def cell_sums(kernels, place, moments, first, last, sums):
 
 @VECTOR
 def _product(sines, place, moments, shift):
-    """Size of the sum of z sin(pi u) v^shift, as far as the moments reach."""
+    """Return |sum of z sin(pi u) v^shift|, as far as the moments reach."""
     re, im = 0.0, 0.0
     place, shift = np.uint64(place), np.uint64(shift)
     for i in range(np.uint64(sines.shape[1]) - shift):
@@ -39,7 +39,7 @@ def _product(sines, place, moments, shift):
 def far_moments(sines, place, moments, half, total, second, error, far):
     """Fill far (4,) with bounds of |sum c y^k|, k = 0, 1, 2, and of sum |c y^3|; y in cells from the place.
 
-    c = z sin(pi u). The sine's orders that the moments do not reach are bounded by the sum of |z| v^2.
+    c = z sin(pi u). Orders of the sine that the moments do not reach are bounded by `second`, the sum of |z| v^2.
     """
     degree = sines.shape[1] - 1
     scale, missing = 1.0, 0.0
@@ -52,7 +52,7 @@ def far_moments(sines, place, moments, half, total, second, error, far):
 
 @LEAN
 def far_limit(far, distance, half, count):
-    """Bound of |sum| in every cell at least `distance` from the place; see `answers.far_bound`.
+    """Return a bound of |sum| in every cell at least `distance` from the place; compare `sums.far_bound`.
 
     g(x) = 1 / (M sin(pi x / M)) expanded to third order: |g'''| <= 6 (pi / M)^3 / (M sin^4(pi x / M)). All factors fall
     with distance up to M / 2; the sine is bounded from below by x - x^3 / 6.
@@ -66,38 +66,28 @@ def far_limit(far, distance, half, count):
     return (far[0] * s + (far[1] + far[2] * s) * s * s + far[3] * (n * n) * (n * n)) / math.pi * (1.0 + 1e-9)
 
 
-@LEAN
-def rank(sums, first, last):
-    """Largest and second largest |sum| of the cells first..last, and the place of the largest."""
-    best, second, which = -1.0, -1.0, first
-    for j in range(first, last + 1):
-        strength = sums[j, 0] * sums[j, 0] + sums[j, 1] * sums[j, 1]
-        if strength > best:
-            best, second, which = strength, best, j
-        elif strength > second:
-            second = strength
-    return math.sqrt(best), math.sqrt(second) if second > 0.0 else second, which
+@INLINED
+def certify(table, place, centre, moments, size, totals, error, bound, count, sums, far):
+    """Return (state, row in `sums`, near-tie, lead) of one symbol's strongest cell.
 
-
-@LEAN
-def certify(kernels, sines, place, centre, moments, deep, half, totals, error, bound, count, sums, far):
-    """Strongest cell of one symbol: (state, place in `sums`, near-tie, lead), more cells as the bound asks.
-
-    centre: of the expansion, in cells from the nearest whole one. deep: how far the points reach (cells). totals: sums
-    of |z| and of |z| v^2. lead: lower bound of how much larger |sum| is there than elsewhere, negative where none is
-    proved. sums, far: room.
+    First the cells about the target are computed, then all 2 SIDE + 1 if the bound of the others asks for it. table:
+    `cell_kernel.CellPolynomials`; place: row of its tables; centre: that place in cells from the nearest whole cell;
+    size: largest distance of a point from the reference (cells); totals: sums of |z| and of |z| v^2; error: relative to
+    them, of the sums in `far_moments`; bound: of the error of any cell's sum; sums, far: work arrays.
+    lead: lower bound of |sum| in the strongest cell less |sum| in any other, negative where none is proved.
     """
-    far_moments(sines, place, moments, half, totals[0], totals[1], error, far)
-    margin = 0.6 + 1.5 * deep
+    half = table.half
+    far_moments(table.sines, place, moments, half, totals[0], totals[1], error, far)
+    margin = 0.6 + 1.5 * size
     first = SIDE + max(-SIDE, min(math.ceil(centre - margin), SIDE))
     last = SIDE + max(-SIDE, min(math.floor(centre + margin), SIDE))
     for whole in range(2):
         if whole:
             first, last = 0, 2 * SIDE
-        cell_sums(kernels, place, moments, first, last, sums)
-        best, second, which = rank(sums, first, last)
+        cell_sums(table.kernels, place, moments, first, last, sums)
+        best, second, which = strongest_of(sums, first, last)
         gap = min(centre - (first - 1 - SIDE), last + 1 - SIDE - centre, 0.5 * count)
         limit = far_limit(far, gap, half, count)
         if limit + bound < best * (1.0 - NEAR_TIE) - bound:
-            return FINE, which, best - second <= NEAR_TIE * best, best - max(second, limit) - 2.0 * bound
-    return AGAIN, 0, False, 0.0
+            return CERTAIN, which, best - second <= NEAR_TIE * best, best - max(second, limit) - 2.0 * bound
+    return UNCERTAIN, 0, False, 0.0

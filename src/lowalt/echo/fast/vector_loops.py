@@ -1,13 +1,13 @@
-"""The fast kernel: short loops over a tile of one symbol's points that the compiler turns into vector instructions.
+"""The fast kernel's loops over a tile of one symbol's points, which the compiler turns into vector instructions.
 
 A tile's arrays stay in the first-level cache. Every smooth factor is a polynomial whose degree the plan has chosen
 by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
-Sums may be reordered and products fused; nothing here depends on the order of roundings. Places in arrays are
-unsigned: a signed one may be negative, and Python's wrap-around of those would keep the loops from being vectors;
-views of arrays would do as well, but cost a counted reference each.
+Sums may be reordered and products fused: no bound here depends on the order of roundings. Indices are unsigned: a
+signed one may be negative, and Python's meaning of negative indices would keep the loops from becoming vectors.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,23 +15,92 @@ from lowalt.common.jit import LEAN, VECTOR
 
 TILE = 256
 """Most points worked on at a time: a dozen arrays of 2 kB stay in the nearest cache."""
-LANES = 16
+MULTIPLE = 16
 """Tiles hold whole multiples of this many points; the padding has no amplitude."""
-ROW = TILE + LANES + 8
-"""Room of a work array: a tile and what the last run of a part may write beyond it; of odd length, since rows a
-whole 4096 bytes apart would make loads wait for unrelated stores."""
+TILE_ROOM = TILE + MULTIPLE + 8
+"""Length of a work array: a tile, and what the last group of a part may write beyond it. It is no power of two:
+arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
+
+
+class Placing(NamedTuple):
+    """What places a symbol's points: twice the unit vector to the reference (array's axes), and how the horizontal and
+    vertical coordinates become direction cosines on [-1, 1] before the division by r."""
+
+    twice_x: float
+    twice_y: float
+    twice_z: float
+    y_scale: float
+    y_shift: float
+    z_scale: float
+    z_shift: float
+
+
+class PartPose(NamedTuple):
+    """A part's matrix and its offset from the reference, in the array's axes (normal, horizontal, up), over r_ref."""
+
+    xx: float
+    xy: float
+    xz: float
+    yx: float
+    yy: float
+    yz: float
+    zx: float
+    zy: float
+    zz: float
+    x: float
+    y: float
+    z: float
+
+
+class Geometry(NamedTuple):
+    """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift that take the
+    relative range difference to [-1, 1]; turns of phase per relative range difference, per psi and per omega; the
+    reference's turn."""
+
+    psi_shift: float
+    omega_shift: float
+    cell_scale: float
+    cell_shift: float
+    turn_range: float
+    turn_psi: float
+    turn_omega: float
+    turn_start: float
+
+
+class Offsets(NamedTuple):
+    """A tile's points in float64 (TILE_ROOM,): eps = r^2 / r_ref^2 - 1, scaled horizontal and vertical coordinates."""
+
+    eps: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+
+
+class Tile(NamedTuple):
+    """A tile's points in the type of the sums (TILE_ROOM,): direction cosines and ranges on [-1, 1], turns on
+    [-1/2, 1/2], (r_ref / r)^2, array gains, and real and imaginary part of the amplitudes."""
+
+    psi: np.ndarray
+    omega: np.ndarray
+    cells: np.ndarray
+    turn: np.ndarray
+    square: np.ndarray
+    gain_h: np.ndarray
+    gain_v: np.ndarray
+    real: np.ndarray
+    imag: np.ndarray
 
 
 @LEAN
-def chunk_of(points: int) -> int:
-    """Points of a tile when a target has `points` (padded): equal shares of at most TILE, whole multiples of LANES."""
+def tile_size(points: int) -> int:
+    """Return the points of a tile when a target has `points` (padded): equal shares of at most TILE, whole multiples
+    of MULTIPLE."""
     shares = -(-points // TILE)
-    return -(-points // (shares * LANES)) * LANES
+    return -(-points // (shares * MULTIPLE)) * MULTIPLE
 
 
 @VECTOR
 def horner(x, c, row, degree, out, size):
-    """out[:size] = sum of c[row, k] x^k for k up to `degree`, four orders a pass over the tile."""
+    """Fill out[:size] with the sum of c[row, k] x^k for k up to `degree`, four orders a pass over the tile."""
     top = c[row, degree]
     first = degree & 3
     if first == 0:
@@ -61,41 +130,44 @@ def horner(x, c, row, degree, out, size):
 
 
 @VECTOR
-def place_part(px, py, pz, low, size, m, eps, ey, ez, at):
-    """Place `size` points of a part from `low`, and up to LANES - 1 beyond: eps, ey, ez from `at`.
+def place_part(px, py, pz, low, size, pose, placing, offsets, at):
+    """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE - 1 beyond.
 
-    m: the rows of the part's matrix, then its offset, all over r_ref; twice the unit vector to the reference; scale
-    and shift of ey and of ez. eps = r^2 / r_ref^2 - 1. Whole vectors: single steps would cost more.
+    px, py, pz: all points in their parts' frames (m). The loop takes whole vectors: single steps would cost more.
     """
-    m0, m1, m2, m3, m4, m5 = m[0], m[1], m[2], m[3], m[4], m[5]
-    m6, m7, m8, m9, m10, m11 = m[6], m[7], m[8], m[9], m[10], m[11]
-    hx, hy, hz, ys, y0, zs, z0 = m[12], m[13], m[14], m[15], m[16], m[17], m[18]
+    xx, xy, xz, yx, yy, yz = pose.xx, pose.xy, pose.xz, pose.yx, pose.yy, pose.yz
+    zx, zy, zz, x0, y0, z0 = pose.zx, pose.zy, pose.zz, pose.x, pose.y, pose.z
+    hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
+    eps, ey, ez = offsets
     at, low = np.uint64(at), np.uint64(low)
-    for i in range(np.uint64(-(-size // LANES) * LANES)):
+    for i in range(np.uint64(-(-size // MULTIPLE) * MULTIPLE)):
         x, y, z = px[low + i], py[low + i], pz[low + i]
-        a = m0 * x + m1 * y + m2 * z + m9
-        b = m3 * x + m4 * y + m5 * z + m10
-        c = m6 * x + m7 * y + m8 * z + m11
+        a = xx * x + xy * y + xz * z + x0
+        b = yx * x + yy * y + yz * z + y0
+        c = zx * x + zy * y + zz * z + z0
         eps[at + i] = a * (hx + a) + b * (hy + b) + c * (hz + c)
-        ey[at + i] = b * ys + y0
-        ez[at + i] = c * zs + z0
+        ey[at + i] = b * y_scale + y_shift
+        ez[at + i] = c * z_scale + z_shift
 
 
 @VECTOR
-def place_still(m, size, eps, ey, ez, at):
-    """As `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
-    a, b, c = m[9], m[10], m[11]
-    e = a * (m[12] + a) + b * (m[13] + b) + c * (m[14] + c)
-    y, z = b * m[15] + m[16], c * m[17] + m[18]
+def place_still(pose, placing, size, offsets, at):
+    """Do as `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
+    hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
+    eps, ey, ez = offsets
+    a, b, c = pose.x, pose.y, pose.z
+    e = a * (hx + a) + b * (hy + b) + c * (hz + c)
+    y, z = b * y_scale + y_shift, c * z_scale + z_shift
     at = np.uint64(at)
-    for i in range(np.uint64(-(-size // LANES) * LANES)):
+    for i in range(np.uint64(-(-size // MULTIPLE) * MULTIPLE)):
         eps[at + i], ey[at + i], ez[at + i] = e, y, z
 
 
 @VECTOR
-def place_nodes(translation, n, q, low, size, cosine, sine, scale, m, eps, ey, ez):
-    """As `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
-    hx, hy, hz, ys, y0, zs, z0 = m[12], m[13], m[14], m[15], m[16], m[17], m[18]
+def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offsets):
+    """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
+    hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
+    eps, ey, ez = offsets
     n, low, q = np.uint64(n), np.uint64(low), np.uint64(q)
     px, py, pz = translation[n, q, 0], translation[n, q, 1], translation[n, q, 2]
     for i in range(np.uint64(size)):
@@ -103,18 +175,19 @@ def place_nodes(translation, n, q, low, size, cosine, sine, scale, m, eps, ey, e
         a, b = (cosine * x + sine * y) * scale, (cosine * y - sine * x) * scale
         c = (translation[n, low + i, 2] - pz) * scale
         eps[i] = a * (hx + a) + b * (hy + b) + c * (hz + c)
-        ey[i] = b * ys + y0
-        ez[i] = c * zs + z0
+        ey[i] = b * y_scale + y_shift
+        ez[i] = c * z_scale + z_shift
 
 
 @VECTOR
-def geometry(eps, ey, ez, k, size, psi, omega, cells, turn, square):
-    """Arguments of gains and cell kernel on [-1, 1], turns on [-1/2, 1/2] and (r_ref / r)^2, by root and quotient.
+def geometry(offsets, constants, size, tile):
+    """Fill psi, omega, cells, turn and square of the tile, by one root and one quotient a point.
 
-    k: shifts of psi and omega, scale and shift of the cells, turns per relative range, per psi and per omega, the
-    reference's turn. ey and ez come scaled. The range difference is eps / (1 + sqrt(1 + eps)): nothing cancels.
+    constants: a `Geometry`. The range difference is eps / (1 + sqrt(1 + eps)), in which nothing cancels.
     """
-    cp, co, su, cu, td, tp, to, t0 = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
+    cp, co, su, cu, td, tp, to, t0 = constants
+    eps, ey, ez = offsets
+    psi, omega, cells, turn, square = tile.psi, tile.omega, tile.cells, tile.turn, tile.square
     for i in range(np.uint64(size)):
         e = eps[i]
         r = math.sqrt(1.0 + e)
@@ -130,11 +203,13 @@ def geometry(eps, ey, ez, k, size, psi, omega, cells, turn, square):
 
 
 @VECTOR
-def near_geometry(eps, ey, ez, k, excess, inverse, size, psi, omega, cells, turn, square):
-    """As `geometry`, with polynomials of degree 4 and 3 in eps for the range difference over eps and for 1 / r."""
-    cp, co, su, cu, td, tp, to, t0 = k[0], k[1], k[2], k[3], k[4], k[5], k[6], k[7]
+def near_geometry(offsets, constants, excess, inverse, size, tile):
+    """Do as `geometry`, with polynomials in eps for the range difference over eps (degree 4) and r_ref / r (3)."""
+    cp, co, su, cu, td, tp, to, t0 = constants
     c0, c1, c2, c3, c4 = excess[0], excess[1], excess[2], excess[3], excess[4]
     f0, f1, f2, f3 = inverse[0], inverse[1], inverse[2], inverse[3]
+    eps, ey, ez = offsets
+    psi, omega, cells, turn, square = tile.psi, tile.omega, tile.cells, tile.turn, tile.square
     for i in range(np.uint64(size)):
         e = eps[i]
         d = e * ((((c4 * e + c3) * e + c2) * e + c1) * e + c0)
@@ -149,69 +224,41 @@ def near_geometry(eps, ey, ez, k, excess, inverse, size, psi, omega, cells, turn
 
 
 @VECTOR
-def waves_5(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
-    """real, imag = amplitude times gains times (cosine, sine) of `turn`; returns sums of |amplitude| and of it times
-    cells^2. c, s: coefficients of cos(2 pi t) and sin(2 pi t) / t in t^2, of degree 5.
+def amplitudes(tile, share, first, cosine, sine, size):
+    """Fill real and imag of the tile: share of amplitude times gains times (cosine, sine) of the turn.
+
+    share: all points' amplitudes over their sum; cosine, sine: tuples of the coefficients of cos(2 pi t) and
+    sin(2 pi t) / t in t^2. Returns the sums of |amplitude| and of |amplitude| times cells^2.
     """
-    c0, c1, c2, c3, c4, c5 = c[0], c[1], c[2], c[3], c[4], c[5]
-    s0, s1, s2, s3, s4, s5 = s[0], s[1], s[2], s[3], s[4], s[5]
-    total, second = c0 - c0, c0 - c0
+    turn, cells, square, gain_h, gain_v = tile.turn, tile.cells, tile.square, tile.gain_h, tile.gain_v
+    real, imag = tile.real, tile.imag
+    total, second = cosine[0] - cosine[0], cosine[0] - cosine[0]
     first = np.uint64(first)
+    top = len(cosine) - 1
     for i in range(np.uint64(size)):
         t, v = turn[i], cells[i]
         x = t * t
-        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
+        a = share[first + i] * gain_h[i] * gain_v[i] * square[i]
         b = abs(a)
         total += b
         second += b * v * v
-        real[i] = a * (((((c5 * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
-        imag[i] = a * t * (((((s5 * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
+        # The number of coefficients is known to the compiler, which writes this loop out.
+        c, s = cosine[top], sine[top]
+        for k in range(top):
+            c = c * x + cosine[top - 1 - k]
+            s = s * x + sine[top - 1 - k]
+        real[i] = a * c
+        imag[i] = a * t * s
     return total, second
 
 
 @VECTOR
-def waves_7(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
-    """As `waves_5`, of degree 7."""
-    c0, c1, c2, c3, c4, c5, c6, c7 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]
-    s0, s1, s2, s3, s4, s5, s6, s7 = s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]
-    total, second = c0 - c0, c0 - c0
-    first = np.uint64(first)
-    for i in range(np.uint64(size)):
-        t, v = turn[i], cells[i]
-        x = t * t
-        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
-        b = abs(a)
-        total += b
-        second += b * v * v
-        real[i] = a * (((((((c7 * x + c6) * x + c5) * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
-        imag[i] = a * t * (((((((s7 * x + s6) * x + s5) * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
-    return total, second
+def moments(tile, at, size):
+    """Return the sums of real and of imag times 1, v, v^2, v^3, v = cells, over `size` points from `at`.
 
-
-@VECTOR
-def waves_10(turn, gain_h, gain_v, square, amplitude, first, cells, c, s, size, real, imag):
-    """As `waves_5`, of degree 10."""
-    c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]
-    s0, s1, s2, s3, s4, s5, s6, s7, s8, s9, s10 = s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10]
-    total, second = c0 - c0, c0 - c0
-    first = np.uint64(first)
-    for i in range(np.uint64(size)):
-        t, v = turn[i], cells[i]
-        x = t * t
-        a = amplitude[first + i] * gain_h[i] * gain_v[i] * square[i]
-        b = abs(a)
-        total += b
-        second += b * v * v
-        high = ((((c10 * x + c9) * x + c8) * x + c7) * x + c6) * x + c5
-        real[i] = a * (((((high * x + c4) * x + c3) * x + c2) * x + c1) * x + c0)
-        high = ((((s10 * x + s9) * x + s8) * x + s7) * x + s6) * x + s5
-        imag[i] = a * t * (((((high * x + s4) * x + s3) * x + s2) * x + s1) * x + s0)
-    return total, second
-
-
-@VECTOR
-def moments(real, imag, cells, at, size):
-    """Sums of real and of imag times 1, v, v^2, v^3 with v = cells, which are then multiplied by v^4, from `at` on."""
+    real and imag are then multiplied by v^4, for the next four orders.
+    """
+    real, imag, cells = tile.real, tile.imag, tile.cells
     a = real[0] - real[0]
     a0, a1, a2, a3, b0, b1, b2, b3 = a, a, a, a, a, a, a, a
     at = np.uint64(at)

@@ -1,1 +1,1 @@
-"""The general kernel: reference range, terms of every point, sums over points. It serves any geometry and any array."""
+"""The pointwise kernel: reference range, terms of every point, sums over points. It serves any geometry and array."""

@@ -1,69 +1,58 @@
-"""Range of one reference point a symbol in double-double arithmetic: the only place that needs more than a double.
+"""Range of one reference point a symbol in double-double arithmetic.
 
-Every other point's range is this one plus a difference that a double holds to its last digit, so phase errors do
-not grow with range. Compiled without any fast-math flag: the compensations below must not be simplified away.
+Every other point's range is this one plus a difference that a double holds to its last digit, so phase errors do not
+grow with range. The functions are compiled without fast-math flags, which would simplify the corrections away.
 """
 
 import math
 
 import numpy as np
 
+from lowalt.common import double_double
 from lowalt.common.jit import LEAN
+from lowalt.echo.radar import Radar
 
+X, Y, Z, RANGE, TURN, CELL, REST = range(7)
+"""Columns of the table of reference ranges: vector from the station (m), range (m), fraction of a turn of its phase,
+nearest whole range cell, and the rest of the range in cells."""
 
-@LEAN
-def _two_sum(a, b):
-    s = a + b
-    t = s - a
-    return s, (a - (s - t)) + (b - t)
-
-
-@LEAN
-def _two_product(a, b):
-    p = a * b
-    x = 134217729.0 * a
-    a_high = x - (x - a)
-    a_low = a - a_high
-    y = 134217729.0 * b
-    b_high = y - (y - b)
-    b_low = b - b_high
-    return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
+two_sum = LEAN(double_double.two_sum)
+two_product = LEAN(double_double.two_product)
 
 
 @LEAN
 def _fraction(r, r_lo, k, k_lo):
     """Whole part and fraction, within about [-1/2, 1/2], of (r + r_lo) (k + k_lo)."""
-    p, q = _two_product(r, k)
+    p, q = two_product(r, k)
     whole = np.rint(p)
     return whole, (p - whole) + (q + (r * k_lo + r_lo * k))
 
 
 @LEAN
-def _fill(place, station, turns, turns_lo, cells, cells_lo, out):
+def _fill(place, radar, out):
     for n in range(len(place)):
         h2, h2_lo = 0.0, 0.0
         for i in range(3):
-            d, d_lo = _two_sum(place[n, i], -station[i])
+            d, d_lo = two_sum(place[n, i], -radar.station[i])
             out[n, i] = d
-            p, q = _two_product(d, d)
-            h2, more = _two_sum(h2, p)
+            p, q = two_product(d, d)
+            h2, more = two_sum(h2, p)
             h2_lo += more + q + 2.0 * d * d_lo
         r = math.sqrt(h2)
         r_lo = 0.0
         if r > 0.0:
-            p, q = _two_product(r, r)
+            p, q = two_product(r, r)
             r_lo = ((h2 - p) - q + h2_lo) / (2.0 * r)
-        out[n, 3] = r
-        _, out[n, 4] = _fraction(r, r_lo, turns, turns_lo)
-        out[n, 5], out[n, 6] = _fraction(r, r_lo, cells, cells_lo)
+        out[n, RANGE] = r
+        _, out[n, TURN] = _fraction(r, r_lo, radar.turns, radar.turns_lo)
+        out[n, CELL], out[n, REST] = _fraction(r, r_lo, radar.cells, radar.cells_lo)
 
 
-def reference(place, station, turns, turns_lo, cells, cells_lo) -> np.ndarray:
-    """Return the reference geometry of every symbol, (N, 7).
+def reference(place: np.ndarray, radar: Radar) -> np.ndarray:
+    """Return the table of reference ranges (N, 7) of points `place` (N, 3) m seen by one station.
 
-    place: (N, 3) m, a point near the target; station: (3,) m. Columns: vector from the station (m, 3), range (m),
-    fraction of a turn of its phase, nearest whole range cell, and the rest of the range in cells.
+    Columns: X, Y, Z, RANGE, TURN, CELL, REST.
     """
     out = np.empty((len(place), 7))
-    _fill(place, station, turns, turns_lo, cells, cells_lo, out)
+    _fill(place, radar, out)
     return out

@@ -1,6 +1,6 @@
-"""The general kernel: every point's complex amplitude and range at one symbol, whatever the geometry or arrays.
+"""The pointwise kernel: every point's complex amplitude and range at one symbol, whatever the geometry or arrays.
 
-It serves all three answers, extra paths, and the symbols that the fast kernel cannot certify.
+It serves the signal, all range cells, the subcarriers, extra paths, and the symbols that the fast kernel leaves.
 """
 
 import math
@@ -8,11 +8,12 @@ import math
 import numpy as np
 
 from lowalt.common.jit import LEAN, PLAIN
+from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN
 
 
 @PLAIN
 def sin_pi(x):
-    """Sine of pi x with the argument reduced before pi comes in, so whole x give exactly zero."""
+    """Return sin(pi x); the argument is reduced before pi comes in, so whole x give exactly zero."""
     k = np.rint(x)
     s = math.sin(math.pi * (x - k))
     return -s if int(k) & 1 else s
@@ -20,7 +21,7 @@ def sin_pi(x):
 
 @PLAIN
 def dirichlet(x, count):
-    """U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x."""
+    """Return U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x."""
     k = np.rint(x)
     f = x - k
     sign = -1.0 if (int(k) & 1) and (count - 1) & 1 else 1.0
@@ -31,7 +32,7 @@ def dirichlet(x, count):
 
 @LEAN
 def aim_cosines(aim, station, sine, cosine):
-    """Direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and Omega)."""
+    """Return the direction cosines (horizontal, vertical) of the beams (Eq. 4 put into Psi and Omega)."""
     x, y, z = aim[0] - station[0], aim[1] - station[1], aim[2] - station[2]
     r = math.sqrt(x * x + y * y + z * z)
     return (cosine * y - sine * x) / r, z / r
@@ -55,12 +56,14 @@ def offsets(scene, n, place, e):
 
 
 @PLAIN
-def terms(scene, radar, ref, n, psi0, omega0, e, z, u, risk):
-    """Fill z (L,), complex amplitudes without the cell's own phase, u (L,), ranges in cells from ref's cell, and
-    risk (L,), the peak amplitude times how much rounding its direction may have taken: (r_ref + |e|) / r.
+def terms(scene, radar, ref, n, aims, e, z, u, risk):
+    """Fill z, u and risk (L,) with what each point adds at symbol n.
 
-    ref: the symbol's row of `precise.reference`; e (L, 3): a work array. Returns 0, or 1 + l where point l stands
-    in the station. Source: paper Eqs. 7 and 24, steering sums as Chebyshev polynomials.
+    z: complex amplitude without the cell's own phase; u: range in cells from the reference's cell; risk: peak amplitude
+    times (r_ref + |e|) / r, which grows with the rounding of the point's direction. ref: the symbol's row of
+    `reference_range.reference`; aims: direction cosines of the beams; e (L, 3): a work array.
+    Returns 0, or 1 + l where point l stands in the station. Source: paper Eqs. 7 and 24, steering sums as Chebyshev
+    polynomials.
     """
     place = scene.translation[n, 0 if scene.rotation.shape[0] == 0 else scene.part[0]]
     offsets(scene, n, place, e)
@@ -74,44 +77,44 @@ def terms(scene, radar, ref, n, psi0, omega0, e, z, u, risk):
         if r2 == 0.0:
             return 1 + l
         r = math.sqrt(r2)
-        # r^2 - r_ref^2 over r + r_ref: a difference of ranges without cancellation.
+        # (r^2 - r_ref^2) / (r + r_ref) is the difference of the ranges without cancellation.
         excess = 0.0
         for i in range(3):
             excess += e[l, i] * (2.0 * ref[i] + e[l, i])
-        more = excess / (r + ref[3])
-        psi = (radar.cosine * y - radar.sine * x) / r - psi0
-        omega = w / r - omega0
+        more = excess / (r + ref[RANGE])
+        psi = (radar.cosine * y - radar.sine * x) / r - aims[0]
+        omega = w / r - aims[1]
         h, v = 0.5 * radar.kappa * psi, 0.5 * radar.kappa * omega
         gain = dirichlet(h, radar.transmit_h) * dirichlet(h, radar.receive_h)
         gain *= dirichlet(v, radar.transmit_v) * dirichlet(v, radar.receive_v)
-        turn = phase_h * psi + phase_v * omega - ref[4] - radar.turns * more
+        turn = phase_h * psi + phase_v * omega - ref[TURN] - radar.turns * more
         turn -= np.rint(turn)
         strength = radar.scale * scene.root_rcs[l] / r2
         a = strength * gain
         offset = math.sqrt(e[l, 0] ** 2 + e[l, 1] ** 2 + e[l, 2] ** 2)
-        risk[l] = strength * peak * (ref[3] + offset) / r
+        risk[l] = strength * peak * (ref[RANGE] + offset) / r
         z[l] = complex(a * math.cos(2.0 * math.pi * turn), a * math.sin(2.0 * math.pi * turn))
-        u[l] = ref[6] + cells * more
+        u[l] = ref[REST] + cells * more
     return 0
 
 
 @PLAIN
 def cell_phase(m, count):
-    """Phase factor exp(j pi (M-1) m / M) of range cell m, reduced in whole numbers."""
+    """Return the phase factor exp(j pi (M-1) m / M) of range cell m; its argument is reduced in whole numbers."""
     turn = ((count - 1) * (m % (2 * count)) % (2 * count)) / (2.0 * count)
     return complex(math.cos(2.0 * math.pi * turn), math.sin(2.0 * math.pi * turn))
 
 
 @PLAIN
-def kernel(x, count):
-    """Real part of the range-cell kernel, sin(pi x) / (M sin(pi x / M)), x in cells."""
+def cell_weight(x, count):
+    """Return the real part of the range-cell kernel, sin(pi x) / (M sin(pi x / M)), x in cells."""
     return dirichlet(x / count, count) / count
 
 
 @PLAIN
 def cell_sum(z, u, j, count):
-    """Sum of the points in the cell j cells after ref's, without the cell's phase."""
+    """Return the sum of the points in the cell j cells after the reference's, without the cell's phase."""
     total = 0.0j
     for l in range(len(z)):  # noqa: E741
-        total += z[l] * kernel(j - u[l], count)
+        total += z[l] * cell_weight(j - u[l], count)
     return total

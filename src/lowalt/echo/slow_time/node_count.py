@@ -3,7 +3,7 @@
 A part's moments, the reference's phase left out, are an analytic function of time. On the ellipse with foci at a
 block's ends and semi-axes that sum to rho they are at most M, so the polynomial through d + 1 Chebyshev points is off
 by at most 4 M rho^-d / (rho - 1) (Trefethen, Approximation Theory and Approximation Practice, theorem 8.2). M follows
-from the sizes of the poses' series (`slow`).
+from the sizes of the poses' series (`pose_series`).
 """
 
 import math
@@ -16,15 +16,16 @@ from lowalt.echo.fast.cell_kernel import PLACES
 from lowalt.echo.radar import Radar
 
 RHO = np.exp(np.linspace(math.log(1.15), math.log(40.0), 24))
-"""Ellipses that bounds are looked for on."""
+"""Ellipses on which bounds are computed."""
 ROUND = 2.0**-53
+"""Largest relative rounding error of a double."""
 
 
 class Nodes(NamedTuple):
     """How a block is interpolated: `degree` in time; `error`: bound of the interpolation relative to the sum of peak
-    amplitudes at the reference's range; `phase`: what the poses' series may be off by (rad); `gain`: what that does to
-    the array gains, relative to their peak; `flat`, `bent`: how much more than interpolated linearly between nodes the
-    sums of |amplitude| and of it times v^2 may be, relative to the sum of peak amplitudes."""
+    amplitudes at the reference's range; `phase`: largest error of the phase by the poses' series (rad); `gain`: the
+    array gains' error by it, relative to their peak; `flat`, `bent`: by how much the sums of |amplitude| and of
+    |amplitude| v^2 may exceed their linear interpolation, relative to the sum of peak amplitudes."""
 
     degree: int
     error: float
@@ -36,8 +37,8 @@ class Nodes(NamedTuple):
 
 @PLAIN
 def _on_ellipse(rho, moves, sizes):
-    """Bounds of complex vectors on the ellipse rho: (how far the reference strays, the imaginary part of it, the size
-    of an offset, the imaginary part of it). moves, sizes: norms of the series' orders."""
+    """Return bounds of complex vectors on the ellipse rho: of the reference's change and its imaginary part, and of a
+    point's offset and its imaginary part. moves, sizes: norms of the series' orders."""
     stray, imaginary, reach, depth = 0.0, 0.0, sizes[0], 0.0
     up = 1.0
     for k in range(1, len(moves)):
@@ -52,18 +53,18 @@ def _on_ellipse(rho, moves, sizes):
 
 @PLAIN
 def _tilt(imaginary, range_m):
-    """Bound of the imaginary part of V / sqrt(V.V) for |Im V| and Re sqrt(V.V) as given."""
+    """Return a bound of the imaginary part of V / sqrt(V.V) from |Im V| and Re sqrt(V.V)."""
     y = imaginary / range_m
     return y * math.sqrt(1.0 + y**4)
 
 
 @PLAIN
 def _growth(rho, moves, sizes, turns, cells_half, phases, rates):
-    """Logarithms of bounds on the ellipse of a point's factor, (with its phase, without), and a bound of |v|.
+    """Return logarithms of bounds of a point's factor on the ellipse, with its phase and without, and a bound of |v|.
 
-    Infinite where the ellipse is too wide for a bound. Range difference: e.m, m = (2 ref + e) / (|ref + e| + |ref|),
-    the mean of both unit vectors but for (|ref + e| - |ref|) / (2 (|ref + e| + |ref|)) times their difference;
-    |Im sqrt(V.V)| <= |Im V|, so every imaginary part is bounded by those of the poses.
+    All are infinite where the ellipse is too wide for a bound. The range difference is e.m with
+    m = (2 ref + e) / (|ref + e| + |ref|) = (a + b) / 2 + (a - b) (|ref + e| - |ref|) / (2 (|ref + e| + |ref|)), a and b
+    the unit vectors along ref + e and ref. As |Im sqrt(V.V)| <= |Im V|, the poses bound every imaginary part.
     """
     stray, imaginary, reach, depth = _on_ellipse(rho, moves, sizes)
     low, side = moves[0] - stray - reach, imaginary + depth
@@ -83,9 +84,10 @@ def _growth(rho, moves, sizes, turns, cells_half, phases, rates):
 
 @PLAIN
 def choose(moves, sizes, turns, cells_half, slack, phases, rates, orders, kernel, target, top, ellipses):
-    """Smallest degree that keeps `target`: (degree or 0, error, excess of linear interpolation for |z| and |z| v^2).
+    """Return the smallest degree that keeps `target` (0: none), its error, and `flat` and `bent` of `Nodes`.
 
-    kernel: three sizes of the cell kernels' coefficients (`cells.Cells`); slack: how far, in v, they are shifted.
+    kernel: three sizes of the cell kernels' coefficients (`CellPolynomials.sizes`); slack: by how much, in v, their
+    place may differ from the reference's.
     """
     best, error, flat, bent = 0, np.inf, np.inf, np.inf
     for rho in ellipses:
@@ -111,8 +113,9 @@ def choose(moves, sizes, turns, cells_half, slack, phases, rates, orders, kernel
 def nodes(radar: Radar, sizes: tuple, stray_ref: float, table, target: float, room: float, top: int) -> Nodes | None:
     """Return how to interpolate a block so that the error keeps `target`, relative to the sum of peak amplitudes.
 
-    sizes: of `extent`; stray_ref: how far the reference may be from its series (m); table: `cells.Cells`; room: most
-    radians that the poses' series may be off by; top: highest degree worth having. None where no bound allows it.
+    sizes: of `series_sizes`; stray_ref: largest error of the reference's series (m); table: `CellPolynomials`; room:
+    largest phase error allowed of the poses' series (rad); top: highest degree that saves time. None where no bound
+    allows interpolation.
     """
     moves, offsets, stray = sizes
     elements = radar.transmit_h + radar.receive_h + radar.transmit_v + radar.receive_v - 4

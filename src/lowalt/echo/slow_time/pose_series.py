@@ -1,6 +1,7 @@
-"""Slowly moving rigid parts: which they are, their poses as short series in time, and how nodes carry to symbols.
+"""Slowly moving rigid parts: which parts they are, their poses as short series in time, and interpolation weights.
 
-What the series leave out is measured at every symbol and counted; how many nodes are needed, `ellipse` says.
+The difference between a pose and its series is measured at every symbol and counted as error. `node_count` says how
+many nodes are needed.
 """
 
 import math
@@ -16,23 +17,27 @@ BLOCK = 512
 """Most symbols interpolated over at a time."""
 DEGREE = 8
 """Degree in time of the poses' series."""
-WORTH = 40_000
-"""Points times symbols that must be saved: below that, fitting and interpolating cost more."""
+INTERPOLATION_COST = 40_000
+"""Cost of fitting and interpolating, in points x symbols of the exact plan."""
 SWING = 150.0
-"""Radians a part's edge may turn through, by its first step, to be looked at: a guess that saves time, no bound."""
+"""Largest phase (rad) that a part's edge may sweep, by its first step, to be considered: a guess that saves time."""
 
 
 @lru_cache(maxsize=64)
 def fit(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices (orders, count) from values at `count` symbols to Chebyshev coefficients by least squares, and back."""
+    """Return two matrices (orders, count): one takes values at `count` symbols to Chebyshev coefficients by least
+    squares, the other holds the Chebyshev polynomials at the symbols."""
     values = chebyshev.chebvander(np.linspace(-1.0, 1.0, count), min(DEGREE, count // 4))
     return np.linalg.pinv(values), np.ascontiguousarray(values.T)
 
 
 @lru_cache(maxsize=256)
 def weights(count: int, degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights that carry values at the nodes to `count` symbols, (count, degree + 1): by the polynomial (barycentric,
-    Berrut and Trefethen 2004), and linearly; and the Chebyshev polynomials at the nodes (degree + 1, orders)."""
+    """Return interpolation weights from degree + 1 nodes to `count` symbols, both (count, degree + 1), and values.
+
+    The first weights are those of the polynomial through the nodes (barycentric, Berrut and Trefethen 2004), the second
+    are linear between nodes; the values (degree + 1, orders) are the Chebyshev polynomials at the nodes.
+    """
     nodes = -np.cos(np.pi * np.arange(degree + 1) / degree)
     symbols = np.linspace(-1.0, 1.0, count)
     sign = (-1.0) ** np.arange(degree + 1)
@@ -48,27 +53,28 @@ def weights(count: int, degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 @PLAIN
-def candidates(rotation, parts, starts, centres, radii, steps, turns, enough):
-    """Parts (P,) bool with at least `enough` points that, by their first step, turn slowly enough to be looked at.
+def candidates(rotation, lay, steps, turns, enough):
+    """Return parts (P,) bool with at least `enough` points that, by their first step, turn slowly enough.
 
-    parts, starts, centres, radii: `layout.Layout`.
+    lay: `layout.Layout`; steps: symbols of a block; turns: turns of phase per metre of range.
     """
+    parts, starts, centres, radii = lay.parts, lay.starts, lay.centres, lay.radii
     counts, result = np.zeros(rotation.shape[1], np.int64), np.ones(rotation.shape[1], np.bool_)
-    for run in range(len(parts)):
-        p = parts[run]
+    for group in range(len(parts)):
+        p = parts[group]
         change = 0.0
         for i in range(3):
             for j in range(3):
                 change += (rotation[1, p, i, j] - rotation[0, p, i, j]) ** 2
-        reach = math.sqrt(centres[run, 0] ** 2 + centres[run, 1] ** 2 + centres[run, 2] ** 2) + radii[run]
-        counts[p] += starts[run + 1] - starts[run]
+        reach = math.sqrt(centres[group, 0] ** 2 + centres[group, 1] ** 2 + centres[group, 2] ** 2) + radii[group]
+        counts[p] += starts[group + 1] - starts[group]
         result[p] &= np.pi * turns * math.sqrt(change) * reach * steps < SWING
     return result & (counts >= enough)
 
 
 @VECTOR
 def _column(project, back, values, found, column):
-    """Fit values (B,) into found[:, column]; returns the largest difference at any symbol."""
+    """Fit values (B,) into found[:, column]; returns the largest difference at any symbol. values is overwritten."""
     worst = 0.0
     for k in range(len(project)):
         total = 0.0
@@ -89,7 +95,8 @@ def series(rotation, translation, refs, first, chosen, fits):
     """Fit the poses of the parts `chosen` (K,) over the symbols of refs (B, 7), the reference being part `first`.
 
     Returns Chebyshev coefficients (orders, 3) of the reference from the station, (orders, K, 3) of the parts' origins
-    from it, (orders, K, 3, 3) of the rotations, and what each leaves out at most: (2 K + 1,), the reference first.
+    from the reference, (orders, K, 3, 3) of the rotations, and the largest residual of each, (2 K + 1,): reference,
+    origins, rotations.
     """
     project, back = fits
     orders, count, parts = len(project), len(refs), len(chosen)
@@ -115,24 +122,26 @@ def series(rotation, translation, refs, first, chosen, fits):
 
 
 @PLAIN
-def extent(reference, offset, turned, left, row_of, centres, radii):
-    """Sizes of the series' orders: (|reference| (orders,), largest |offset of a point| (orders,), farthest that a point
-    may be from where the series puts it (m)). row_of, centres, radii: runs of points: their row, middle and radius."""
+def series_sizes(reference, offset, turned, left, row_of, centres, radii):
+    """Return (|reference| (orders,), largest |offset of a point| (orders,), largest error of a point's place (m)).
+
+    Arguments: the results of `series`, then for each group of points its part's row, its centre and its radius.
+    """
     orders, parts = offset.shape[0], offset.shape[1]
     moves, sizes = np.empty(orders), np.zeros(orders)
     stray = 0.0
     for k in range(orders):
         moves[k] = math.sqrt(reference[k, 0] ** 2 + reference[k, 1] ** 2 + reference[k, 2] ** 2)
-        for run in range(len(row_of)):
-            row, total = row_of[run], 0.0
+        for group in range(len(row_of)):
+            row, total = row_of[group], 0.0
             for i in range(3):
                 at = offset[k, row, i]
                 for j in range(3):
-                    at += turned[k, row, i, j] * centres[run, j]
+                    at += turned[k, row, i, j] * centres[group, j]
                 total += at * at
-            sizes[k] = max(sizes[k], math.sqrt(total) + norm(turned, k, row) * radii[run])
-    for run in range(len(row_of)):
-        c = centres[run]
-        reach = math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + radii[run]
-        stray = max(stray, left[1 + row_of[run]] + left[1 + parts + row_of[run]] * reach)
+            sizes[k] = max(sizes[k], math.sqrt(total) + norm(turned, k, row) * radii[group])
+    for group in range(len(row_of)):
+        c = centres[group]
+        reach = math.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2]) + radii[group]
+        stray = max(stray, left[1 + row_of[group]] + left[1 + parts + row_of[group]] * reach)
     return moves, sizes, stray

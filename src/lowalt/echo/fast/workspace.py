@@ -1,0 +1,98 @@
+"""What the fast kernel's driver works with: bundles of its inputs and of its work arrays.
+
+The driver is compiled without counted references, so it cannot allocate; all arrays come in from here.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo.fast.cell_kernel import SIDE, CellPolynomials
+from lowalt.echo.fast.error_model import ArrayGains, EchoPlan
+from lowalt.echo.fast.polynomials import TOP
+from lowalt.echo.fast.vector_loops import TILE_ROOM, Offsets, Tile
+
+
+class Approximation(NamedTuple):
+    """Everything that stands for a function: the plan's polynomials, the array gains as sums of cosines, the cell
+    kernels, and the weights of `polynomials.folding`."""
+
+    plan: EchoPlan
+    gains: ArrayGains
+    cells: CellPolynomials
+    fold: np.ndarray
+
+
+class Symbols(NamedTuple):
+    """The symbols to compute: index (B,) of each in the sample, and the rows of its tables: reference ranges (B, 7),
+    extents (B, 4), and the segments (S, 6) that B symbols fall into."""
+
+    index: np.ndarray
+    refs: np.ndarray
+    extents: np.ndarray
+    segments: np.ndarray
+
+
+class SlowMoments(NamedTuple):
+    """What slow points add at each of B symbols, times r^2 and without the reference's phase: moments about the
+    reference's range (B, 2, orders), bounds of the sums of |z| and |z| v^2 (B, 2), bounds of the error (B,)."""
+
+    moments: np.ndarray
+    sums: np.ndarray
+    errors: np.ndarray
+
+
+class Found(NamedTuple):
+    """What is known of every symbol, each (N,): the strongest cell's value and index; `strongest_cell`'s state; sum of
+    |amplitudes|; bound of the value's error; whether there is a near-tie; certified lead over every other cell."""
+
+    values: np.ndarray
+    cells: np.ndarray
+    state: np.ndarray
+    totals: np.ndarray
+    bounds: np.ndarray
+    ties: np.ndarray
+    gaps: np.ndarray
+
+    @classmethod
+    def empty(cls, count: int) -> "Found":
+        """Return room for `count` symbols, none of them computed."""
+        return cls(
+            np.zeros(count, np.complex128), np.zeros(count, np.int64), np.ones(count, np.int64), np.zeros(count),
+            np.zeros(count), np.zeros(count, np.bool_), np.zeros(count),
+        )  # fmt: skip
+
+
+class Workspace(NamedTuple):
+    """Work arrays: Taylor terms of a gain (3, rates); moments (2, orders); gain coefficients (2, TOP + 1), in float64
+    and in the tile's type; cell sums (2 SIDE + 1, 2); bounds for far cells (4,); a tile's arrays; and every point's
+    share (padded L,) of the sum of amplitudes, in the tile's type."""
+
+    taylor: np.ndarray
+    moments: np.ndarray
+    coefficients: np.ndarray
+    typed: np.ndarray
+    sums: np.ndarray
+    far: np.ndarray
+    offsets: Offsets
+    tile: Tile
+    share: np.ndarray
+
+
+def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
+    """Return work arrays for an approximation and the points' amplitudes (padded L,).
+
+    The tile's arrays are separate and of odd length: as rows of one array a whole 4096 bytes apart, loads would wait
+    for unrelated stores.
+    """
+    kind = np.float32 if approximation.plan.single else np.float64
+    gains = approximation.gains
+    rates = max(len(gains.rates_h), len(gains.rates_v))
+    total = amplitude.sum()
+    return Workspace(
+        np.empty((3, rates)), np.empty((2, approximation.cells.kernels.shape[2])), np.empty((2, TOP + 1)),
+        np.empty((2, TOP + 1), kind), np.empty((2 * SIDE + 1, 2)), np.empty(4),
+        Offsets(*(np.empty(TILE_ROOM) for _ in Offsets._fields)),
+        Tile(*(np.empty(TILE_ROOM, kind) for _ in Tile._fields)),
+        (amplitude / total if total > 0 else amplitude).astype(kind),
+    )  # fmt: skip

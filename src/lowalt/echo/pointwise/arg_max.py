@@ -1,0 +1,28 @@
+"""The choice of the strongest range cell among computed sums, as both kernels make it.
+
+Each kernel bounds the cells that it did not compute by its own means.
+"""
+
+import math
+
+from lowalt.common.jit import LEAN
+
+NEAR_TIE = 1e-12
+"""Relative gap below which the two strongest cells count as a near-tie."""
+
+
+@LEAN
+def strongest_of(sums, first, last):
+    """Return the largest |sum| of the rows first..last of sums (cells, 2), the second largest, and the largest's row.
+
+    Columns of sums: real and imaginary part. Of equal sums the first row wins. The second largest is -1 where only one
+    row is given.
+    """
+    best, second, which = -1.0, -1.0, first
+    for j in range(first, last + 1):
+        strength = sums[j, 0] * sums[j, 0] + sums[j, 1] * sums[j, 1]
+        if strength > best:
+            best, second, which = strength, best, j
+        elif strength > second:
+            second = strength
+    return math.sqrt(best), math.sqrt(second) if second > 0.0 else second, which
