@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
 from lowalt.noise import add_noise
 from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.normals import circular
 
 
 def measured_snr_db(snr_db: float, scale: float = 1.0) -> float:
@@ -71,3 +73,11 @@ def test_streams_do_not_depend_on_what_else_is_there():
     assert np.array_equal(full[1, 1, 2], some[0, 0, 0])
     assert np.array_equal(full[:, 2].transpose(1, 0, 2), echoes)
     assert not np.array_equal(full[0, 0], full[0, 1])
+
+
+@pytest.mark.parametrize("count", [1, 2, 399, 1001])
+def test_the_compiled_normals_are_those_of_the_draws(count):
+    plain, raw = (Draws(np.random.PCG64(count)) for _ in range(2))
+    expected = 0.3 * plain.standard_normal(2 * count)
+    found = circular(raw.words(2 * count), 0.3)
+    assert np.array_equal(found, expected.reshape(-1, 2).T)

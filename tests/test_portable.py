@@ -128,3 +128,18 @@ def test_draws_go_on_after_pickling():
     copy = pickle.loads(pickle.dumps(draws))
     assert (copy.integers(10, size=5) == draws.integers(10, size=5)).all()
     assert copy.standard_normal() == draws.standard_normal()
+
+
+def test_the_thinnest_direction_is_the_library_s_eigenvector():
+    for scales in ((3.0, 1.0, 0.2), (1.0, 1.0, 0.01), (0.5, 2.0, 2.0)):
+        points = RNG.normal(size=(300, 3)) * scales @ np.linalg.qr(RNG.normal(size=(3, 3)))[0]
+        points -= points.mean(axis=0)
+        expected = np.linalg.eigh(points.T @ points)[1][:, 0]
+        assert abs(abs(portable.thinnest(points) @ expected) - 1) < 1e-14
+
+
+def test_the_nearest_rotation_is_the_library_s_polar_factor():
+    blends = np.eye(3) + 0.3 * RNG.normal(size=(50, 3, 3))
+    blends = blends[np.linalg.det(blends) > 0.1]
+    left, _, right = np.linalg.svd(blends)
+    assert np.allclose(portable.nearest_rotations(blends), left @ right, atol=1e-14)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 
 SPEED_OF_LIGHT = 299_792_458.0
@@ -34,7 +35,8 @@ class Station:
     @property
     def horizontal(self) -> np.ndarray:
         """Unit vector y'_k along the array's horizontal axis, shape (3,)."""
-        return np.array([-math.sin(self.normal_rad), math.cos(self.normal_rad), 0.0])
+        sine, cosine = portable.sine_cosine(self.normal_rad)
+        return np.array([-sine, cosine, 0.0])
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ _TWO_OVER_PI = 0.6366197723675814
 # Pi / 2 in parts of 33 bits: products with whole numbers below 2^20 are exact.
 _HALF_PI = (1.57079632673412561417, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 _LARGEST_ANGLE = 1.0e6
-_SINE = (
+SINE = (
     -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
     2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10,
 )  # fmt: skip
-_COSINE = (
+COSINE = (
     4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
     -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11,
 )  # fmt: skip
@@ -26,11 +26,13 @@ _EXPONENTIAL = (
     1.66666666666666019037e-01, -2.77777777770155933842e-03, 6.61375632143793436117e-05,
     -1.65339022054652515390e-06, 4.13813679705723846039e-08,
 )  # fmt: skip
-_LOGARITHM = (
+LOGARITHM = (
     6.666666666666735130e-01, 3.999999999940941908e-01, 2.857142874366239149e-01, 2.222219843214978396e-01,
     1.818357216161805012e-01, 1.531383769920937332e-01, 1.479819860511658591e-01,
 )  # fmt: skip
-_LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+LN_10 = 2.302585092994046
+"""Natural logarithm of 10."""
 _TANGENT = (
     3.33333333333329318027e-01, -1.99999999998764832476e-01, 1.42857142725034663711e-01, -1.11111104054623557880e-01,
     9.09088713343650656196e-02, -7.69187620504482999495e-02, 6.66107313738753120669e-02, -5.83357013379057348645e-02,
@@ -55,10 +57,10 @@ def _polynomial(x: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
 def _eighth(high: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sine and cosine of high + low, |high| <= pi / 4."""
     square = high * high
-    rest = _polynomial(square, _SINE[1:])
+    rest = _polynomial(square, SINE[1:])
     cube = square * high
-    sine = high - ((square * (0.5 * low - cube * rest) - low) - cube * _SINE[0])
-    rest = square * _polynomial(square, _COSINE)
+    sine = high - ((square * (0.5 * low - cube * rest) - low) - cube * SINE[0])
+    rest = square * _polynomial(square, COSINE)
     half = 0.5 * square
     one = 1.0 - half
     cosine = one + (((1.0 - one) - half) + (square * rest - high * low))
@@ -111,7 +113,7 @@ def exp(x: np.ndarray | float) -> np.ndarray:
     """Return e^x for x of any shape, |x| <= 700."""
     x = np.asarray(x, np.float64)
     twos = np.rint(x * 1.44269504088896338700)
-    high, low = x - twos * _LN2[0], twos * _LN2[1]
+    high, low = x - twos * LN2[0], twos * LN2[1]
     rest = high - low
     square = rest * rest
     c = rest - square * _polynomial(square, _EXPONENTIAL)
@@ -126,9 +128,9 @@ def log(x: np.ndarray | float) -> np.ndarray:
     twos = (twos - small).astype(np.float64)
     s = f / (2.0 + f)
     square = s * s
-    rest = square * _polynomial(square, _LOGARITHM)
+    rest = square * _polynomial(square, LOGARITHM)
     half = 0.5 * f * f
-    return twos * _LN2[0] - ((half - (s * (half + rest) + twos * _LN2[1])) - f)
+    return twos * LN2[0] - ((half - (s * (half + rest) + twos * LN2[1])) - f)
 
 
 def power(base: np.ndarray | float, exponent: float) -> np.ndarray:
@@ -213,3 +215,42 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def applied(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return matrix @ vector for each vector: (..., I, K) and (..., K) -> (..., I)."""
     return dot(matrix, np.asarray(vectors, np.float64)[..., None, :])
+
+
+def thinnest(vectors: np.ndarray) -> np.ndarray:
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its sign is arbitrary.
+
+    Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
+    """
+    columns = np.asarray(vectors, np.float64).T
+    moments = np.array([[total(a * b) for b in columns] for a in columns])
+    axes = np.eye(3)
+    # Each sweep squares what is left off the diagonal.
+    for _ in range(12):
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            if abs(moments[p, q]) <= 1e-30 * np.diagonal(moments).max():
+                continue
+            slope = (moments[q, q] - moments[p, p]) / (2 * moments[p, q])
+            tangent = (1.0 if slope >= 0 else -1.0) / (abs(slope) + np.sqrt(slope * slope + 1))
+            cosine = 1 / np.sqrt(tangent * tangent + 1)
+            turn = np.eye(3)
+            turn[p, p] = turn[q, q] = cosine
+            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
+            moments = product(product(turn.T, moments), turn)
+            moments[p, q] = moments[q, p] = 0.0
+            axes = product(axes, turn)
+    return axes[:, np.argmin(np.diagonal(moments))]
+
+
+def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
+    """Return the rotations (..., 3, 3) nearest to matrices (..., 3, 3) of positive determinant.
+
+    Source: Newton's iteration for the polar decomposition, Higham 1986.
+    """
+    result = np.asarray(matrices, np.float64)
+    # It squares its error in each step; blends of like rotations need five.
+    for _ in range(10):
+        rows = [np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)]
+        cofactors = np.stack(rows, axis=-2)
+        result = 0.5 * (result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None])
+    return result

@@ -9,8 +9,8 @@ import math
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
-from lowalt.motion.poses import attitude
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.targets.cloud import Cloud
 
@@ -49,7 +49,7 @@ def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, cle
     low, high = corners.min(axis=0), corners.max(axis=0)
     for _ in range(10_000):
         point = rng.uniform(low, high)
-        far = np.all(np.hypot(*(masts - point).T) >= clearance_m)
+        far = np.all(portable.dot(masts - point, masts - point) >= clearance_m * clearance_m)
         if far and np.all(_edges(corners, point) > 0):
             return point
     raise InputError(f"motion: no place in the region is {clearance_m} m away from every mast")
@@ -104,7 +104,7 @@ def draw(
     else:
         row["z_m"] = cloud.record["origin_height_m"]
         speed = rng.uniform(published["speed_lo"], published["speed_hi"])
-        velocity = speed * attitude(row["yaw_rad"], 0.0, 0.0)[:, 1]
-        row["vx_mps"], row["vy_mps"], row["vz_mps"] = map(float, velocity)
+        sine, cosine = map(float, portable.sine_cosine(row["yaw_rad"]))
+        row["vx_mps"], row["vy_mps"], row["vz_mps"] = -speed * sine, speed * cosine, 0.0
     _rates(rng, cloud, published, row, speed, settings["cadence"])
     return {"subtype": cloud.subtype, "category": cloud.category, **row}

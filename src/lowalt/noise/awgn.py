@@ -4,8 +4,10 @@ import math
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 from lowalt.common.power import rms
+from lowalt.noise.normals import circular
 
 
 def add_noise(
@@ -31,5 +33,11 @@ def add_noise(
     scale = rms(signal) if power is None else math.sqrt(power)
     if scale == 0:
         return signal.copy()
-    pair = rng.standard_normal((2, *signal.shape))
-    return signal + scale * 10 ** (-snr_db / 20) * math.sqrt(0.5) * (pair[0] + 1j * pair[1])
+    # Half the noise's power is in each part: sqrt(1/2) 10^(-SNR / 20).
+    share = math.sqrt(0.5) * float(portable.exp(-snr_db * (portable.LN_10 / 20)))
+    real, imaginary = circular(rng.bit_generator.random_raw(2 * signal.size), scale * share)
+    result = np.empty(signal.shape, np.complex128)
+    result.real, result.imag = (
+        part + more.reshape(signal.shape) for part, more in ((signal.real, real), (signal.imag, imaginary))
+    )
+    return result

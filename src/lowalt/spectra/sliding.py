@@ -11,11 +11,13 @@ bits on every machine that keeps IEEE 754. The kernels work in the precision of 
 import numpy as np
 from numba import njit
 
+from lowalt.common.portable import sine_cosine_turns
+
 
 def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:
     """Return cos and sin of -2 pi q / points, shape (points,) each, rounded once to `dtype`."""
-    angle = -2 * np.pi * np.arange(points) / points
-    return np.cos(angle).astype(dtype), np.sin(angle).astype(dtype)
+    sine, cosine = sine_cosine_turns(-np.arange(points) / points)
+    return cosine.astype(dtype), sine.astype(dtype)
 
 
 @njit(cache=True)

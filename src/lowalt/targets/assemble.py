@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.sampling import face_normals, sample_surface, thin
@@ -46,7 +47,7 @@ def allot(parts: list[Part], count: int, moving_share: float) -> list[int]:
     Raises: InputError where `count` leaves the body without a point.
     """
     weights = np.array([0.0 if part.kind == "body" else part.weight for part in parts])
-    wanted = count * moving_share * weights / max(weights.sum(), 1e-300)
+    wanted = count * moving_share * weights / max(float(portable.total(weights)), 1e-300)
     counts = [part.copies * max(1, round(want / part.copies)) for part, want in zip(parts, wanted, strict=True)]
     bodies = [index for index, part in enumerate(parts) if part.kind == "body"]
     counts[bodies[0]] = count - sum(value for index, value in enumerate(counts) if index != bodies[0])
@@ -62,7 +63,7 @@ def _tips(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     for vertex in np.unique(np.concatenate([surface.vertices.argmin(0), surface.vertices.argmax(0)])):
         # On a face, not at the vertex: there the normal is that of a surface.
         face = np.argmax(np.where((surface.faces == vertex).any(1), areas, -1.0))
-        corner, middle = surface.vertices[vertex], surface.vertices[surface.faces[face]].mean(0)
+        corner, middle = surface.vertices[vertex], portable.mean(surface.vertices[surface.faces[face]], 0)
         points.append(corner + 1e-4 * (middle - corner))
         normals.append(unit[face])
     return np.array(points), np.array(normals)
@@ -98,7 +99,8 @@ def turn(axis: np.ndarray, angle: float) -> np.ndarray:
     """Return the rotation matrix (3, 3) by `angle` (rad) about the unit vector `axis` (3,), Rodrigues' formula."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    sine, cosine = portable.sine_cosine(angle)
+    return np.eye(3) + sine * cross + (1 - cosine) * portable.product(cross, cross)
 
 
 def assemble(parts: list[Part], record: dict, moving_share: float, rng: np.random.Generator) -> Cloud:
@@ -113,8 +115,8 @@ def assemble(parts: list[Part], record: dict, moving_share: float, rng: np.rando
         for copy in range(part.copies):
             matrix = np.eye(3) if copy == 0 else turn(np.array(part.axis), 2 * np.pi * copy / part.copies)
             centre = np.zeros(3) if copy == 0 else np.array(part.hinge)
-            points.append((one - centre) @ matrix.T + centre)
-            normals.append(facing @ matrix.T)
+            points.append(portable.applied(matrix, one - centre) + centre)
+            normals.append(portable.applied(matrix, facing))
         owner.append(np.full(count, index))
     points = np.concatenate(points)
     record = record | {

@@ -4,6 +4,8 @@ Axes: front +y, right +x, up +z, metres; the origin lies half-way between bill t
 A positive angle about either hinge raises the wing's tip, on both sides.
 """
 
+import math
+
 import numpy as np
 
 from lowalt.targets.assemble import Part
@@ -85,7 +87,7 @@ def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[
     fingers = int(f["fingers"])
     tip = f["tip_chord"] * chord
     plan = [(0, 0.95), (0.35, 0.87), (0.62, 0.76)] if fingers else [(0, 0.95), (0.35, 0.81), (0.7, 0.57), (0.92, 0.28)]
-    rows = [(x + t * reach, y - back * t**1.5, z, max(c * chord, c * tip), 0.03) for t, c in plan]
+    rows = [(x + t * reach, y - back * t * math.sqrt(t), z, max(c * chord, c * tip), 0.03) for t, c in plan]
     if not fingers:
         return (foil([*rows, (half_span, y - 1.1 * back, z, min(0.5 * tip, 0.25 * chord), 0.03)], 0.06),)
     shells = [foil(rows, 0.06)]

@@ -9,7 +9,9 @@ import json
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
+from lowalt.common.portable import product
 from lowalt.targets import gait_run, gait_walk
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
@@ -48,20 +50,20 @@ def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
     The ball bends at push-off, or the toes would be driven into the ground. Estimate; continuously differentiable.
     """
     down, width = np.minimum(foot_rad, 0), np.radians(5)
-    return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * np.expm1(down / width)
+    return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * (portable.exp(down / width) - 1)
 
 
 def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.ndarray:
     """Return every bone's global rotation (F, 31, 3, 3); `leg(phase)` and `arm(phase)` give the right side's."""
     result = np.empty((len(phase), len(NODES), 3, 3))
-    pelvis = rotation("z", trunk["turn"]) @ rotation("y", trunk["list"])
-    chest = rotation("z", trunk["twist"]) @ rotation("x", -trunk["lean"])
+    pelvis = product(rotation("z", trunk["turn"]), rotation("y", trunk["list"]))
+    chest = product(rotation("z", trunk["twist"]), rotation("x", -trunk["lean"]))
     turned = {"root": pelvis}
     for name, share in _TRUNK_SHARE.items():
         below = 1 - share if name in ("lowerback", "upperback") else 0  # the neck comes back to straight ahead
         yaw = share * trunk["twist"] + below * trunk["turn"]
-        turned[name] = rotation("z", yaw) @ rotation("x", -share * trunk["lean"])
-        turned[name] = turned[name] @ rotation("y", below * trunk["list"])
+        turned[name] = product(rotation("z", yaw), rotation("x", -share * trunk["lean"]))
+        turned[name] = product(turned[name], rotation("y", below * trunk["list"]))
     for side, later in (("r", 0.0), ("l", 0.5)):
         hip, knee, ankle = leg((phase + later) % 1.0)
         shoulder, elbow = arm((phase + later) % 1.0)
@@ -73,9 +75,9 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
         turned[side + "foot"] = rotation("x", hip - knee + ankle)
         turned[side + "toes"] = rotation("x", _toe_pitch(hip - knee + ankle))
         turned[side + "clavicle"] = chest
-        turned[side + "humerus"] = chest @ rotation("x", shoulder)
+        turned[side + "humerus"] = product(chest, rotation("x", shoulder))
         for name in ("radius", "wrist", "hand", "fingers", "thumb"):
-            turned[side + name] = chest @ rotation("x", shoulder + elbow)
+            turned[side + name] = product(chest, rotation("x", shoulder + elbow))
     for index, name in enumerate(NODES):
         result[:, index] = turned[name]
     return result
@@ -103,7 +105,7 @@ def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple
         root, stride = gait_run.shift_m(phase), speed_mps * duration
     else:
         raise InputError(f"gait: {kind!r}, expected walk or run")
-    return forward_kinematics(root - root.mean(axis=0), turned, bones_m(stature_m)), duration, stride
+    return forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m)), duration, stride
 
 
 def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height_m: float = 0.02) -> float:
@@ -118,7 +120,7 @@ def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height
     lowest = feet[..., 2].argmin(axis=1)
     frames = np.arange(len(feet))
     down = feet[frames, lowest, 2] < feet[..., 2].min() + height_m
-    return float(np.linalg.norm(velocity[frames, lowest, :2], axis=-1)[down].mean())
+    return float(portable.mean(portable.norm(velocity[frames, lowest, :2])[down]))
 
 
 KEYS = ("gait", "speed_mps", "stature_m", "rate_hz", "person")

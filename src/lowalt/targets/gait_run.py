@@ -12,6 +12,7 @@ The hip's angles are those of the thigh against the vertical: [H] less the 1 deg
 
 import numpy as np
 
+from lowalt.common.portable import sine_cosine_turns
 from lowalt.targets.gait_walk import through
 
 STRIDES_PER_SECOND = 84.8 / 60
@@ -43,14 +44,14 @@ def leg(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def arm(phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return flexion (rad) of shoulder and elbow of the right arm, each shaped like `phase`."""
-    swing = np.cos(2 * np.pi * np.asarray(phase))
+    swing = sine_cosine_turns(phase)[1]
     shoulder = SHOULDER_DEG - SHOULDER_SWING_DEG * swing
     return np.radians(shoulder), np.radians(ELBOW_DEG - ELBOW_SWING_DEG * swing)
 
 
 def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
     """Return the trunk's rotations (rad) by name, as `gait_walk.trunk` does; each shaped like `phase`."""
-    swing = np.cos(2 * np.pi * np.asarray(phase))
+    swing = sine_cosine_turns(phase)[1]
     angles = {
         "list": np.zeros_like(swing),
         "turn": TURN_DEG * swing,
@@ -62,5 +63,5 @@ def trunk(phase: np.ndarray) -> dict[str, np.ndarray]:
 
 def shift_m(phase: np.ndarray) -> np.ndarray:
     """Return the root's periodic translation (..., 3) in metres: lowest in each mid-stance, highest in flight."""
-    up = -BOB_M * np.cos(4 * np.pi * (np.asarray(phase) - SUPPORT / 2))
+    up = -BOB_M * sine_cosine_turns(2 * np.asarray(phase) - SUPPORT)[1]
     return np.stack([np.zeros_like(up), np.zeros_like(up), up], axis=-1)

@@ -6,9 +6,9 @@ Source: "A global human walking model with real-time kinematic personification",
 """
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from lowalt.common.errors import InputError
+from lowalt.common.portable import sine_cosine_turns
 
 
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
@@ -17,10 +17,19 @@ def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
     Monotone between control points (Fritsch and Carlson 1980), so no overshoot; any values of `phase`.
     """
     times, values = np.array(sorted((time % 1.0, value) for time, value in points)).T
-    # Two periods on either side make the slopes at the seam those of the periodic curve.
-    shifts = np.arange(-2, 3)
-    curve = PchipInterpolator((times + shifts[:, None]).ravel(), np.tile(values, len(shifts)))
-    return curve(np.asarray(phase) % 1.0)
+    phase = np.asarray(phase) % 1.0
+    width, rise = np.diff(times, append=times[0] + 1), np.diff(values, append=values[0])
+    steep, before, earlier = rise / width, np.roll(width, 1), np.roll(rise / width, 1)
+    # The weighted harmonic mean of the slopes on both sides, 0 at a peak or a dip.
+    same = steep * earlier > 0
+    safe, first, second = np.where(same, steep * earlier, 1.0), 2 * width + before, width + 2 * before
+    slope = np.where(same, (first + second) * safe / (first * np.where(same, steep, 1.0) + second * earlier), 0.0)
+    left = np.searchsorted(times, phase, side="right") - 1
+    along = np.where(left < 0, phase + 1, phase) - times[left]
+    near, far, long = slope[left], np.roll(slope, -1)[left], width[left]
+    share, mean = along / long, steep[left]
+    square = along * (3 * mean - 2 * near - far) / long
+    return values[left] + along * (near + square - share * share * (2 * mean - near - far))
 
 
 def timing(rv: float) -> tuple[float, float, float]:
@@ -65,7 +74,7 @@ def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def arm(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return flexion (rad) of shoulder and elbow of the right arm, each shaped like `phase`."""
     swing = 9.88 * rv
-    shoulder = 3 - swing / 2 - swing * np.cos(2 * np.pi * np.asarray(phase))
+    shoulder = 3 - swing / 2 - swing * sine_cosine_turns(phase)[1]
     slow, middle, fast = min(rv, 0.5), min(max(rv - 0.5, 0) / 0.8, 1), max(rv - 1.3, 0) / 1.7
     elbow = [
         (0.05, 3 + 6 * slow + 8 * middle - 6 * fast),
@@ -88,16 +97,16 @@ def trunk(rv: float, phase: np.ndarray) -> dict[str, np.ndarray]:
     sway = np.select(
         [first, second, third],
         [
-            -drop + drop * np.cos(2 * np.pi * phase * 10 / 3),
-            -drop - drop * np.cos(2 * np.pi * (phase - 0.15) * 10 / 7),
-            drop - drop * np.cos(2 * np.pi * (phase - 0.5) * 10 / 3),
+            -drop + drop * sine_cosine_turns(phase * 10 / 3)[1],
+            -drop - drop * sine_cosine_turns((phase - 0.15) * 10 / 7)[1],
+            drop - drop * sine_cosine_turns((phase - 0.5) * 10 / 3)[1],
         ],
-        drop + drop * np.cos(2 * np.pi * (phase - 0.65) * 10 / 7),
+        drop + drop * sine_cosine_turns((phase - 0.65) * 10 / 7)[1],
     )
-    tilt = -8 * rv**2 + 8 * rv if rv < 0.5 else 2.0
-    lean = tilt - tilt * np.sin(2 * np.pi * (2 * phase - 0.1))
+    tilt = -8 * rv * rv + 8 * rv if rv < 0.5 else 2.0
+    lean = tilt - tilt * sine_cosine_turns(2 * phase - 0.1)[0]
     twist = through([(0.1, -4 / 3 * rv), (0.4, 1.5 * rv), (0.6, 4 / 3 * rv), (0.9, -1.5 * rv)], phase)
-    angles = {"list": sway, "turn": 4 * rv * np.cos(2 * np.pi * phase), "lean": lean, "twist": twist}
+    angles = {"list": sway, "turn": 4 * rv * sine_cosine_turns(phase)[1], "lean": lean, "twist": twist}
     return {name: np.radians(value) for name, value in angles.items()}
 
 
@@ -112,9 +121,9 @@ def shift(rv: float, phase: np.ndarray) -> np.ndarray:
     phase, up = np.asarray(phase), 0.015 * rv
     return np.stack(
         [
-            side * np.sin(2 * np.pi * (phase - 0.1)),
-            along * np.sin(2 * np.pi * (2 * phase + 2 * (0.625 - support))),
-            -up + up * np.sin(2 * np.pi * (2 * phase - 0.35)),
+            side * sine_cosine_turns(phase - 0.1)[0],
+            along * sine_cosine_turns(2 * phase + 2 * (0.625 - support))[0],
+            -up + up * sine_cosine_turns(2 * phase - 0.35)[0],
         ],
         axis=-1,
     )

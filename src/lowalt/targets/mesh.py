@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import sha256
 from lowalt.common.streams import stream
@@ -83,8 +84,8 @@ def _made_wheels(record: dict, rng: np.random.Generator) -> dict[tuple, tuple[np
 def _made_wheel(part: dict, samples: tuple[np.ndarray, np.ndarray], frame: np.ndarray) -> Pool:
     """Return the pool of a made wheel at its hinge, in the file's axes, mirrored on the left."""
     size, hinge = part["wheel"], np.array(part["hinge"], float)
-    side = np.array([np.sign(frame[0] @ hinge) or 1.0, 1, 1])
-    points, normals = (array * side @ frame for array in samples)
+    side = np.array([np.sign(portable.dot(frame[0], hinge)) or 1.0, 1, 1])
+    points, normals = (portable.applied(frame.T, array * side) for array in samples)
     area = np.pi * size["diameter_m"] * (size["diameter_m"] / 2 + size["width_m"])
     nothing = np.full(3, np.nan)
     # sample_part puts the points that bound the wheel first.
@@ -133,11 +134,11 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
         body = cut(body, mesh, region)[1]
     if not len(body.points):
         raise InputError(f"{where}: regions and drop leave nothing of {body_name}, expected a body")
-    closed = float(mesh.closed[mesh.component].mean())
+    closed = float(np.count_nonzero(mesh.closed[mesh.component]) / len(mesh.component))
     turned = {
         name: replace(
-            pool, points=pool.points @ frame.T, normals=pool.normals @ frame.T,
-            hinge=frame @ pool.hinge, axis=frame @ pool.axis,
+            pool, points=portable.applied(frame, pool.points), normals=portable.applied(frame, pool.normals),
+            hinge=portable.applied(frame, pool.hinge), axis=portable.applied(frame, pool.axis),
         )
         for name, pool in {body_name: body, **found}.items()
     }  # fmt: skip
@@ -159,7 +160,7 @@ def measured_m(size_is: str, parts: dict[str, Pool], kinds: dict[str, str]) -> f
         hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
         if len(hubs) < 2:
             raise InputError(f"size_is is 'motor diagonal' for {len(hubs)} rotors, expected at least two")
-        return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max())
+        return float(portable.norm(hubs[:, None] - hubs[None]).max())
     return float({"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, extent.max()))
 
 
@@ -197,7 +198,8 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
 def _turned_radius(pool: Pool) -> float:
     """Largest distance (m) of a part's samples from its axis."""
     away = pool.points - pool.hinge
-    return float(np.linalg.norm(away - (away @ pool.axis)[:, None] * pool.axis, axis=1).max())
+    along = portable.dot(away, pool.axis)[:, None]
+    return float(portable.norm(away - along * pool.axis).max())
 
 
 def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[dict[str, Pool], dict]:
@@ -211,7 +213,7 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
     result = {}
     for name, pool in parts.items():
         normals = pool.normals / scale
-        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        normals /= portable.norm(normals)[:, None]
         result[name] = replace(pool, points=pool.points * scale, normals=normals, hinge=pool.hinge * scale)
         if kinds[name] == "wheel":
             raw = 2 * _turned_radius(pool)
@@ -230,7 +232,7 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
     middle = (low + high) / 2
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
     if hubs:
-        middle[:2] = np.mean(hubs, axis=0)
+        middle[:2] = portable.mean(np.array(hubs), 0)
     if record["category"] == "Vehicle":
         facts["origin_height_m"] = float(middle[2] - ground)
     if record["category"] == "Bird":

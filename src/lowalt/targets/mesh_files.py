@@ -16,6 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import existing
 
@@ -43,7 +44,7 @@ class Mesh:
     def mapped(self, matrix: np.ndarray, offset: np.ndarray) -> "Mesh":
         """Return the mesh under x -> matrix @ x + offset; a mirroring matrix turns the faces: normals stay outward."""
         faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
-        return Mesh(self.vertices @ np.asarray(matrix, float).T + offset, faces, self.component, self.closed)
+        return Mesh(portable.applied(matrix, self.vertices) + offset, faces, self.component, self.closed)
 
 
 def joined(meshes: list[Mesh]) -> Mesh:
@@ -102,10 +103,14 @@ def _triangles(path: Path, geometry: list[str] | None) -> tuple[np.ndarray, np.n
         parts = []
         for node in sorted(scene.graph.nodes_geometry):
             place, name = scene.graph[node]
+            # A chain of transforms is multiplied by the machine's BLAS; its last bits are rounded away.
+            place = np.round(place, 12)
             if geometry is None or name in geometry:
                 mesh = scene.geometry[name]
                 if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                    vertices = trimesh.transform_points(mesh.vertices, place)
+                    # What is not finite is refused later, by name.
+                    with np.errstate(invalid="ignore"):
+                        vertices = portable.applied(place[:3, :3], mesh.vertices) + place[:3, 3]
                     faces = np.asarray(mesh.faces)
                     parts.append((vertices, faces[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else faces))
     except Exception as error:  # trimesh's readers raise whatever their format brings
@@ -177,7 +182,7 @@ def _outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> 
     closed = np.ones(count, bool)
     closed[component[first[uses != 2] % len(faces)]] = False
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    volume = np.bincount(component, np.einsum("ij,ij->i", a, np.cross(b, c)), minlength=count)
+    volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=count)
     inverted = closed & (volume < 0)
     return np.where(inverted[component][:, None], faces[:, ::-1], faces), closed
 

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
@@ -35,7 +36,7 @@ class Pool:
         """Return the samples of a mask (N,), in their order."""
         return replace(
             self, points=self.points[mask], normals=self.normals[mask], component=self.component[mask],
-            corners=int(mask[: self.corners].sum()), area=self.area * float(mask.mean()),
+            corners=int(mask[: self.corners].sum()), area=self.area * float(np.count_nonzero(mask) / max(1, len(mask))),
         )  # fmt: skip
 
 
@@ -45,7 +46,7 @@ def placed(mesh: Mesh, item: dict) -> Mesh:
     if "mirror" in item:
         matrix["xyz".index(item["mirror"])] *= -1
     if "turn" in item:
-        matrix = rotation(item["turn"]["axis"], np.radians(item["turn"]["deg"])) @ matrix
+        matrix = portable.product(rotation(item["turn"]["axis"], np.radians(item["turn"]["deg"])), matrix)
     return mesh.mapped(matrix, np.array(item.get("move", [0.0, 0, 0])))
 
 
@@ -62,7 +63,7 @@ def pool_of(mesh: Mesh, count: int, rng: np.random.Generator) -> Pool:
     normals, areas = face_normals(mesh.vertices, mesh.faces)
     return Pool(
         np.concatenate([along[corners], points]), normals[face], mesh.component[face], len(corners),
-        float(areas.sum()), np.full(3, np.nan), np.full(3, np.nan),
+        float(portable.total(areas)), np.full(3, np.nan), np.full(3, np.nan),
     )  # fmt: skip
 
 
@@ -78,7 +79,8 @@ def inside(points: np.ndarray, region: dict) -> np.ndarray:
     away = points - np.array(cylinder["centre"])
     axis = "xyz".index(cylinder["axis"])
     across = np.delete(away, axis, axis=1)
-    return (np.hypot(*across.T) <= cylinder["radius"]) & (abs(away[:, axis]) <= cylinder["half_length"])
+    far = portable.dot(across, across) > cylinder["radius"] * cylinder["radius"]
+    return ~far & (abs(away[:, axis]) <= cylinder["half_length"])
 
 
 def taken(pool: Pool, mesh: Mesh, region: dict) -> np.ndarray:
@@ -127,7 +129,7 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     """
     right = np.cross(front, up)
     hinge, axis = part.get("hinge", "found"), part.get("axis", "found")
-    centre = pool.points.mean(axis=0) if len(pool.points) else np.zeros(3)
+    centre = portable.mean(pool.points, 0) if len(pool.points) else np.zeros(3)
     if isinstance(hinge, str):
         hinge = centre
         if part["kind"] == "wheel":
@@ -138,13 +140,14 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     if isinstance(axis, str):
         if len(pool.points) < 4:
             raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")
-        axis = np.linalg.eigh(np.cov((pool.points - centre).T))[1][:, 0]
-    axis = np.array(axis, float) / np.linalg.norm(axis)
+        axis = portable.thinnest(pool.points - centre)
+    axis = np.array(axis, float)
+    axis = axis / portable.norm(axis)
     if part["kind"] == "rotor":
-        axis = axis * np.sign(axis @ up or 1) * (-1 if part.get("sense") == "cw" else 1)
+        axis = axis * np.sign(portable.dot(axis, up) or 1) * (-1 if part.get("sense") == "cw" else 1)
     elif part["kind"] == "wheel":
-        axis = axis * -np.sign(axis @ right or 1)
+        axis = axis * -np.sign(portable.dot(axis, right) or 1)
     else:
-        out = (centre - hinge) @ right
-        axis = axis * np.sign(np.cross(axis, out * right) @ up or 1)
+        out = portable.dot(centre - hinge, right)
+        axis = axis * np.sign(portable.dot(np.cross(axis, out * right), up) or 1)
     return replace(pool, hinge=hinge, axis=axis)

@@ -4,14 +4,15 @@ Here the angles turn the bones, the best cycle of the recording is found and clo
 front and scaled. What the files look like is in `mocap_files`. Axes of the result: x right, y front, z up, metres.
 """
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
+from lowalt.common.portable import applied, product
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
 from lowalt.targets.input_files import check_file_name
@@ -48,7 +49,7 @@ class Motion:
 def _euler(angles_rad: np.ndarray) -> np.ndarray:
     """Return rotations (..., 3, 3) for angles (..., 3): about x first, then y, then z (ASF's order XYZ)."""
     x, y, z = np.moveaxis(np.asarray(angles_rad, float), -1, 0)
-    return rotation("z", z) @ rotation("y", y) @ rotation("x", x)
+    return product(product(rotation("z", z), rotation("y", y)), rotation("x", x))
 
 
 def posed(skeleton: Skeleton, channels: dict[str, np.ndarray], rate_hz: float) -> Motion:
@@ -64,12 +65,13 @@ def posed(skeleton: Skeleton, channels: dict[str, np.ndarray], rate_hz: float) -
             if dof[0] == "r":
                 angles[:, "xyz".index(dof[1])] = np.radians(channels[name][:, column])
         frame = _euler(skeleton.axes_rad[index])
-        local = frame @ _euler(angles) @ frame.T
-        turned[:, index] = local if index == 0 else turned[:, PARENTS[index]] @ local
+        local = product(product(frame, _euler(angles)), frame.T)
+        turned[:, index] = local if index == 0 else product(turned[:, PARENTS[index]], local)
     order = [skeleton.dofs["root"].index(name) for name in ("tx", "ty", "tz")]
-    root = channels["root"][:, order] * skeleton.unit_m @ FROM_FILE.T
+    root = applied(FROM_FILE, channels["root"][:, order] * skeleton.unit_m)
     # Seen from our axes a rotation is P R P^T, a bone P b.
-    return Motion(root, FROM_FILE @ turned @ FROM_FILE.T, skeleton.bones * skeleton.unit_m @ FROM_FILE.T, rate_hz)
+    seen = product(product(FROM_FILE, turned), FROM_FILE.T)
+    return Motion(root, seen, applied(FROM_FILE, skeleton.bones * skeleton.unit_m), rate_hz)
 
 
 def nodes_m(motion: Motion) -> np.ndarray:
@@ -136,7 +138,7 @@ def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
     best = np.flatnonzero(good & (end - start == longest))
     best = best[np.argmin(distance[best])]
     found = int(start[best]), int(end[best])
-    return *found, fade, float(np.sqrt(((state[found[0]] - state[found[1]]) ** 2).sum() / len(NODES)))
+    return *found, fade, float(portable.norm(state[found[0]] - state[found[1]]) / np.sqrt(len(NODES)))
 
 
 def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
@@ -144,14 +146,15 @@ def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> 
     other: it would be shorter than `shortest` frames, or fewer than `fade` frames would follow it."""
     ends = np.arange(len(place))[None]
     length = ends - starts[:, None]
-    way = np.linalg.norm(place[None] - place[starts, None], axis=2)
+    way = portable.norm(place[None] - place[starts, None])
     return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
 
 
 def _mismatches(state: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Root mean square distance (S, F) over the nodes between the states at each start and at each end."""
-    square = (state**2).sum(axis=1)
-    return np.sqrt(np.maximum(square[starts, None] + square - 2 * state[starts] @ state.T, 0) / len(NODES))
+    square = portable.dot(state, state)
+    both = product(state[starts], state.T)
+    return np.sqrt(np.maximum(square[starts, None] + square - 2 * both, 0) / len(NODES))
 
 
 def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
@@ -171,17 +174,17 @@ def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.
     looped = root[start:end].copy()
     looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
     weight = weight[:, None, None, None]
-    left, _, right = np.linalg.svd(weight * turned[:fade] + (1 - weight) * motion.turned[after])
-    turned[:fade] = left @ right
+    turned[:fade] = portable.nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
     return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz
 
 
 def front(motion: Motion, direction: np.ndarray) -> Motion:
     """Return the motion turned about the vertical so that the horizontal `direction` (2,) becomes +y, and moved so
     that the root's mean is the origin."""
-    spin = rotation("z", np.array(math.atan2(direction[0], direction[1])))
-    root = motion.root_m @ spin.T
-    return Motion(root - root.mean(axis=0), spin @ motion.turned, motion.bones_m, motion.rate_hz)
+    sine, cosine = direction / portable.norm(direction)
+    spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    root = applied(spin, motion.root_m)
+    return Motion(root - portable.mean(root, 0), product(spin, motion.turned), motion.bones_m, motion.rate_hz)
 
 
 KEYS = ("skeleton", "motion", "first_frame", "last_frame", "rate_hz", "scale", "max_acceleration_mps2",
@@ -256,12 +259,16 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
             "choose first_frame and last_frame around a steady gait"
         )
     cycle, drift = closed(motion, start, end, fade)
+<<<<<<< HEAD
     looped = nodes_m(cycle)
     seam = np.concatenate([looped, looped[:2]])
     refuse_glitches(
         seam, motion.rate_hz, record["max_acceleration_mps2"], f"{paths[1]} (its closed cycle)", first + start
     )
     speed = float(np.hypot(*drift))
+=======
+    speed = float(portable.norm(drift))
+>>>>>>> 78e37bd (Compute clouds, motion tables, noise and the tables of tiles by operations that IEEE 754 fixes)
     if speed < 0.05:
         raise InputError(f"{paths[1]}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")
     stature = stature_m(motion.bones_m)

@@ -7,6 +7,7 @@ drawn systematically, which halves the unevenness before thinning and spares the
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 
 
@@ -17,7 +18,7 @@ def face_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, n
     """
     corners = np.asarray(vertices, float)[np.asarray(faces)]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(cross, axis=1)
+    length = portable.norm(cross)
     unit = np.divide(cross, length[:, None], out=np.zeros_like(cross), where=length[:, None] > 0)
     return unit, length / 2
 

@@ -6,6 +6,7 @@ end of the bone that carries its name, as in the CMU skeleton files. Axes: x rig
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.targets.cloud import Cloud
 
 LIMBS = {
@@ -42,7 +43,7 @@ def forward_kinematics(root_m: np.ndarray, rotations: np.ndarray, offsets_m: np.
     positions = np.empty((len(root_m), len(NODES), 3))
     positions[:, 0] = root_m
     for node in range(1, len(NODES)):
-        bone = rotations[:, node] @ offsets_m[node]
+        bone = portable.applied(rotations[:, node], offsets_m[node])
         positions[:, node] = positions[:, PARENTS[node]] + bone
     return positions
 
@@ -57,10 +58,10 @@ def stature_m(offsets_m: np.ndarray) -> float:
     def bone(name: str) -> np.ndarray:
         return offsets_m[NODES.index(name)]
 
-    spine = sum(np.linalg.norm(bone(name)) for name in _SPINE)
+    spine = sum(portable.norm(bone(name)) for name in _SPINE)
     legs = 0.0
     for side in "lr":
-        legs += sum(np.linalg.norm(bone(side + name)) for name in _LEG)
+        legs += sum(portable.norm(bone(side + name)) for name in _LEG)
         legs -= sum(bone(side + name)[2] for name in ("hipjoint", "foot", "toes"))
     return float(spine + legs / 2)
 
@@ -71,7 +72,7 @@ def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
     angle_rad = np.asarray(angle_rad, float)
     result = np.zeros((*angle_rad.shape, 3, 3))
     result[..., 3 - first - second, 3 - first - second] = 1.0
-    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    sin, cos = portable.sine_cosine(angle_rad)
     result[..., first, first] = result[..., second, second] = cos
     result[..., first, second], result[..., second, first] = -sin, sin
     return result

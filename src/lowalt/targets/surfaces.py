@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lowalt.common import portable
+
 
 @dataclass(frozen=True)
 class Surface:
@@ -25,13 +27,13 @@ class Surface:
         """Return the surface under a linear map (3, 3); a mirroring map turns the faces, so normals stay outward."""
         matrix = np.asarray(matrix, float)
         faces = self.faces[:, ::-1] if np.linalg.det(matrix) < 0 else self.faces
-        return Surface(self.vertices @ matrix.T, faces)
+        return Surface(portable.applied(matrix, self.vertices), faces)
 
 
 def volume(surface: Surface) -> float:
     """Return the enclosed volume, positive where the normals point outward (divergence theorem)."""
     a, b, c = np.moveaxis(surface.vertices[surface.faces], 1, 0)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+    return float(portable.total(portable.dot(a, np.cross(b, c))) / 6)
 
 
 def merged(surfaces: Iterable[Surface]) -> Surface:
@@ -54,9 +56,10 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
     # Blocks bound the memory of the points-by-triangles arrays.
     for block in np.array_split(near, len(near) * len(corners) // 30_000 + 1):
         a, b, c = np.moveaxis(corners[None] - points[block, None, None], 2, 0)
-        la, lb, lc = (np.sqrt(np.einsum("...i,...i->...", v, v)) for v in (a, b, c))
-        numerator = np.einsum("...i,...i->...", a, np.cross(b, c))
-        ab, bc, ca = (np.einsum("...i,...i->...", v, w) for v, w in ((a, b), (b, c), (c, a)))
+        la, lb, lc = (portable.norm(v) for v in (a, b, c))
+        numerator = portable.dot(a, np.cross(b, c))
+        ab, bc, ca = (portable.dot(v, w) for v, w in ((a, b), (b, c), (c, a)))
+        # The sum is 0 or 4 pi, so the last bits of the library's arc tangent cannot move it across 2 pi.
         angle = 2 * np.arctan2(numerator, la * lb * lc + ab * lc + bc * la + ca * lb)
         result[block] = angle.sum(1) > 2 * np.pi
     return result
@@ -70,7 +73,7 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     """
     sections = np.asarray(sections, float)
     rows, sides, _ = sections.shape
-    tips = sections[[0, -1]].mean(1) if tips is None else np.asarray(tips, float)
+    tips = portable.mean(sections[[0, -1]], 1) if tips is None else np.asarray(tips, float)
     grid = np.arange(rows * sides).reshape(rows, sides)
     a, b = grid[:-1], np.roll(grid[:-1], -1, 1)
     c, d = np.roll(grid[1:], -1, 1), grid[1:]
@@ -90,20 +93,16 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
 
 def superellipse(half_a: float, half_b: float, exponent: float = 2.0, sides: int = 24) -> np.ndarray:
     """Return the loop |a/A|^n + |b/B|^n = 1, shape (sides, 2): n = 2 an ellipse, larger n a rounded rectangle."""
-    angle = 2 * np.pi * np.arange(sides) / sides
-    c, s = np.cos(angle), np.sin(angle)
-    power = 2 / exponent
-    return np.stack([half_a * np.sign(c) * abs(c) ** power, half_b * np.sign(s) * abs(s) ** power], 1)
+    s, c = portable.sine_cosine_turns(np.arange(sides) / sides)
+    along, across = (np.sign(part) * portable.power(abs(part), 2 / exponent) for part in (c, s))
+    return np.stack([half_a * along, half_b * across], 1)
 
 
 def ellipsoid(radii: Iterable[float], centre: Iterable[float] = (0, 0, 0), sides: int = 16) -> Surface:
     """Return an ellipsoid with the half axes `radii` (3,) about `centre` (3,)."""
-    polar = np.pi * np.arange(1, sides // 2) / (sides // 2)
-    turn = 2 * np.pi * np.arange(sides) / sides
-    ring = np.stack([np.cos(turn), np.sin(turn)], 1)
-    rings = np.concatenate(
-        [np.sin(polar)[:, None, None] * ring, np.broadcast_to(np.cos(polar)[:, None, None], (len(polar), sides, 1))], 2
-    )
+    out, up = portable.sine_cosine_turns(np.arange(1, sides // 2) / (2 * (sides // 2)))
+    ring = np.stack(portable.sine_cosine_turns(np.arange(sides) / sides)[::-1], 1)
+    rings = np.concatenate([out[:, None, None] * ring, np.broadcast_to(up[:, None, None], (len(up), sides, 1))], 2)
     unit = loft(rings, tips=[[0, 0, 1], [0, 0, -1]])
     return unit.mapped(np.diag(np.asarray(radii, float))).moved(centre)
 
@@ -113,14 +112,14 @@ def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surfac
     path = np.asarray(path, float)
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
     tangents = np.gradient(path, axis=0)
-    tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
+    tangents /= portable.norm(tangents)[:, None]
     # One reference direction for all sections, the one least along the path, keeps the loops from twisting.
     reference = np.eye(3)[np.argmin(abs(tangents).max(0))]
     first = np.cross(tangents, reference)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
+    first /= portable.norm(first)[:, None]
     second = np.cross(tangents, first)
-    turn = 2 * np.pi * np.arange(sides) / sides
-    rings = np.cos(turn)[None, :, None] * first[:, None] + np.sin(turn)[None, :, None] * second[:, None]
+    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    rings = cosine[None, :, None] * first[:, None] + sine[None, :, None] * second[:, None]
     return loft(path[:, None] + radii[:, None, None] * rings)
 
 
@@ -140,7 +139,7 @@ def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow:
         loop = superellipse(half_width, (high - low) / 2, exponent, sides)
         sections.append(np.stack([loop[:, 0], np.full(sides, y), loop[:, 1] + (low + high) / 2], 1))
     sections = np.array(sections)
-    tips = sections[[0, -1]].mean(1)
+    tips = portable.mean(sections[[0, -1]], 1)
     tips[:, 1] += bow * np.array([-1, 1]) * np.sign(table[-1, 0] - table[0, 0])
     return loft(sections, tips)
 
@@ -154,9 +153,9 @@ def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: fl
 def ring(profile: np.ndarray, sides: int = 32) -> Surface:
     """Return a closed profile (S, 2) of (radius, height) turned about the z axis: a tyre, a duct, a torus."""
     profile = np.asarray(profile, float)
-    turn = 2 * np.pi * np.arange(sides) / sides
-    x = np.cos(turn)[:, None] * profile[:, 0]
-    y = np.sin(turn)[:, None] * profile[:, 0]
+    sine, cosine = portable.sine_cosine_turns(np.arange(sides) / sides)
+    x = cosine[:, None] * profile[:, 0]
+    y = sine[:, None] * profile[:, 0]
     vertices = np.stack([x, y, np.broadcast_to(profile[:, 1], x.shape)], -1)
     grid = np.arange(x.size).reshape(x.shape)
     right, up = np.roll(grid, -1, 0), np.roll(grid, -1, 1)
@@ -172,8 +171,8 @@ def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
     `thickness` is the largest thickness over the chord; the trailing edge is blunt, a fiftieth of that thick.
     Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
-    x = (1 - np.cos(np.pi * np.arange(panels + 1) / panels)) / 2
-    y = 5 * thickness * (0.2969 * np.sqrt(x) - 0.1260 * x - 0.3516 * x**2 + 0.2843 * x**3 - 0.1015 * x**4)
+    x = (1 - portable.sine_cosine_turns(np.arange(panels + 1) / (2 * panels))[1]) / 2
+    y = 5 * thickness * (0.2969 * np.sqrt(x) + x * (-0.1260 + x * (-0.3516 + x * (0.2843 - 0.1015 * x))))
     loop = np.concatenate([np.stack([x, y], 1), np.stack([x, -y], 1)[:0:-1]]) * chord
     return np.stack([chord / 4 - loop[:, 0], loop[:, 1]], 1)
 
@@ -187,7 +186,7 @@ def foil(stations: Iterable[tuple], thickness: float = 0.12) -> Surface:
     sections = []
     for x, y, z, chord, twist in stations:
         loop = airfoil(chord, thickness)
-        c, s = np.cos(twist), np.sin(twist)
+        s, c = portable.sine_cosine(twist)
         along, across = loop[:, 0] * c - loop[:, 1] * s, loop[:, 0] * s + loop[:, 1] * c
         sections.append(np.stack([np.full(len(loop), float(x)), y + along, z + across], 1))
     return loft(np.array(sections))

@@ -6,6 +6,7 @@ What a layout needs is in FIGURES; where a number below is a plain factor it onl
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import box, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
@@ -45,7 +46,7 @@ def fault(record: dict) -> str | None:
         return f"model is {record['model']}, which has {len(places)} rotors, expected one of {count}"
     if record.get("coaxial") and record["model"] != "cabin":
         return f"coaxial is True, expected it with model cabin only, not {record['model']}"
-    gap = np.linalg.norm(places - np.roll(places, 1, 0), axis=1).min()
+    gap = portable.norm(places - np.roll(places, 1, 0)).min()
     diameter = figures["propeller_diameter"]
     if diameter >= gap:
         return f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m between motors"
@@ -77,13 +78,13 @@ def ducted(record: dict, f: dict) -> list[Part]:
     outer = (record["published"]["size_m"] - motor_diagonal(record)) / 2
     inner, half = f["propeller_diameter"] / 2 * 1.04, f["duct_height"] / 2
     middle, wall = (inner + outer) / 2, (outer - inner) / 2
-    turn = 2 * np.pi * np.arange(10) / 10
-    duct = ring(np.stack([middle + wall * np.cos(turn), half * np.sin(turn)], 1), 40)
+    sine, cosine = portable.sine_cosine_turns(np.arange(10) / 10)
+    duct = ring(np.stack([middle + wall * cosine, half * sine], 1), 40)
     shells = [duct.moved((x, y, 0)) for x, y in places] + motors(places, 0.0, f)
     for x, y in places:
         low = -f["motor_height"] - f["arm_diameter"] / 2
-        for angle in np.pi / 2 + np.arange(3) * 2 * np.pi / 3:
-            end = (x + middle * np.cos(angle), y + middle * np.sin(angle), low)
+        for sine, cosine in zip(*portable.sine_cosine_turns(1 / 4 + np.arange(3) / 3), strict=True):
+            end = (x + middle * cosine, y + middle * sine, low)
             shells.append(tube([(x, y, low), end], f["arm_diameter"] / 2, 8))
     pod = fuselage(f, 0.8).moved((0, 0, f["body_height"] / 2))
     battery = box((0.75 * f["body_width"], 0.45 * f["body_length"], 0.45 * f["body_height"]),
@@ -127,8 +128,10 @@ def radial(record: dict, f: dict) -> list[Part]:
     cell = f["battery_length"]
     for x, y in places:
         shells.append(tube([(0.2 * x, 0.2 * y, 0), (x, y, 0)], arm))
-        turn = np.arctan2(y, x) - np.pi / 2
-        spin = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        # From the front to the arm's direction: the arm's angle less a quarter turn.
+        far = np.sqrt(x * x + y * y)
+        sine, cosine = -x / far, y / far
+        spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
         reach = 0.36 * f["body_length"]
         pack = box((0.4 * cell, cell, 0.5 * cell), (0, reach, 0.5 * f["body_height"]))
         shells.append(pack.mapped(spin))

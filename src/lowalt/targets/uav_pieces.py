@@ -5,6 +5,7 @@ Axes: front +y, right +x, up +z, metres. `figure` is a record's figures in SI un
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tube
 
@@ -28,11 +29,12 @@ def hubs(record: dict, ratio: float | None) -> np.ndarray:
     reach = motor_diagonal(record) / 2
     count = record["published"]["n_rotors_or_wings"]
     if ratio is not None:
-        half = np.arctan(ratio)
-        angle = np.pi / 2 + np.array([-half, half, np.pi - half, np.pi + half])
+        slant = np.sqrt(1 + ratio * ratio)
+        front = np.array([1, 1, -1, -1]) / slant
+        right = np.array([1, -1, -1, 1]) * ratio / slant
     else:
-        angle = np.pi / 2 + 2 * np.pi * (np.arange(count) - 0.5) / count
-    return reach * np.stack([np.cos(angle), np.sin(angle)], 1)
+        front, right = portable.sine_cosine_turns(1 / 4 + (np.arange(count) - 0.5) / count)
+    return reach * np.stack([right, front], 1)
 
 
 def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
@@ -42,7 +44,7 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
     """
     stations = np.array([root, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
     chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
-    twist = np.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
+    twist = portable.arctan(4 / 3 / (2 * np.pi * np.maximum(stations, 0.2)))
     return foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
 
 
@@ -51,8 +53,10 @@ def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
-    out = np.arctan2(hub[1], hub[0]) + np.pi / 2
-    turn = np.array([[np.cos(out), -np.sin(out), 0], [np.sin(out), np.cos(out), 0], [0, 0, 1]])
+    # The hub's direction and a quarter turn more.
+    far = np.sqrt(hub[0] * hub[0] + hub[1] * hub[1])
+    sine, cosine = (hub[0] / far, -hub[1] / far) if far > 0 else (1.0, 0.0)
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
     axis = (0.0, 0.0, float(sense))
     return Part(name, "rotor", (shell.mapped(turn).moved(hub),), tuple(hub), axis, copies=int(figure["blade_count"]))
 

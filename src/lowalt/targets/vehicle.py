@@ -6,6 +6,7 @@ half the height above the ground.
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, box, cylinder, hull, loft, ring, superellipse
 
@@ -94,9 +95,9 @@ def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
     to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     shells = [ring(loop, 32).mapped(to_x), cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0))]
     for k in range(SPOKES):
-        angle = 2 * np.pi * k / SPOKES
-        out = np.array([0, np.cos(angle), np.sin(angle)])
-        across = np.array([0, -np.sin(angle), np.cos(angle)])
+        sine, cosine = portable.sine_cosine_turns(k / SPOKES)
+        out = np.array([0, cosine, sine])
+        across = np.array([0, -sine, cosine])
         side = np.array([1.0, 0, 0])
         section = superellipse(0.12 * radius, 0.2 * half, 4.0, 8)
         rows = [out * r + 0.35 * half * side + section[:, :1] * across + section[:, 1:] * side

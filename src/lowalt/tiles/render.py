@@ -13,6 +13,7 @@ from numba import njit
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.common.portable import sine_cosine
 from lowalt.spectra.settings import Spectra, windows
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
@@ -85,7 +86,8 @@ class Renderer:
         self.matched = []
         for station in network.stations:
             phase = 4 * np.pi * station.frequency_hz * network.symbol_interval_s / SPEED_OF_LIGHT * steps
-            self.matched.append((np.cos(phase).astype(np.float32), np.sin(phase).astype(np.float32)))
+            sine, cosine = sine_cosine(phase)
+            self.matched.append((cosine.astype(np.float32), sine.astype(np.float32)))
         self.share = np.array([(length / (length + 1)) ** 2], np.float32)
         tables = {name: lookup(images.scale, 127 if name == "vt" else 255) for name in VIEWS}
         self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in tables.items()}
@@ -194,8 +196,9 @@ def normalised(signal: np.ndarray) -> np.ndarray:
     if largest == 0:
         return signal.astype(np.complex64)
     exponent = int(np.frexp(largest)[1])
-    parts = (np.ldexp(signal.real, -exponent), np.ldexp(signal.imag, -exponent))
-    return (parts[0] + 1j * parts[1]).astype(np.complex64)
+    result = np.empty(signal.shape, np.complex64)
+    result.real, result.imag = np.ldexp(signal.real, -exponent), np.ldexp(signal.imag, -exponent)
+    return result
 
 
 def split(tile: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 
 
@@ -27,7 +28,7 @@ def triangle(size: int, out: int) -> np.ndarray:
     ratio = size / out
     distance = np.arange(size) + 0.5 - (np.arange(out)[:, None] + 0.5) * ratio
     weights = np.maximum(0.0, 1 - np.abs(distance) / max(1.0, ratio))
-    weights /= weights.sum(axis=1, keepdims=True)
+    weights /= portable.total(weights, 1)[:, None]
     weights.setflags(write=False)
     return weights
 

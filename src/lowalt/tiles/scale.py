@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.common.errors import InputError
 
 SCALES = ("linear", "decibel", "power")
@@ -37,8 +38,8 @@ class Scale:
         """Return the x at which the index rises to 1 .. levels, shape (levels,), float64, ascending, in (0, 1)."""
         y = (np.arange(1, levels + 1) - 0.5) / levels
         if self.name == "decibel":
-            return 10 ** (self.floor_db * (y - 1) / 20)
-        return y if self.name == "linear" else y ** (1 / self.gamma)
+            return portable.exp(self.floor_db * (y - 1) * (portable.LN_10 / 20))
+        return y if self.name == "linear" else portable.power(y, 1 / self.gamma)
 
 
 def index(values: np.ndarray, scale: Scale, signed: bool) -> np.ndarray:
@@ -78,7 +79,7 @@ def lookup(scale: Scale, levels: int) -> Lookup:
     thresholds = scale.thresholds(levels).astype(np.float32)
     bits = thresholds.view(np.int32)
     top = int(np.float32(1).view(np.int32))
-    lowest = int(np.float32(2.0 ** np.floor(np.log2(thresholds[0]))).view(np.int32))
+    lowest = int(np.ldexp(np.float32(1), np.frexp(thresholds[0])[1] - 1).view(np.int32))
     shift, keys = 0, bits
     for mantissa in range(6, 24):
         shift = 23 - mantissa
