@@ -218,7 +218,7 @@ def applied(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def thinnest(vectors: np.ndarray) -> np.ndarray:
-    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its sign is arbitrary.
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its largest part is positive.
 
     Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
     """
@@ -239,7 +239,8 @@ def thinnest(vectors: np.ndarray) -> np.ndarray:
             moments = product(product(turn.T, moments), turn)
             moments[p, q] = moments[q, p] = 0.0
             axes = product(axes, turn)
-    return axes[:, np.argmin(np.diagonal(moments))]
+    axis = axes[:, np.argmin(np.diagonal(moments))]
+    return axis * np.sign(axis[np.argmax(np.abs(axis))]) + 0.0
 
 
 def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
