@@ -259,16 +259,12 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
             "choose first_frame and last_frame around a steady gait"
         )
     cycle, drift = closed(motion, start, end, fade)
-<<<<<<< HEAD
     looped = nodes_m(cycle)
     seam = np.concatenate([looped, looped[:2]])
     refuse_glitches(
         seam, motion.rate_hz, record["max_acceleration_mps2"], f"{paths[1]} (its closed cycle)", first + start
     )
-    speed = float(np.hypot(*drift))
-=======
     speed = float(portable.norm(drift))
->>>>>>> 78e37bd (Compute clouds, motion tables, noise and the tables of tiles by operations that IEEE 754 fixes)
     if speed < 0.05:
         raise InputError(f"{paths[1]}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")
     stature = stature_m(motion.bones_m)

@@ -85,13 +85,9 @@ def read_skeleton(path: str | Path) -> Skeleton:
         for name in LIMBS:
             block, index = named[name], NODES.index(name)
             direction = np.array([float(word) for word in block["direction"]])
-<<<<<<< HEAD
             if float(block["length"][0]) < 0:
                 raise InputError(f"{path}: length of {name} is {block['length'][0]}, expected at least 0")
-            bones[index] = direction / np.linalg.norm(direction) * float(block["length"][0])
-=======
             bones[index] = direction / portable.norm(direction) * float(block["length"][0])
->>>>>>> 78e37bd (Compute clouds, motion tables, noise and the tables of tiles by operations that IEEE 754 fixes)
             if block["axis"][3].upper() != "XYZ":
                 raise InputError(f"{path}: axis order of {name} is {block['axis'][3]!r}, expected XYZ")
             axes[index] = np.radians([float(word) for word in block["axis"][:3]])
