@@ -4,6 +4,7 @@ Here the angles turn the bones, the best cycle of the recording is found and clo
 front and scaled. What the files look like is in `mocap_files`. Axes of the result: x right, y front, z up, metres.
 """
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
