@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost accuracy effects scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real test test-slow lint format bench cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -61,10 +61,10 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 cost: $(SETUP)  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
 	$(SNAKEMAKE) -- cost
 
-accuracy: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png
+accuracy-cost: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
 	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
-	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy
+	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost
 
 # The paper's scene first: its model is what the other scenes' samples are tried on, beside a model of their own.
 scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained without effects, and of their own
@@ -72,10 +72,11 @@ scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained w
 	for scene in urban worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
 		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
 
-effects: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
-	$(SNAKEMAKE) -- effects
+effects-cost: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
+	$(SNAKEMAKE) -- effects_cost
 
-tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data; three times: make tables OVERLAY=config/seeds.yaml
+tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data, into results/tables; three times: make tables OVERLAY=config/seeds.yaml
+	$(SNAKEMAKE)
 	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
@@ -86,10 +87,10 @@ space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/t
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) --out results/reference/space.csv
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
-	for table in $(TABLES); do cp results/default/$$table.csv results/reference/tables-$$table.csv; done
+	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done
 	$(BIN)/python -m lowalt.report.documents design/recognition.md schemes=results/reference/tables-
 
-reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy` and write it into the documents
+reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy-cost` and write it into the documents
 	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end; done
 	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
 
@@ -103,4 +104,4 @@ pins: $(SETUP)  ## write the installed versions as the pins
 	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
 
 help:
-	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'

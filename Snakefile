@@ -11,13 +11,13 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/targets.smk"
 include: "workflow/rules/motion.smk"
 include: "workflow/rules/occluders.smk"
-include: "workflow/rules/effects.smk" if config["effects"] else "workflow/rules/echo.smk"
+include: "workflow/rules/echo_in_scene.smk" if config["effects"] else "workflow/rules/echo.smk"
 include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
-include: "workflow/rules/cost.smk"
 include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
-include: "workflow/rules/accuracy.smk"
+include: "workflow/rules/cost.smk"
+include: "workflow/rules/accuracy_cost.smk"
 include: "workflow/rules/effects_table.smk"
 include: "workflow/rules/report.smk"
 
@@ -28,13 +28,13 @@ localrules:
     signals,
     data,
     models,
-    accuracy,
     cost,
-    effects,
+    accuracy_cost,
+    effects_cost,
 
 
 onstart:
-    space_check.before(workflow, PLAN, config)
+    space_check.before(workflow, RUN.plan, config)
 
 
 onerror:
@@ -44,49 +44,49 @@ onerror:
 rule all:
     default_target: True
     input:
-        f"results/{RUN}/report.html",
-        f"results/{RUN}/accuracy.csv",
-        f"results/{RUN}/shards/README.md",
-        [f"results/{RUN}/transfer.csv"] if OTHERS else [],
+        f"results/{RUN.name}/report.html",
+        f"results/{RUN.name}/accuracy.csv",
+        f"{DATA}/shards/README.md",
+        [f"results/{RUN.name}/transfer.csv"] if config["recognition"]["transfer"] else [],
 
 
 rule clouds:
     input:
-        expand("results/{run}/clouds/{subtype}.npz", run=RUN, subtype=SLUGS),
-        f"results/{RUN}/clouds.png",
+        expand("results/{run}/clouds/{subtype}.npz", run=RUN.name, subtype=RUN.subtypes),
+        f"results/{RUN.name}/clouds.png",
 
 
 rule signals:
     input:
-        expand("results/{run}/noisy/{chunk}.npy", run=RUN, chunk=PLAN.chunks),
+        expand("results/{run}/noisy/{chunk}.npy", run=RUN.name, chunk=RUN.plan.chunks),
 
 
 rule data:
     input:
-        f"results/{RUN}/shards/index.json",
-        f"results/{RUN}/shards/README.md",
+        f"results/{RUN.name}/shards/index.json",
+        f"results/{RUN.name}/shards/README.md",
 
 
 rule models:
     input:
-        expand("results/{run}/models/{training}/model.pt", run=RUN, training=TRAININGS),
-        f"results/{RUN}/config.yaml",
-
-
-rule accuracy:
-    input:
-        f"results/{RUN}/accuracy_cost.csv",
-        f"results/{RUN}/accuracy_cost.png",
+        expand("results/{run}/models/{training}/model.pt", run=RUN.name, training=RUN.trainings),
+        f"results/{RUN.name}/config.yaml",
 
 
 rule cost:
     input:
-        f"results/{RUN}/cost.csv",
-        f"results/{RUN}/cost_pixels.csv",
-        f"results/{RUN}/cost.png",
+        f"results/{RUN.name}/cost.csv",
+        f"results/{RUN.name}/cost_pixels.csv",
+        f"results/{RUN.name}/cost.png",
 
 
-rule effects:
+rule accuracy_cost:
     input:
-        f"results/{RUN}/effects.csv",
-        f"results/{RUN}/effects.png",
+        f"results/{RUN.name}/accuracy_cost.csv",
+        f"results/{RUN.name}/accuracy_cost.png",
+
+
+rule effects_cost:
+    input:
+        f"results/{RUN.name}/effects.csv",
+        f"results/{RUN.name}/effects.png",

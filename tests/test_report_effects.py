@@ -348,10 +348,10 @@ def test_effects_are_priced_where_asked_for_and_nowhere_else(tmp_path):
     folder = workplace(tmp_path)
     priced = {"effect_samples", "occluders", "effects_table"}
     assert not priced & planned(folder)
-    assert priced | {"cloud", "motion", "train"} <= planned(folder, "--", "effects")
+    assert priced | {"cloud", "motion", "train"} <= planned(folder, "--", "effects_cost")
     shown = folder / "shown.yaml"
     shown.write_text("report: {effects: true}\n")
     assert priced | {"report"} <= planned(folder, "--configfile", "overlay.yaml", str(shown))
     shown.write_text("effects: {adc: {}}\n")
-    text = snakemake(folder, "-n", "--configfile", "overlay.yaml", str(shown), "--", "effects", good=False)
+    text = snakemake(folder, "-n", "--configfile", "overlay.yaml", str(shown), "--", "effects_cost", good=False)
     assert "effects: ['adc'], expected none" in text

@@ -7,7 +7,7 @@ rule cost_table:
     input:
         code=code("lowalt.measure.echo_cost"),
         targets=config["targets"]["table"],
-        clouds=cost_clouds,
+        clouds=products.cost_clouds,
     output:
         "results/{run}/cost.csv",
     log:
@@ -18,7 +18,7 @@ rule cost_table:
         "../../envs/environment.yaml"
     threads: workflow.cores
     params:
-        settings=cost_settings("network", "motion"),
+        settings=settings.cost_table,
     shell:
         "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
         " python -m lowalt.measure.echo_cost --settings {params.settings:q} --clouds {input.clouds:q}"
@@ -30,7 +30,7 @@ rule cost_pixels:
         code=code("lowalt.measure.echo_pixels"),
         targets=config["targets"]["table"],
         table="results/{run}/cost.csv",
-        clouds=cost_clouds,
+        clouds=products.cost_clouds,
     output:
         "results/{run}/cost_pixels.csv",
     log:
@@ -40,7 +40,7 @@ rule cost_pixels:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=cost_settings("network", "motion", "spectra", "images"),
+        settings=settings.cost_pixels,
     shell:
         "python -m lowalt.measure.echo_pixels --settings {params.settings:q} --table {input.table:q}"
         " --clouds {input.clouds:q} --targets {input.targets:q} --out {output:q} 2> {log:q}"

@@ -7,7 +7,7 @@ rule echo:
     input:
         code=code("lowalt.echo"),
         motion="results/{run}/motion/{group}-{part}.csv",
-        clouds=group_clouds,
+        clouds=products.group_clouds,
     output:
         expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
     log:
@@ -17,8 +17,8 @@ rule echo:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"network": config["network"], "tolerance": config["echo"]["tolerance"]}),
-        stations=heard_stations,
+        settings=settings.echo,
+        stations=products.heard,
     shell:
         "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " --station {params.stations:q} --out {output:q} 2> {log:q}"

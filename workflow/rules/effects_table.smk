@@ -5,10 +5,10 @@
 
 rule effect_samples:
     input:
-        code=call_code,
+        code=lambda wildcards: code("lowalt.measure.effects_samples", *calls.modules(wildcards.call)),
         motion="results/{run}/motion/{group}-00000.csv",
-        clouds=group_clouds,
-        occluders=call_occluders,
+        clouds=products.group_clouds,
+        occluders=products.call_occluders,
     output:
         "results/{run}/effects/{group}-{call}.npz",
     log:
@@ -18,8 +18,8 @@ rule effect_samples:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=call_settings,
-        occluders=occluders_option,
+        settings=settings.effect_samples,
+        occluders=options.occluders,
     shell:
         "python -m lowalt.measure.effects_samples --settings {params.settings:q} --motion {input.motion:q}"
         " --clouds {input.clouds:q} {params.occluders} --out {output:q} 2> {log:q}"
@@ -28,8 +28,8 @@ rule effect_samples:
 rule effects_table:
     input:
         code=code("lowalt.measure.effects_cost"),
-        samples=call_files,
-        model=asked_model,
+        samples=products.call_samples,
+        model=products.asked_model,
     output:
         "results/{run}/effects.csv",
     log:
@@ -40,7 +40,7 @@ rule effects_table:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     params:
-        settings=canonical({"seed": config["seed"], "evaluation": config["recognition"]["evaluation"]}),
+        settings=settings.effects_table,
     shell:
         "python -m lowalt.measure.effects_cost --settings {params.settings:q} --samples {input.samples:q}"
         " --model {input.model:q} --out {output:q} 2> {log:q}"
@@ -50,7 +50,7 @@ rule effects_figure:
     input:
         code=code("lowalt.report.figures.effects"),
         table="results/{run}/effects.csv",
-        samples=call_files,
+        samples=products.call_samples,
     output:
         "results/{run}/effects.png",
     log:

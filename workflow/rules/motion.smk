@@ -6,7 +6,7 @@
 rule motion:
     input:
         code=code("lowalt.motion"),
-        clouds=group_clouds,
+        clouds=products.group_clouds,
     output:
         "results/{run}/motion/{group}-{part}.csv",
     log:
@@ -16,8 +16,8 @@ rule motion:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=motion_settings,
-        span=motion_span,
+        settings=settings.motion,
+        span=products.span,
     shell:
         "python -m lowalt.motion --settings {params.settings:q} --clouds {input.clouds:q}"
         " --group {wildcards.group} {params.span} --out {output:q} 2> {log:q}"

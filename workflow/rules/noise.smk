@@ -7,8 +7,8 @@ rule noise:
     input:
         code=code("lowalt.noise"),
         motion="results/{run}/motion/{group}-{part}.csv",
-        echoes=chunk_echoes,
-        powers=chunk_powers,
+        echoes=products.chunk_echoes,
+        powers=products.chunk_powers,
     output:
         "results/{run}/noisy/{group}-{part}.npy",
     log:
@@ -18,8 +18,8 @@ rule noise:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"seed": config["seed"], "stations": STATIONS, "snr_db": config["noise"]["snr_db"]}),
-        powers=powers_option,
+        settings=settings.noise,
+        powers=options.powers,
     shell:
         "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
         " --echoes {input.echoes:q} {params.powers} --out {output:q} 2> {log:q}"

@@ -6,7 +6,7 @@
 rule occluders:
     input:
         code=code("lowalt.targets.occluders", *SOURCE_MODULES),
-        files=record_files,
+        files=products.record_files,
     output:
         "results/{run}/occluders/{subtype}.npz",
     log:
@@ -16,7 +16,7 @@ rule occluders:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=cloud_settings,
-        inputs=f"--inputs {INPUTS}" if INPUTS else "",
+        settings=settings.cloud,
+        inputs=f"--inputs {RUN.inputs}" if RUN.inputs else "",
     shell:
         "python -m lowalt.targets.occluders --settings {params.settings:q} {params.inputs} --out {output:q} 2> {log:q}"

@@ -18,7 +18,7 @@ rule views:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=lambda wildcards: canonical({"size": int(wildcards.size)}),
+        settings=settings.views,
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
         " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
@@ -27,8 +27,8 @@ rule views:
 rule freeze:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.freeze"),
-        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
-        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
+        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=RUN.plan.chunks),
     output:
         "results/{run}/SHA256SUMS",
     log:
@@ -43,8 +43,8 @@ rule freeze:
 rule distances:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.distances"),
-        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
-        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=PLAN.groups),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
+        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=RUN.plan.groups),
     output:
         "results/{run}/distances.csv",
     log:
@@ -60,11 +60,11 @@ rule distances:
 
 rule train:
     input:
-        unpack(sample_source),
+        unpack(products.samples),
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen="results/{run}/SHA256SUMS",
+        frozen=DATA + "/SHA256SUMS",
         schemes=config["recognition"]["table"],
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
@@ -77,8 +77,8 @@ rule train:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
     params:
-        settings=training_settings,
-        source=source_option,
+        settings=settings.training,
+        source=options.samples,
         events="--tensorboard" if config["recognition"]["tensorboard"] else "",
     shell:
         "python -m lowalt.recognition train --settings {params.settings:q} {params.source} --frozen {input.frozen:q}"
@@ -88,11 +88,11 @@ rule train:
 
 rule evaluate:
     input:
-        unpack(sample_source),
+        unpack(products.samples),
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen="results/{run}/SHA256SUMS",
+        frozen=DATA + "/SHA256SUMS",
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
     output:
         table="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.csv",
@@ -105,8 +105,8 @@ rule evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     params:
-        settings=canonical(config["recognition"]["evaluation"]),
-        source=source_option,
+        settings=settings.evaluation,
+        source=options.samples,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
         " --frozen {input.frozen:q} --model {input.model:q} --out {output.table:q} 2> {log:q}"
@@ -115,12 +115,12 @@ rule evaluate:
 rule tables:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.tables"),
-        predictions=expand("results/{{run}}/predictions/{training}.csv", training=TRAININGS),
-        about=expand("results/{{run}}/predictions/{training}.json", training=TRAININGS),
+        predictions=expand("results/{{run}}/predictions/{training}.csv", training=RUN.trainings),
+        about=expand("results/{{run}}/predictions/{training}.json", training=RUN.trainings),
         schemes=config["recognition"]["table"],
         published=config["report"]["published"],
     output:
-        multiext("results/{run}/", *RESULT_TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
+        multiext("results/{run}/", *TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
     log:
         "results/{run}/logs/tables.log",
     benchmark:
@@ -128,7 +128,7 @@ rule tables:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"seed": config["seed"]}),
+        settings=settings.seed,
     shell:
         "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
         " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"
@@ -136,11 +136,11 @@ rule tables:
 
 rule transfer_evaluate:
     input:
-        unpack(sample_source),
+        unpack(products.samples),
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen="results/{run}/SHA256SUMS",
+        frozen=DATA + "/SHA256SUMS",
         model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",
     output:
         table="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.csv",
@@ -153,8 +153,8 @@ rule transfer_evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     params:
-        settings=canonical(config["recognition"]["evaluation"]),
-        source=source_option,
+        settings=settings.evaluation,
+        source=options.samples,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
         " --frozen {input.frozen:q} --model {input.model:q} --trained-on {wildcards.other} --out {output.table:q} 2> {log:q}"
@@ -163,11 +163,19 @@ rule transfer_evaluate:
 rule transfer:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.transfer"),
-        own=expand("results/{{run}}/predictions/{training}.csv", training=TRAININGS),
-        own_about=expand("results/{{run}}/predictions/{training}.json", training=TRAININGS),
-        other=expand("results/{{run}}/transfer/{other}/{training}.csv", other=OTHERS, training=TRAININGS),
-        other_about=expand("results/{{run}}/transfer/{other}/{training}.json", other=OTHERS, training=TRAININGS),
-        configs=expand("results/{name}/config.yaml", name=[RUN, *OTHERS]),
+        own=expand("results/{{run}}/predictions/{training}.csv", training=RUN.trainings),
+        own_about=expand("results/{{run}}/predictions/{training}.json", training=RUN.trainings),
+        other=expand(
+            "results/{{run}}/transfer/{other}/{training}.csv",
+            other=config["recognition"]["transfer"],
+            training=RUN.trainings,
+        ),
+        other_about=expand(
+            "results/{{run}}/transfer/{other}/{training}.json",
+            other=config["recognition"]["transfer"],
+            training=RUN.trainings,
+        ),
+        configs=expand("results/{name}/config.yaml", name=[RUN.name, *config["recognition"]["transfer"]]),
         schemes=config["recognition"]["table"],
     output:
         "results/{run}/transfer.csv",
@@ -178,7 +186,7 @@ rule transfer:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"seed": config["seed"]}),
+        settings=settings.seed,
     shell:
         "python -m lowalt.recognition transfer --settings {params.settings:q} --own {input.own:q} --other {input.other:q}"
         " --configs {input.configs:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"

@@ -9,18 +9,18 @@ rule report:
         code=code("lowalt.report"),
         page="src/lowalt/report/page.html",
         published=config["report"]["published"],
-        tables=multiext("results/{run}/", *RESULT_TABLES, "seeds.csv", "ranges.csv", "aspects.csv"),
-        index="results/{run}/shards/index.json",
+        tables=multiext("results/{run}/", *TABLES, "seeds.csv", "ranges.csv", "aspects.csv"),
+        index=DATA + "/shards/index.json",
         configuration="results/{run}/config.yaml",
-        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
-        gallery="results/{run}/clouds.png",
-        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=PLAN.chunks[0]),
-        distances="results/{run}/distances.csv",
-        transfer=["results/{run}/transfer.csv"] if OTHERS else [],
+        clouds=expand(DATA + "/clouds/{subtype}.npz", subtype=RUN.subtypes),
+        gallery=DATA + "/clouds.png",
+        motion=f"{DATA}/motion/{RUN.plan.chunks[0]}.csv",
+        distances=DATA + "/distances.csv",
+        transfer=["results/{run}/transfer.csv"] if config["recognition"]["transfer"] else [],
         accuracy=config["report"]["accuracy"] or [],
-        benchmarks=benchmark_files,
-        cost=cost_products,
-        effects=effect_products,
+        benchmarks=products.benchmarks,
+        cost=products.cost,
+        effects=products.effects,
     output:
         page="results/{run}/report.html",
         stages="results/{run}/stages.csv",
@@ -29,10 +29,10 @@ rule report:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=report_settings,
-        tables=recognition_options,
-        cost=cost_products_option,
-        effects=effect_products_option,
+        settings=settings.report,
+        tables=options.recognition,
+        cost=options.cost,
+        effects=options.effects,
     shell:
         "python -m lowalt.report --settings {params.settings:q} --accuracy results/{wildcards.run}/accuracy.csv"
         " --published {input.published:q} --confusion results/{wildcards.run}/confusion.csv"

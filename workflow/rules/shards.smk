@@ -6,7 +6,7 @@
 
 rule shard:
     input:
-        unpack(shard_tiles),
+        unpack(products.shard_tiles),
         code=code("lowalt.shards"),
         motion="results/{run}/motion/{group}-{part}.csv",
         signals="results/{run}/noisy/{group}-{part}.npy",
@@ -20,8 +20,8 @@ rule shard:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=shard_settings,
-        tiles=lambda wildcards, input: f"--tiles {input.tiles}" if "tiles" in input.keys() else "",
+        settings=settings.shard,
+        tiles=options.tiles,
     shell:
         "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
         " --signals {input.signals:q} {params.tiles} --fold {wildcards.fold} --out {output.tar:q} 2> {log:q}"
@@ -30,8 +30,8 @@ rule shard:
 rule index:
     input:
         code=code("lowalt.shards"),
-        tars=expand("results/{{run}}/shards/{shard}.tar", shard=PLAN.shards),
-        tables=expand("results/{{run}}/shards/{shard}.npz", shard=PLAN.shards),
+        tars=expand("results/{{run}}/shards/{shard}.tar", shard=RUN.plan.shards),
+        tables=expand("results/{{run}}/shards/{shard}.npz", shard=RUN.plan.shards),
     output:
         "results/{run}/shards/index.json",
     log:
@@ -41,7 +41,7 @@ rule index:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
+        settings=settings.images,
     shell:
         "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q} --out {output:q} 2> {log:q}"
 
@@ -69,6 +69,6 @@ rule configuration:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical(config),
+        settings=settings.configuration,
     shell:
         "python -m lowalt.common.config --settings {params.settings:q} --out {output:q} 2> {log:q}"

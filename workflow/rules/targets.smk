@@ -6,7 +6,7 @@
 rule cloud:
     input:
         code=code("lowalt.targets", *SOURCE_MODULES),
-        files=record_files,
+        files=products.record_files,
     output:
         "results/{run}/clouds/{subtype}.npz",
     log:
@@ -16,7 +16,7 @@ rule cloud:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=cloud_settings,
+        settings=settings.cloud,
     shell:
         "python -m lowalt.targets --settings {params.settings:q} --out {output:q} 2> {log:q}"
 
@@ -24,7 +24,7 @@ rule cloud:
 rule gallery:
     input:
         code=code("lowalt.targets.gallery"),
-        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=SLUGS),
+        clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
     output:
         "results/{run}/clouds.png",
     log:

@@ -16,6 +16,6 @@ rule tiles:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({key: config[key] for key in ("network", "spectra", "images")}),
+        settings=settings.images,
     shell:
         "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} --out {output:q} 2> {log:q}"

@@ -9,6 +9,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
+SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
+"""Modules that targets are read from; a command imports the one that a record names."""
 
 
 def _file(module: str) -> Path | None:
@@ -54,3 +56,13 @@ def sources(*modules: str) -> tuple[Path, ...]:
             parent = name.rpartition(".")[0]
             todo += [*([parent] if parent else []), *_imports(_file(name))]
     return tuple(sorted({_file(name) for name in seen}))
+
+
+@functools.cache
+def code(*modules: str) -> tuple[str, ...]:
+    """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs.
+
+    Paths below the working directory are relative, so that a moved checkout has the same inputs.
+    """
+    here = Path.cwd()
+    return tuple(str(path.relative_to(here) if path.is_relative_to(here) else path) for path in sources(*modules))

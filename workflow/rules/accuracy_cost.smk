@@ -1,6 +1,6 @@
 # Accuracy: what recognition accuracy costs in time, over the schemes trained and the networks only timed.
-# REQUIRED INPUTS: predictions of the run in the unseen protocol; results/fidelity-exact/transfer.csv (`make accuracy`
-#                  makes it first); a quiet machine
+# REQUIRED INPUTS: predictions of the run in the unseen protocol; results/fidelity-exact/transfer.csv, which other runs make
+#                  (`make accuracy-cost` does all); a quiet machine
 # OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.png
 
 
@@ -19,47 +19,47 @@ rule speed:
     # All cores, so that nothing else runs beside what is timed.
     threads: workflow.cores or 1
     params:
-        settings=training_settings,
+        settings=settings.training,
     shell:
         "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
-rule accuracy_table:
+rule accuracy_cost_table:
     input:
         code=code("lowalt.measure.accuracy_cost"),
-        predictions=expand("results/{{run}}/predictions/{training}.csv", training=PRICED),
-        about=expand("results/{{run}}/predictions/{training}.json", training=PRICED),
-        speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=BY_SCHEME),
-        index="results/{run}/shards/index.json",
-        fidelity="results/fidelity-exact/transfer.csv",
+        predictions=expand("results/{{run}}/predictions/{training}.csv", training=RUN.priced),
+        about=expand("results/{{run}}/predictions/{training}.json", training=RUN.priced),
+        speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=RUN.schemes_by_slug),
+        index=DATA + "/shards/index.json",
+        fidelity=products.fidelity,
         schemes=config["recognition"]["table"],
     output:
         "results/{run}/accuracy_cost.csv",
     log:
-        "results/{run}/logs/accuracy_table.log",
+        "results/{run}/logs/accuracy_cost_table.log",
     benchmark:
-        "results/{run}/benchmarks/accuracy_table.jsonl"
+        "results/{run}/benchmarks/accuracy_cost_table.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical({"seed": config["seed"]}),
+        settings=settings.seed,
     shell:
         "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
         " --speeds {input.speeds:q} --index {input.index:q} --fidelity {input.fidelity:q}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
-rule accuracy_figure:
+rule accuracy_cost_figure:
     input:
         code=code("lowalt.report.figures.accuracy_cost"),
         table="results/{run}/accuracy_cost.csv",
     output:
         "results/{run}/accuracy_cost.png",
     log:
-        "results/{run}/logs/accuracy_figure.log",
+        "results/{run}/logs/accuracy_cost_figure.log",
     benchmark:
-        "results/{run}/benchmarks/accuracy_figure.jsonl"
+        "results/{run}/benchmarks/accuracy_cost_figure.jsonl"
     conda:
         "../../envs/environment.yaml"
     shell:

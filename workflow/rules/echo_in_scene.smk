@@ -5,12 +5,12 @@
 # OUTPUTS: results/{run}/echo/{group}-{part}/{station}.npy, complex64 (models, symbols), and {station}.power.npy
 
 
-rule echo:
+rule echo_in_scene:
     input:
-        code=code("lowalt.effects", *effect_modules()),
+        code=code("lowalt.effects", *map(dotted, config["effects"])),
         motion="results/{run}/motion/{group}-{part}.csv",
-        clouds=group_clouds,
-        occluders=group_occluders,
+        clouds=products.group_clouds,
+        occluders=products.group_occluders,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
         power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=HEARD),
@@ -21,16 +21,9 @@ rule echo:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=canonical(
-            {
-                "seed": config["seed"],
-                "network": config["network"],
-                "tolerance": config["echo"]["tolerance"],
-                "effects": config["effects"],
-            }
-        ),
-        occluders=occluders_option,
-        stations=heard_stations,
+        settings=settings.echo_in_scene,
+        occluders=options.occluders,
+        stations=products.heard,
     shell:
         "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " {params.occluders} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"

@@ -1,0 +1,150 @@
+"""The files each rule reads, by the plan of the run. Each method takes the wildcards of a job and can stand in a rule's
+`input:`. Nothing is read here; whether a file exists is asked only where no rule of the run can make it."""
+
+from pathlib import Path
+from typing import Any
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.targets.records import source_files
+from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.run import Run
+
+FIDELITY = "results/fidelity-exact/transfer.csv"
+"""What training on echoes at a tolerance costs: a product of other runs, named in the error where it is missing."""
+
+TABLES = (
+    "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
+    "calibration.csv", "reliability.csv",
+)  # fmt: skip
+"""Tables of recognition that have one row a protocol, scheme and more."""
+
+
+class Products:
+    """Paths of the products of one run."""
+
+    def __init__(self, run: Run, calls: EffectCalls) -> None:
+        self._run, self._config, self._calls = run, run.config, calls
+        self._groups: dict[tuple, list[str]] = {}
+
+    def _of_group(self, folder: str, wildcards: Any) -> list[str]:
+        key = (folder, wildcards.run, wildcards.group)
+        if key not in self._groups:
+            names = self._run.plan.groups[wildcards.group]
+            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
+        return self._groups[key]
+
+    def record_files(self, wildcards: Any) -> list[str]:
+        """The user's mesh or recording files that the record of one subtype names."""
+        return source_files(self._run.records[self._run.subtypes[wildcards.subtype]], self._run.inputs)
+
+    def group_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of a group's subtypes, in the table's order."""
+        return self._of_group("clouds", wildcards)
+
+    def group_occluders(self, wildcards: Any) -> list[str]:
+        """Surfaces of a group's subtypes where the scene hides points behind surfaces, none elsewhere."""
+        return self._of_group("occluders", wildcards) if "occlusion" in self._config["effects"] else []
+
+    def call_occluders(self, wildcards: Any) -> list[str]:
+        """Surfaces of a group's subtypes where the call hides points behind surfaces, none elsewhere."""
+        hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
+        return self._of_group("occluders", wildcards) if hidden else []
+
+    def span(self, wildcards: Any) -> str:
+        """The part of a group's motion models that one chunk holds, as options of the stage."""
+        first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
+        return f"--first {first} --count {count}"
+
+    def cost_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of the first subtype of each category, in the table's order."""
+        first: dict[str, str] = {}
+        for name, record in self._run.records.items():
+            first.setdefault(record["published"]["category"], name)
+        return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
+
+    def heard(self, wildcards: Any) -> list[str]:
+        """Names of the stations whose signals one echo job makes."""
+        return [wildcards.station] if self._run.echo_per_station else self._run.stations
+
+    def chunk_echoes(self, wildcards: Any) -> list[str]:
+        """The clean signals of a chunk, in the order of the stations."""
+        stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+        return [f"{stem}/{station}.npy" for station in self._run.stations]
+
+    def chunk_powers(self, wildcards: Any) -> list[str]:
+        """The powers of the targets' own echoes, to which set SNRs refer in a scene with effects; none elsewhere."""
+        stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+        return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
+
+    def shard_tiles(self, wildcards: Any) -> dict[str, str]:
+        """The tiles of a chunk where shards hold images; signal shards need none, so none are rendered."""
+        if self._config["shards"]["kind"] == "signal":
+            return {}
+        return {"tiles": f"results/{wildcards.run}/tiles/{wildcards.group}-{wildcards.part}.npz"}
+
+    def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """What training and evaluation read: images shrunk to the scheme's size, or the shards."""
+        base = f"results/{self._run.data}"
+        if not self._config["recognition"]["cache"]:
+            return {"index": f"{base}/shards/index.json"}
+        size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
+        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
+
+    def asked_model(self, wildcards: Any) -> str:
+        """The network that shows what effects do."""
+        seed = self._config["recognition"]["seeds"][0]
+        return f"results/{wildcards.run}/models/seen/{self._run.asked.slug}/{seed}/model.pt"
+
+    def call_samples(self, wildcards: Any) -> list[str]:
+        """Samples of every call for effects and group; scenes first, since they take longest."""
+        groups, stem = self._run.plan.groups, f"results/{wildcards.run}/effects"
+        return [f"{stem}/{group}-{name}.npz" for name in reversed(self._calls.all) for group in groups]
+
+    def fidelity(self, wildcards: Any) -> str:
+        """The table of models trained on echoes at a tolerance, made by other runs.
+
+        Raises: InputError naming the command that makes it, where it is missing.
+        """
+        if not Path(FIDELITY).is_file():
+            raise InputError(f"no {FIDELITY}: it comes from runs of their own, `make accuracy-cost` makes it first")
+        return FIDELITY
+
+    def cost(self, wildcards: Any) -> list[str]:
+        """Tables and figure of what the echo's accuracy costs, where the report shows them."""
+        stem = f"results/{wildcards.run}/cost"
+        return [stem + end for end in (".csv", "_pixels.csv", ".png")] if self._config["report"]["cost"] else []
+
+    def effects(self, wildcards: Any) -> list[str]:
+        """Table and figure of what effects cost and do, where the report shows them."""
+        stem = f"results/{wildcards.run}/effects"
+        return [stem + end for end in (".csv", ".png")] if self._config["report"]["effects"] else []
+
+    def benchmarks(self, wildcards: Any) -> list[str]:
+        """Measurements of all jobs, in pipeline order."""
+        run, plan = self._run, self._run.plan
+        images = self._config["shards"]["kind"] == "image"
+        cached = self._config["recognition"]["cache"]
+        sizes = sorted({run.pixels(scheme) for scheme in run.trained}) if cached else []
+        echoes = [f"{chunk}-{station}" for chunk in plan.chunks for station in run.stations]
+        data = [
+            *(f"cloud/{subtype}" for subtype in run.subtypes),
+            *(f"motion/{chunk}" for chunk in plan.chunks),
+            *(f"echo/{name}" for name in (echoes if run.echo_per_station else plan.chunks)),
+            *(f"noise/{chunk}" for chunk in plan.chunks),
+            *(f"tiles/{chunk}" for chunk in plan.chunks if images),
+            *(f"shard/{shard}" for shard in plan.shards),
+            "index",
+            *(f"views/{size}/{shard}" for size in sizes for shard in plan.shards),
+        ]
+        training = [
+            *(f"train/{training}" for training in run.trainings),
+            *(f"evaluate/{training}" for training in run.trainings),
+        ]
+        own, shared = f"results/{wildcards.run}/benchmarks", f"results/{run.data}/benchmarks"
+        return [
+            *(f"{shared}/{name}.jsonl" for name in data),
+            *(f"{own}/{name}.jsonl" for name in training),
+            f"{shared}/distances.jsonl",
+            f"{own}/tables.jsonl",
+        ]

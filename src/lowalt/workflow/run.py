@@ -1,0 +1,144 @@
+"""One run: the facts that follow from its checked configuration, and nothing about files or single stages.
+
+Every fault of a configuration is found here, before any job starts.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from lowalt.common.config import check, plain
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.common.network import Network
+from lowalt.common.plan import Plan
+from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition.schemes import Scheme, named
+from lowalt.spectra import Spectra
+from lowalt.targets.records import load_records, missing_inputs
+from lowalt.tiles.settings import Images
+
+TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
+"""Blocks of the configuration in which a run may differ from the run whose data set it trains on."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """Records, plan and schemes of one run; `inputs` is the folder of the user's meshes and recordings, or None."""
+
+    config: dict
+    schema: Path
+    inputs: str | None
+    records: dict[str, dict]
+    plan: Plan
+    schemes: dict[str, Scheme]
+
+    @classmethod
+    def of(cls, config: dict, schema: str | Path, inputs: str | None) -> "Run":
+        """Return the run of a merged configuration.
+
+        Raises: InputError naming key, value and what was expected, or each file of the user's that is missing.
+        """
+        check(config, schema)
+        records = load_records(config["targets"]["table"], config["targets"]["records"])
+        plan = Plan.of(config, {name: record["published"] for name, record in records.items()})
+        chosen = {name: records[name] for members in plan.groups.values() for name in members}
+        Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
+        Images.from_settings(config["images"])
+        block = config["recognition"]
+        schemes = {name: named(block["table"], name) for name in (*block["schemes"], *block["timed"])}
+        if config["run"] in block["transfer"]:
+            raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
+        if config["effects"]:
+            from lowalt.effects.checks import check as check_effects
+
+            check_effects(config)
+        lacking = missing_inputs(chosen, inputs)
+        if lacking:
+            raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
+        _check_data(config)
+        return cls(config, Path(schema), inputs, chosen, plan, schemes)
+
+    @property
+    def name(self) -> str:
+        """Name of the run; all it makes lies in results/{name}/."""
+        return self.config["run"]
+
+    @property
+    def data(self) -> str:
+        """Name of the run whose data set this run trains on: its own, unless the configuration names another."""
+        return self.config.get("data", self.name)
+
+    @cached_property
+    def stations(self) -> list[str]:
+        """Names of the base stations, in the network's order."""
+        return list(self.config["network"]["stations"])
+
+    @property
+    def echo_per_station(self) -> bool:
+        """Whether an echo job makes the signals of one station; otherwise those of all."""
+        return self.config["echo"]["job"] == "station"
+
+    @cached_property
+    def subtypes(self) -> dict[str, str]:
+        """Subtypes by the name of their files, in the plan's order."""
+        return {slug(name): name for name in self.records}
+
+    @cached_property
+    def schemes_by_slug(self) -> dict[str, Scheme]:
+        """Schemes trained or timed by the name of their folders."""
+        return {scheme.slug: scheme for scheme in self.schemes.values()}
+
+    @cached_property
+    def trained(self) -> list[Scheme]:
+        """Schemes that are trained, in the configuration's order."""
+        return [self.schemes[name] for name in self.config["recognition"]["schemes"]]
+
+    @cached_property
+    def trainings(self) -> list[str]:
+        """{protocol}/{scheme}/{training seed} of every training."""
+        block = self.config["recognition"]
+        return [
+            f"{protocol}/{scheme.slug}/{seed}"
+            for scheme in self.trained
+            for protocol in block["protocols"]
+            if protocol in scheme.protocols
+            for seed in block["seeds"]
+        ]
+
+    @cached_property
+    def priced(self) -> list[str]:
+        """The trainings whose accuracy is set against their cost: the unseen protocol, the first training seed."""
+        return [f"unseen/{scheme.slug}/{self.config['recognition']['seeds'][0]}" for scheme in self.trained]
+
+    @cached_property
+    def asked(self) -> Scheme:
+        """The scheme whose network shows what effects do: that of the most images, trained on all subtypes.
+
+        Raises: InputError where no scheme is trained in the protocol "seen".
+        """
+        protocols = self.config["recognition"]["protocols"]
+        able = [scheme for scheme in self.trained if "seen" in scheme.protocols and "seen" in protocols]
+        if not able:
+            raise InputError(
+                "recognition.schemes: none is trained in the protocol 'seen', expected one to ask about effects"
+            )
+        return max(able, key=lambda scheme: len(scheme.columns))
+
+    def pixels(self, scheme: Scheme) -> int:
+        """Pixels a side that a scheme's network sees."""
+        return scheme.size or self.config["recognition"]["size"]
+
+
+def _check_data(config: dict) -> None:
+    """Refuse another run's data set that is not there or was made with other settings than this configuration's."""
+    name = config.get("data", config["run"])
+    if name == config["run"]:
+        return
+    made = Path("results") / name / "config.yaml"
+    if not made.is_file():
+        raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
+    own, other = plain(config), plain(load_yaml(made))
+    differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
+    if differ:
+        raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")

@@ -1,0 +1,118 @@
+"""The settings of every stage as one JSON text each: what a stage does not read does not stand in its text.
+
+Snakemake compares these texts, so a changed value re-runs the stages that read it and no others. Each method takes the
+wildcards of a job and can stand in a rule's `params:`. A text is made once: Snakemake asks for it again and again.
+"""
+
+from typing import Any
+
+from lowalt.common.config import canonical
+from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.run import Run
+
+
+class Settings:
+    """Settings of the stages of one run."""
+
+    def __init__(self, run: Run, calls: EffectCalls) -> None:
+        self._run, self._config, self._calls = run, run.config, calls
+        self._texts: dict[tuple, str] = {}
+
+    def _text(self, *key: Any, **block: Any) -> str:
+        if key not in self._texts:
+            self._texts[key] = canonical(block)
+        return self._texts[key]
+
+    def _blocks(self, *names: str) -> dict:
+        return {name: self._config[name] for name in names}
+
+    def configuration(self, wildcards: Any) -> str:
+        """The whole configuration."""
+        return self._text("configuration", **self._config)
+
+    def cloud(self, wildcards: Any) -> str:
+        """Seed and the merged record of one subtype; occluders read the same."""
+        record = self._run.records[self._run.subtypes[wildcards.subtype]]
+        return self._text("cloud", wildcards.subtype, seed=self._config["seed"], record=record)
+
+    def motion(self, wildcards: Any) -> str:
+        """What motion models are drawn from: region, masts, and the published ranges of a group's subtypes."""
+        block, stations = self._config["motion"], self._config["network"]["stations"]
+        return self._text(
+            "motion", wildcards.group,
+            seed=self._config["seed"],
+            masts_m=[place["position_m"][:2] for place in stations.values()],
+            motion={key: block[key] for key in ("region", "height_m", "tilt_deg", "cadence")},
+            published={
+                name: self._run.records[name]["published"] for name in self._run.plan.groups[wildcards.group]
+            },
+        )  # fmt: skip
+
+    def echo(self, wildcards: Any) -> str:
+        """The network and the echo's tolerance."""
+        return self._text("echo", **self._blocks("network"), tolerance=self._config["echo"]["tolerance"])
+
+    def echo_in_scene(self, wildcards: Any) -> str:
+        """The network, the echo's tolerance, the effects of the scene, and the seed that they draw from."""
+        tolerance = self._config["echo"]["tolerance"]
+        return self._text("echo_in_scene", **self._blocks("seed", "network", "effects"), tolerance=tolerance)
+
+    def noise(self, wildcards: Any) -> str:
+        """The set of SNRs and the names of the stations."""
+        snrs = self._config["noise"]["snr_db"]
+        return self._text("noise", **self._blocks("seed"), stations=self._run.stations, snr_db=snrs)
+
+    def images(self, wildcards: Any) -> str:
+        """Network, spectra and images, for tiles and for the index that describes them."""
+        return self._text("images", **self._blocks("network", "spectra", "images"))
+
+    def shard(self, wildcards: Any) -> str:
+        """The fold of each sample, its name and its form."""
+        snrs = self._config["noise"]["snr_db"]
+        return self._text("shard", **self._blocks("seed", "network", "split", "shards"), snr_db=snrs)
+
+    def cost_table(self, wildcards: Any) -> str:
+        """What the echo is timed with."""
+        return self._text("cost_table", **self._blocks("network", "motion", "seed", "cost"))
+
+    def cost_pixels(self, wildcards: Any) -> str:
+        """What the echo is timed with, and the images whose pixels are compared."""
+        return self._text("cost_pixels", **self._blocks("network", "motion", "spectra", "images", "seed", "cost"))
+
+    def views(self, wildcards: Any) -> str:
+        """Pixels a side of the shrunk images."""
+        return self._text("views", wildcards.size, size=int(wildcards.size))
+
+    def training(self, wildcards: Any) -> str:
+        """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
+        block = self._config["recognition"]
+        kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
+        seed = int(wildcards.get("train_seed", self._config["seed"]))
+        return self._text("training", seed, seed=seed, colour_map=self._config["images"]["colour_map"], **kept)
+
+    def evaluation(self, wildcards: Any) -> str:
+        """How a network is asked."""
+        return self._text("evaluation", **self._config["recognition"]["evaluation"])
+
+    def seed(self, wildcards: Any) -> str:
+        """The run's seed alone, for tables with intervals."""
+        return self._text("seed", **self._blocks("seed"))
+
+    def effect_samples(self, wildcards: Any) -> str:
+        """One call for effects, and the samples and images it is tried on."""
+        call = self._calls.named(wildcards.call)
+        models, size = self._config["report"]["effect_models"], self._run.pixels(self._run.asked)
+        blocks = self._blocks("network", "spectra", "images", "split", "seed")
+        return self._text(
+            "effect_samples", wildcards.call, **blocks, **call, name=wildcards.call, models=models, size=size
+        )
+
+    def effects_table(self, wildcards: Any) -> str:
+        """The run's seed, and how a network is asked."""
+        evaluation = self._config["recognition"]["evaluation"]
+        return self._text("effects_table", **self._blocks("seed"), evaluation=evaluation)
+
+    def report(self, wildcards: Any) -> str:
+        """The whole configuration, and the published values of each subtype."""
+        published = {name: record["published"] for name, record in self._run.records.items()}
+        return self._text("report", config=self._config, published=published)

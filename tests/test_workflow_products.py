@@ -1,0 +1,202 @@
+"""The workflow's logic without Snakemake: names, files and settings that follow from a configuration."""
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import yaml
+
+from lowalt.common.config import merge, plain
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
+from lowalt.effects.catalogue import PLACES
+from lowalt.workflow import options
+from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.products import FIDELITY, Products
+from lowalt.workflow.run import Run
+from lowalt.workflow.settings import Settings
+from lowalt.workflow.sources import code, sources
+
+ROOT = Path(__file__).parent.parent
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
+
+
+class Inputs(dict):
+    """A job's inputs by name, read as items or attributes, as Snakemake gives them."""
+
+    __getattr__ = dict.__getitem__
+
+
+@pytest.fixture(autouse=True)
+def checkout(monkeypatch):
+    """Paths of the default configuration are relative to the checkout."""
+    monkeypatch.chdir(ROOT)
+
+
+def run_of(overlay: dict | None = None, inputs: str | None = None) -> Run:
+    return Run.of(merge(load_yaml("config/default.yaml"), overlay or {}), SCHEMA, inputs)
+
+
+def parts(overlay: dict | None = None) -> tuple[Run, Products, Settings]:
+    run = run_of(overlay)
+    calls = EffectCalls(run)
+    return run, Products(run, calls), Settings(run, calls)
+
+
+def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
+    run = run_of({"recognition": {"seeds": [4, 5], "protocols": ["unseen"]}})
+    assert run.trainings == [
+        f"unseen/{scheme}/{seed}" for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt") for seed in (4, 5)
+    ]
+    assert run.priced == ["unseen/a-vrp-trp-vt/4", "unseen/abc-vrp-trp-vt/4"]
+    assert len(run.subtypes) == len(run.records) == 40
+    assert run.data == run.name == "default"
+
+
+def test_the_network_asked_about_effects_sees_the_most_images_and_knows_all_subtypes():
+    assert run_of().asked.name == "ABC:VRP+TRP+VT"
+    with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
+        _ = run_of({"recognition": {"protocols": ["unseen"]}}).asked
+
+
+def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
+    run, products, _ = parts({"network": {"stations": {"D": {"position_m": [0, 9, 25], "normal_deg": 0}}}})
+    base = "results/default"
+    assert products.chunk_echoes(CHUNK) == [f"{base}/echo/seen-00001/{name}.npy" for name in "ABCD"]
+    assert products.heard(CHUNK) == ["B"]
+    assert products.span(CHUNK) == "--first 50 --count 50"
+    assert products.shard_tiles(CHUNK) == {"tiles": f"{base}/tiles/seen-00001.npz"}
+    clouds = products.group_clouds(CHUNK)
+    assert len(clouds) == len(run.plan.groups["seen"]) and len(set(clouds)) == len(clouds)
+    assert all(Path(path).stem in run.subtypes for path in clouds)
+
+
+def test_an_echo_job_for_all_stations_hears_all():
+    run, products, _ = parts({"echo": {"job": "chunk"}})
+    assert products.heard(CHUNK) == run.stations == ["A", "B", "C"]
+    names = products.benchmarks(CHUNK)
+    assert "results/default/benchmarks/echo/seen-00001.jsonl" in names and len(set(names)) == len(names)
+
+
+def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
+    _, products, _ = parts({"shards": {"kind": "signal"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
+    assert products.shard_tiles(CHUNK) == {}
+    surfaces = products.group_occluders(CHUNK)
+    assert [path.replace("occluders", "clouds") for path in surfaces] == products.group_clouds(CHUNK)
+    assert [Path(path).name for path in products.chunk_powers(CHUNK)] == ["A.power.npy", "B.power.npy", "C.power.npy"]
+    _, usual, _ = parts()
+    assert usual.group_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []
+
+
+def test_training_reads_images_of_the_scheme_s_own_size():
+    run, products, _ = parts(
+        {"recognition": {"table": "config/accuracy.csv", "schemes": ["base", "24 pixels"], "timed": []}}
+    )
+    for scheme, size in (("base", 48), ("24-pixels", 24)):
+        views = products.samples(SimpleNamespace(scheme=scheme))["views"]
+        assert views == [f"results/default/views/{size}/{shard}.npz" for shard in run.plan.shards]
+    _, uncached, _ = parts({"recognition": {"cache": False}})
+    assert uncached.samples(SimpleNamespace(scheme="x")) == {"index": "results/default/shards/index.json"}
+
+
+@pytest.mark.parametrize(
+    ("overlay", "changed"),
+    [
+        ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table", "cost_pixels"}),
+        ({"noise": {"snr_db": [9]}}, {"noise", "shard"}),
+        ({"images": {"gamma": 0.7}}, {"images", "cost_pixels"}),
+        ({"images": {"colour_map": "magma"}}, {"images", "cost_pixels", "training"}),
+        ({"recognition": {"training": {"steps": 7}}}, {"training"}),
+        ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation", "effects_table"}),
+        ({"split": {"val": 2, "train": 7}}, {"shard"}),
+        ({"echo": {"tolerance": 1e-3}}, {"echo", "echo_in_scene"}),
+    ],
+)
+def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
+    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="48", train_seed="3", get=lambda key, default: 3)
+    names = (
+        "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "cost_pixels", "views",
+        "training", "evaluation", "seed", "effects_table",
+    )  # fmt: skip
+    before, after = parts()[2], parts(overlay)[2]
+    assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
+    # The whole configuration stands beside the results and in the report.
+    assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
+
+
+def test_settings_of_different_jobs_differ_and_are_json():
+    _, _, settings = parts()
+    one, other = (SimpleNamespace(run="default", group=group) for group in ("seen", "unseen"))
+    drawn = [set(json.loads(settings.motion(job))["published"]) for job in (one, other, one)]
+    assert drawn[0] == drawn[2] and drawn[0].isdisjoint(drawn[1])
+    assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
+
+
+def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
+    run, products, settings = parts()
+    calls = EffectCalls(run)
+    assert list(calls.all) == ["none", *PLACES, "urban", "worst"]
+    assert products.call_samples(CHUNK)[0] == "results/default/effects/seen-worst.npz"
+    occluded = SimpleNamespace(run="default", group="seen", call="occlusion")
+    assert len(products.call_occluders(occluded)) == 20
+    assert json.loads(settings.effect_samples(occluded))["effects"] == {"occlusion": {}}
+    with pytest.raises(InputError, match="no call 'nothing'"):
+        calls.named("nothing")
+
+
+def test_a_run_on_another_s_data_reads_there_and_refuses_other_settings(tmp_path, monkeypatch):
+    overlay = {"run": "mine", "data": "default", "recognition": {"training": {"steps": 9}}}
+    made = tmp_path / "results/default/config.yaml"
+    made.parent.mkdir(parents=True)
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="expected a finished run"):
+        run_of(overlay)
+    base = load_yaml("config/default.yaml")
+    made.write_text(yaml.safe_dump(base))
+    run, products, _ = parts(overlay)
+    job = SimpleNamespace(run="mine", scheme="abc-vrp-trp-vt")
+    assert products.samples(job)["views"][0].startswith("results/default/views/48/")
+    folders = {Path(name).parts[1] for name in products.benchmarks(job) if "/train/" in name or "/evaluate/" in name}
+    assert folders == {"mine"} and run.data == "default"
+    made.write_text(yaml.safe_dump(base | {"seed": 5}))
+    with pytest.raises(InputError, match=r"other settings of \['seed'\]"):
+        run_of(overlay)
+
+
+def test_the_table_of_other_runs_is_named_with_its_command_where_it_is_missing(tmp_path, monkeypatch):
+    _, products, _ = parts()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match="make accuracy-cost"):
+        products.fidelity(CHUNK)
+    Path(FIDELITY).parent.mkdir(parents=True)
+    Path(FIDELITY).touch()
+    assert products.fidelity(CHUNK) == FIDELITY
+
+
+def test_options_stand_only_where_their_input_does():
+    none = Inputs(occluders="", powers="", cost=[], effects=[], index="i")
+    every = Inputs(occluders="o", powers="p", cost=list("abc"), effects=list("de"), views="v w", tiles="t")
+    found = {name: getattr(options, name) for name in ("occluders", "powers", "tiles", "cost", "effects")}
+    assert {name: build(CHUNK, none) for name, build in found.items()} == dict.fromkeys(found, "")
+    assert [build(CHUNK, every) for build in found.values()] == [
+        "--occluders o", "--powers p", "--tiles t", "--cost a b c", "--effects d e",
+    ]  # fmt: skip
+    assert (options.samples(CHUNK, none), options.samples(CHUNK, every)) == ("--index i", "--views v w")
+
+
+def test_a_run_that_transfers_from_itself_is_refused():
+    with pytest.raises(InputError, match=r"recognition\.transfer: 'default' is this run"):
+        run_of({"recognition": {"transfer": ["default"]}})
+
+
+def test_code_is_the_sources_relative_to_the_checkout_or_absolute_elsewhere(tmp_path, monkeypatch):
+    here = code("lowalt.noise")
+    assert "src/lowalt/noise/awgn.py" in here
+    assert [ROOT / path for path in here] == list(sources("lowalt.noise"))
+    code.cache_clear()
+    monkeypatch.chdir(tmp_path)
+    assert all(Path(path).is_absolute() for path in code("lowalt.noise"))
+    code.cache_clear()
