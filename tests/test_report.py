@@ -2,10 +2,8 @@
 
 import io
 import json
-import re
-from pathlib import Path
+from types import SimpleNamespace
 
-import jinja2
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,8 +11,13 @@ from PIL import Image
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
-from lowalt.report.figures import style as figures
-from lowalt.report.sections import recognition
+from lowalt.report.figures.accuracy_over_snr import accuracy_over_snr
+from lowalt.report.figures.bands import band_figure
+from lowalt.report.figures.confusion import confusion_matrices
+from lowalt.report.figures.stage_times import stage_bars
+from lowalt.report.inputs import FILES, Inputs
+from lowalt.report.page import SECTIONS, TEMPLATES, rendered
+from lowalt.report.sections import accuracy_cost, echo_cost, effects, transfer
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
 
 BANDS = [
@@ -73,10 +76,10 @@ def test_confusion_counts_add_up():
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: figures.accuracy_over_snr({"seen": {"A": {"3": 90.0, "inf": 99.0, "avg": 95.0}}}, {}),
-        lambda: figures.confusion_matrices({("seen", "A"): {("UAV", "UAV"): 5, ("Bird", "UAV"): 1}}, ("UAV", "Bird")),
-        lambda: recognition.band_figure({"range (m)": BANDS, "aspect (°)": BANDS[1:]}),
-        lambda: figures.stage_bars([{"rule": "echo", "jobs": 2, "wall_s": 5.0}]),
+        lambda: accuracy_over_snr({"seen": {"A": {"3": 90.0, "inf": 99.0, "avg": 95.0}}}, {}),
+        lambda: confusion_matrices({("seen", "A"): {("UAV", "UAV"): 5, ("Bird", "UAV"): 1}}, ("UAV", "Bird")),
+        lambda: band_figure({"range (m)": BANDS, "aspect (°)": BANDS[1:]}),
+        lambda: stage_bars([{"rule": "echo", "jobs": 2, "wall_s": 5.0}]),
     ],
 )
 def test_figures_are_pictures_with_ink_and_repeat_to_the_byte(draw):
@@ -114,10 +117,44 @@ def test_training_scales_with_images_and_no_network_is_guessed_at():
     assert training_hours([{**timed, "pixels": "64"}, {**timed, "stations": "A"}], config) == (15, None, "")
 
 
-def test_the_page_does_without_any_picture_that_a_run_may_lack():
-    text = (Path(figures.__file__).parents[1] / "page.html").read_text()
-    conditions = [found for found in re.findall(r"{% if (.*?) %}", text) if "images" in found]
-    assert len(conditions) >= 2
-    strict = jinja2.Environment(undefined=jinja2.StrictUndefined)
-    for condition in conditions:
-        assert strict.from_string("{% if " + condition + " %}there{% endif %}").render(images={}) == ""
+@pytest.fixture
+def bare(tmp_path):
+    """A manifest whose files do not exist, without any name that a manifest may leave out."""
+    files = {name: str(tmp_path / f"{name}.csv") for name in FILES}
+    return files | {"clouds": ["a.npz"], "benchmarks": ["b.jsonl"]}
+
+
+def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, bare):
+    path = tmp_path / "report.json"
+    path.write_text(json.dumps(bare | {"transfer": "t.csv"}))
+    found = Inputs.read(path)
+    assert found.paths("clouds") == ["a.npz"] and "transfer" in found and "effects" not in found
+    with pytest.raises(InputError, match=r"accuracy: no file at .*accuracy\.csv"):
+        found.path("accuracy")
+    for wrong, words in (
+        ({**bare, "colours": "x"}, r"unknown \['colours'\]"),
+        ({name: bare[name] for name in bare if name != "index"}, r"missing \['index'\]"),
+        ({**bare, "clouds": "a.npz"}, "clouds is 'a.npz', expected a list"),
+        ({**bare, "index": ["i.json"]}, r"index is \['i.json'\], expected a path"),
+        ([], "list, expected a JSON object"),
+    ):
+        path.write_text(json.dumps(wrong))
+        with pytest.raises(InputError, match=r"report\.json: .*" + words):
+            Inputs.read(path)
+    path.write_text("{")
+    with pytest.raises(InputError, match=r"report\.json: not JSON"):
+        Inputs.read(path)
+
+
+def test_a_section_that_a_run_may_lack_is_left_out(bare):
+    run = SimpleNamespace(inputs=Inputs(bare))
+    for section in (accuracy_cost, echo_cost, effects, transfer):
+        assert section.values(run) is None
+    assert rendered("transfer", None) == ""
+
+
+def test_every_section_has_a_template_and_every_template_a_section():
+    names = {section.__name__.rpartition(".")[2] for section in SECTIONS}
+    assert len(names) == len(SECTIONS)
+    assert names == {path.stem for path in (TEMPLATES / "sections").glob("*.html")}
+    assert names | {"__init__"} == {path.stem for path in (TEMPLATES / "sections").glob("*.py")}

@@ -11,7 +11,7 @@ from pathlib import Path
 from lowalt.common.command import run
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
-from lowalt.report.sections.recognition import ordering_words
+from lowalt.report.sections.orderings import ordering_words
 from lowalt.report.tables import by_scheme, read_csv
 
 PUBLISHED = "config/published_accuracy.csv"

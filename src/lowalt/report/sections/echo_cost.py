@@ -1,6 +1,7 @@
-"""The report's short table of what accuracy costs: a row a method and tolerance, from the two measured tables."""
+"""Section: the echo's accuracy over its time, a row a method and tolerance, from the two measured tables."""
 
-from lowalt.common.csv_tables import read_csv
+from lowalt.report.figures.style import embedded
+from lowalt.report.run import Run
 
 MEASURED = ("method", "points", "range_m", "tolerance", "seconds", "relative_error", "hardware")
 PIXELS = ("tolerance", "pixels", "changed_pixels")
@@ -46,6 +47,9 @@ def summary(measured: list[dict[str, str]], pixels: list[dict[str, str]]) -> dic
     return {"hardware": measured[0]["hardware"], "range_m": float(distance), "samples": samples, "rows": rows}
 
 
-def read_summary(table: str, pixels: str) -> dict:
-    """Return `summary` of two CSV files. Raises: InputError naming a missing file or column."""
-    return summary(read_csv(table, *MEASURED), read_csv(pixels, *PIXELS))
+def values(run: Run) -> dict | None:
+    """Return the short table and the figure; None where the run does not show them."""
+    if "echo_cost" not in run.inputs:
+        return None
+    cost = summary(run.inputs.table("echo_cost", *MEASURED), run.inputs.table("echo_pixels", *PIXELS))
+    return {"cost": cost, "picture": embedded(run.inputs.path("echo_cost_figure").read_bytes())}

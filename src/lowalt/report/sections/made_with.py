@@ -1,7 +1,11 @@
-"""The versions of what a run was made with."""
+"""Section: the versions of the packages that made the run, and its whole configuration."""
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
+
+import yaml
+
+from lowalt.report.run import Run
 
 NAMES = ("lowalt", "snakemake", "numpy", "scipy", "numba", "pillow", "deflate", "torch", "torchvision", "timm")
 
@@ -15,3 +19,8 @@ def versions() -> list[str]:
         except PackageNotFoundError:
             found.append(f"{name} not installed")
     return found
+
+
+def values(run: Run) -> dict:
+    """Return the versions and the configuration as YAML."""
+    return {"versions": versions(), "configuration": yaml.safe_dump(run.config, sort_keys=False)}

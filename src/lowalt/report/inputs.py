@@ -1,0 +1,72 @@
+"""The manifest of a report: where each table, picture and measurement of a run stands.
+
+A JSON object that names every file by what it is, for example
+
+    {"accuracy": "results/default/accuracy.csv", "clouds": ["results/default/clouds/crow.npz", ...], ...}
+
+Paths are relative to the folder in which the report is made. The workflow writes the manifest of a run.
+"""
+
+import json
+from pathlib import Path
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+
+FILES = (
+    "accuracy", "confusion", "subtypes", "comparisons", "orderings", "alarms", "calibration", "reliability", "seeds",
+    "ranges", "aspects", "distances", "index", "gallery", "motion",
+)  # fmt: skip
+"""Names of which every manifest has one file."""
+LISTS = ("clouds", "benchmarks")
+"""Names of which every manifest has a list of files."""
+OPTIONAL = (
+    "published", "transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects",
+    "effects_figure",
+)  # fmt: skip
+"""Names that a manifest leaves out where the run has no such file; the page then has no such section."""
+
+
+class Inputs:
+    """The files of a manifest by their names."""
+
+    def __init__(self, files: dict[str, str | list[str]], source: str = "manifest") -> None:
+        """files: path or list of paths by name; source: the manifest's own path, for messages.
+
+        Raises: InputError for names that are missing or unknown, and for a path in place of a list or the reverse.
+        """
+        missing = [name for name in (*FILES, *LISTS) if name not in files]
+        unknown = [name for name in files if name not in (*FILES, *LISTS, *OPTIONAL)]
+        if missing or unknown:
+            raise InputError(f"{source}: missing {missing}, unknown {unknown}, optional are {list(OPTIONAL)}")
+        for name, value in files.items():
+            if isinstance(value, str) == (name in LISTS):
+                raise InputError(f"{source}: {name} is {value!r}, expected {'a list' if name in LISTS else 'a path'}")
+        self.files = files
+
+    @classmethod
+    def read(cls, path: str | Path) -> "Inputs":
+        """Read a manifest. Raises: InputError where it is missing, no JSON object, or as the constructor says."""
+        try:
+            found = json.loads(existing(path, "manifest").read_text())
+        except ValueError as error:
+            raise InputError(f"{path}: not JSON ({error})") from error
+        if not isinstance(found, dict):
+            raise InputError(f"{path}: {type(found).__name__}, expected a JSON object")
+        return cls(found, str(path))
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.files
+
+    def path(self, name: str) -> Path:
+        """Return the file called `name`. Raises: InputError where it does not exist."""
+        return existing(self.files[name], name)
+
+    def paths(self, name: str) -> list[str]:
+        """Return the list of files called `name`."""
+        return self.files[name]
+
+    def table(self, name: str, *columns: str) -> list[dict[str, str]]:
+        """Return the rows of the table called `name`. Raises: InputError where it lacks one of `columns`."""
+        return read_csv(self.files[name], *columns)

@@ -1,0 +1,36 @@
+"""What the sections of the page are made from: a run's files, its configuration, its shards and its jobs' times."""
+
+import functools
+
+from lowalt.report.inputs import Inputs
+from lowalt.report.tables import stage_times
+from lowalt.shards import ShardSet
+
+
+class Run:
+    """What the sections are made from."""
+
+    def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:
+        """inputs: the run's files; config: its configuration; targets: row of the table of targets by subtype."""
+        self.inputs, self.config, self.targets = inputs, config, targets
+        self.shards = ShardSet(inputs.path("index"))
+
+    @functools.cached_property
+    def stage_times(self) -> list[dict]:
+        """What each rule took, as `tables.stage_times` gives it."""
+        return stage_times(self.inputs.paths("benchmarks"))
+
+    @property
+    def sample_bytes(self) -> float:
+        """Bytes a sample in the shards."""
+        return sum(shard["bytes"] for shard in self.shards.shards) / len(self.shards)
+
+    @property
+    def snr_labels(self) -> list[str]:
+        """The run's SNRs (dB) as the tables write them."""
+        return [f"{snr:g}" for snr in map(float, self.config["noise"]["snr_db"])]
+
+    @property
+    def stations(self) -> list[str]:
+        """Names of the base stations, in the network's order."""
+        return list(self.config["network"]["stations"])

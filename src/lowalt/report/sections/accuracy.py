@@ -1,0 +1,35 @@
+"""Section: recognition accuracy by scheme and SNR, with the values that the paper prints."""
+
+from pathlib import Path
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.report.figures.accuracy_over_snr import accuracy_over_snr
+from lowalt.report.figures.style import embedded
+from lowalt.report.run import Run
+from lowalt.report.tables import by_scheme, spreads
+
+COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
+
+
+def network_words(block: dict) -> str:
+    """Return the network and its training in words, from the configuration's `recognition` block."""
+    network, training = block["network"], block["training"]
+    start = {"none": "random initial weights", "hub": "ImageNet weights from the hub"}
+    weights = start.get(network["weights"], f"weights from the file {Path(network['weights']).name}")
+    seeds = len(block["seeds"])
+    return (
+        f"{network['backbone']} at {block['size']} pixels, {weights}, at most {training['steps']} steps of "
+        f"{training['batch']} samples, {seeds} training seed{'s' if seeds > 1 else ''}"
+    )
+
+
+def values(run: Run) -> dict:
+    """Return accuracies of this run and of the paper, their figure, and the network in words."""
+    measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
+    ours = by_scheme(measured)
+    paper = by_scheme(read_csv(run.inputs.path("published"), *COLUMNS)) if "published" in run.inputs else {}
+    return {
+        "ours": ours, "published": paper, "spreads": spreads(measured), "snrs": run.snr_labels,
+        "network": network_words(run.config["recognition"]),
+        "picture": embedded(accuracy_over_snr(ours, paper)) if ours else "",
+    }  # fmt: skip

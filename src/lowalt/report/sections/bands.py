@@ -1,0 +1,18 @@
+"""Section: accuracy over distance and aspect."""
+
+from lowalt.report.figures.bands import FEWEST, band_figure
+from lowalt.report.figures.style import embedded
+from lowalt.report.run import Run
+
+COLUMNS = ("protocol", "scheme", "from", "to", "accuracy_percent", "samples")
+
+
+def values(run: Run) -> dict | None:
+    """Return the figure; None where every band has fewer than FEWEST samples."""
+    bands = {
+        "distance to the nearest station used (m)": run.inputs.table("ranges", *COLUMNS),
+        "aspect seen from it (°)": run.inputs.table("aspects", *COLUMNS),
+    }
+    if not any(int(row["samples"]) >= FEWEST for rows in bands.values() for row in rows):
+        return None
+    return {"picture": embedded(band_figure(bands)), "fewest": FEWEST}

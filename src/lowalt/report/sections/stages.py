@@ -1,0 +1,28 @@
+"""Section: the time of each rule's jobs."""
+
+from pathlib import Path
+
+from lowalt.common.csv_tables import write_csv
+from lowalt.common.hardware import describe
+from lowalt.report.figures.stage_times import stage_bars
+from lowalt.report.figures.style import embedded
+from lowalt.report.run import Run
+
+COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
+
+
+def values(run: Run) -> dict:
+    """Return the times of the rules, their figure, and the number of samples."""
+    times = run.stage_times
+    return {"times": times, "samples": len(run.shards), "picture": embedded(stage_bars(times))}
+
+
+def write_stages(path: str | Path, run: Run) -> None:
+    """Write the times of the rules as CSV, with the number of samples, bytes a sample and the hardware."""
+    hardware = describe()
+    rows = []
+    for entry in run.stage_times:
+        seconds = (f"{entry['wall_s']:.2f}", f"{entry['cpu_s']:.2f}", f"{entry['peak_mib']:.0f}")
+        size = f"{run.sample_bytes:.0f}"
+        rows.append([entry["rule"], entry["jobs"], *seconds, len(run.shards), size, hardware])
+    write_csv(path, COLUMNS, rows)
