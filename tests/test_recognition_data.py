@@ -41,7 +41,7 @@ def cache(path, found, size=16):
 
 
 def test_the_table_of_schemes_holds_every_row_of_the_paper():
-    table = schemes.read("config/schemes.csv")
+    table = schemes.read("config/schemes.csv", "ABC")
     with Path("config/published_accuracy.csv").open(newline="") as file:
         published = {(row["protocol"], row["scheme"]) for row in csv.DictReader(file)}
     ours = {(protocol, entry.name) for entry in table.values() for protocol in entry.protocols}
@@ -49,7 +49,7 @@ def test_the_table_of_schemes_holds_every_row_of_the_paper():
     assert table["ABC:VRP+TRP+VT"].columns == list(range(9))
     assert table["B:VRP+TRP+VT"].columns == [3, 4, 5]
     assert table["A:VT"].columns == [2]
-    assert schemes.named("config/schemes.csv", "abc-vit-b-16-mean-fusion").backbone == "vit_base_patch16_224"
+    assert schemes.named("config/schemes.csv", "abc-vit-b-16-mean-fusion", "ABC").backbone == "vit_base_patch16_224"
 
 
 @pytest.mark.parametrize(
@@ -66,14 +66,14 @@ def test_wrong_schemes_are_refused(tmp_path, line, words):
     path = tmp_path / "schemes.csv"
     path.write_text(",".join(schemes.COLUMNS) + "\n" + line + "\n")
     with pytest.raises(InputError, match=words):
-        schemes.read(path)
+        schemes.read(path, "ABC")
 
 
 def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
     path = tmp_path / "schemes.csv"
     head = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
     path.write_text(f"{head}\nsmall,A,VT,mean,,seen,24,70,0.25\nplain,A,VT,mean,,seen,,,\n")
-    small, plain = schemes.read(path).values()
+    small, plain = schemes.read(path, "ABC").values()
     block = {"size": 48, "training": {"steps": 100, "batch": 4}, "seed": 1}
     assert small.settled(block) == {"size": 24, "training": {"steps": 70, "batch": 4}, "seed": 1}
     assert plain.settled(block) == block
@@ -81,7 +81,7 @@ def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
     for column, value in (("size", "4"), ("steps", "0"), ("share", "1.5"), ("share", "half")):
         path.write_text(f"{','.join((*schemes.COLUMNS, column))}\nx,A,VT,mean,,seen,{value}\n")
         with pytest.raises(InputError, match=f"{column} '{value}'"):
-            schemes.read(path)
+            schemes.read(path, "ABC")
 
 
 def test_a_share_takes_the_first_models_of_every_subtype_and_all_their_snrs():
@@ -267,7 +267,7 @@ def read_rows(path):
 
 
 def test_tables_say_what_the_predictions_say(tmp_path):
-    names = list(schemes.read("config/schemes.csv"))
+    names = schemes.names("config/schemes.csv")
     path, found, guess = run_files(tmp_path, "seen", "ABC:VRP+TRP+VT", 0.95)
     weak, _, weak_guess = run_files(tmp_path, "seen", "A:VRP+TRP+VT", 0.6, seed=3)
     weak.with_suffix(".json").write_text(weak.with_suffix(".json").read_text().replace('"seed": 3', '"seed": 0'))
@@ -312,7 +312,7 @@ def test_tables_say_what_the_predictions_say(tmp_path):
 
 
 def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
-    names = list(schemes.read("config/schemes.csv"))
+    names = schemes.names("config/schemes.csv")
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
     with pytest.raises(InputError, match="two prediction files"):
         tables.write([tables.Run(path), tables.Run(path)], names, {}, tmp_path, 1)
@@ -322,7 +322,7 @@ def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
 
 
 def test_several_seeds_are_averaged(tmp_path):
-    names = list(schemes.read("config/schemes.csv"))
+    names = schemes.names("config/schemes.csv")
     paths = [run_files(tmp_path, "seen", "A:VT", 0.9, seed=seed)[0] for seed in (0, 1, 2)]
     tables.write([tables.Run(path) for path in paths], names, {}, tmp_path, 1)
     trainings = read_rows(tmp_path / "seeds.csv")

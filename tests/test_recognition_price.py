@@ -75,9 +75,10 @@ def table(tmp_path):
     speeds = accuracy_cost.read_speeds(
         [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
     )
-    found = schemes.read(tmp_path / "schemes.csv")
+    timed = accuracy_cost.entries(tmp_path / "schemes.csv", "ABC", speeds, 280000.0)
     out = tmp_path / "accuracy_cost.csv"
-    accuracy_cost.write(runs, found, speeds, 280000.0, accuracy_cost.fidelity_rows(tmp_path / "transfer.csv"), out, 1)
+    fidelity = accuracy_cost.fidelity_rows(tmp_path / "transfer.csv")
+    accuracy_cost.write(runs, ["base", "small", "large"], timed, fidelity, out, 1)
     with out.open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -102,11 +103,11 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
 
 
 def test_runs_without_speed_or_row_are_refused(table, tmp_path):
-    found, run = schemes.read(tmp_path / "schemes.csv"), run_of(tmp_path, "base", 0)
+    run, order = run_of(tmp_path, "base", 0), ["base", "small", "large"]
     with pytest.raises(InputError, match="base"):
-        accuracy_cost.write([run], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+        accuracy_cost.write([run], order, {}, [], tmp_path / "out.csv", 1)
     with pytest.raises(InputError, match="stranger"):
-        accuracy_cost.write([run_of(tmp_path, "stranger", 0)], found, {}, 1.0, [], tmp_path / "out.csv", 1)
+        accuracy_cost.write([run_of(tmp_path, "stranger", 0)], order, {}, [], tmp_path / "out.csv", 1)
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match=r"bad\.json: not a record of speed"):
         accuracy_cost.read_speeds([tmp_path / "bad.json"])

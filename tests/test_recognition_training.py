@@ -142,6 +142,7 @@ def killed_at(moments, views, folder, settings):
     table = folder / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
     line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
+            "--stations", "A", "B", "C",
             "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(folder / "killed")]  # fmt: skip
     kept = folder / "killed" / "checkpoint.pt"
     for moment in moments:
@@ -317,7 +318,22 @@ def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
         settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
         settings["network"] = {**SETTINGS["network"], "dropout": 0.0}
         line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen"]
-        run_ranks([*line, "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(tmp_path / name)], ranks)
+        run_ranks(
+            [
+                *line,
+                "--scheme",
+                "AB:VRP+VT",
+                "--stations",
+                "A",
+                "B",
+                "C",
+                "--schemes",
+                str(table),
+                "--out",
+                str(tmp_path / name),
+            ],
+            ranks,
+        )
         found = checkpoint.load(tmp_path / name / "model.pt")[1]["weights"]
         weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
         with (tmp_path / name / "history.csv").open(newline="") as file:

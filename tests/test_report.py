@@ -107,14 +107,17 @@ def test_an_estimate_scales_samples_and_bytes():
 
 def test_training_scales_with_images_and_no_network_is_guessed_at():
     config = load(["config/default.yaml", "config/workstation.yaml"], "workflow/schemas/config.schema.yaml")
-    timed = {"backbone": "swin_tiny_patch4_window7_224", "pixels": "224", "stations": "ABC", "spectra": "VRP+TRP+VT",
-             "snr_db": "avg", "train_ms": "900", "hardware": "x"}  # fmt: skip
+    timed = {"backbone": "swin_tiny_patch4_window7_224", "pixels": "224",
+             "network_bytes": str(9 * 224**2), "train_ms": "900", "hardware": "x"}  # fmt: skip
     # Both protocols: three schemes of one image, three of three, one of nine; mean fusion in one protocol only.
     images = 2 * (3 * 1 + 3 * 3 + 9) + 9
     trainings, hours, hardware = training_hours([timed], config)
     assert (trainings, hardware) == (15, "x")
     assert hours == pytest.approx(images / 9 * 30000 * 64 * 0.9 / 3600)
-    assert training_hours([{**timed, "pixels": "64"}, {**timed, "stations": "A"}], config) == (15, None, "")
+    assert training_hours(
+        [{**timed, "pixels": "64", "network_bytes": str(9 * 64**2)}, {**timed, "network_bytes": str(3 * 224**2)}],
+        config,
+    ) == (15, None, "")
 
 
 @pytest.fixture

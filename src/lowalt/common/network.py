@@ -39,6 +39,14 @@ class Station:
         return np.array([-sine, cosine, 0.0])
 
 
+def station_names(block: dict) -> list[str]:
+    """Return the names of the stations of a `network` block in their one order, the alphabetical one.
+
+    Settings travel as JSON with sorted keys, so no other order would reach every stage.
+    """
+    return sorted(block["stations"])
+
+
 @dataclass(frozen=True)
 class Network:
     """The stations and the signal they share.
@@ -73,7 +81,7 @@ class Network:
     def from_settings(cls, block: dict) -> "Network":
         """Build the network from the configuration's `network` block.
 
-        Sub-bands follow each other in the order of the stations: f_{k+1} = f_k + (M - 1 + guard) df.
+        Sub-bands follow each other in the alphabetical order of the stations: f_{k+1} = f_k + (M - 1 + guard) df.
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         keys = {
@@ -84,7 +92,8 @@ class Network:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
         step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
         stations = []
-        for index, (name, place) in enumerate(block["stations"].items()):
+        for index, name in enumerate(station_names(block)):
+            place = block["stations"][name]
             position = tuple(float(value) for value in place["position_m"])
             if len(position) != 3 or not all(map(math.isfinite, position)):
                 raise InputError(f"network: stations.{name}.position_m is {position}, expected three finite metres")

@@ -21,7 +21,9 @@ Settings: seed. accuracy_cost.csv, one row a scheme and SNR ("avg": mean over th
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,8 +31,9 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.csv_tables import read_csv, short, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
+from lowalt.common.network import station_names
 from lowalt.common.streams import stream
-from lowalt.recognition.schemes import SPECTRA, STATIONS, TABLE, Scheme, read
+from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
 from lowalt.recognition.statistics import accuracy_by, paired_difference, pareto
 from lowalt.recognition.tables import Run, snr_text
 
@@ -64,11 +67,37 @@ def read_speeds(paths: list[str | Path]) -> dict[str, dict]:
     return found
 
 
-def _what(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
+class Entry(NamedTuple):
+    """A scheme with its measured times; `stations` as the table of schemes writes them."""
+
+    scheme: Scheme
+    stations: str
+    speed: dict
+    shard_bytes: float
+
+
+def entries(
+    table: str | Path, stations: Sequence[str], speeds: dict[str, dict], shard_bytes: float
+) -> dict[str, Entry]:
+    """Return the entry of every scheme with a speed, by name, in the order of `speeds`.
+
+    table: table of schemes; stations: names of the network's stations, in its order.
+    Raises: InputError for a scheme that the table lacks, or that names another station.
+    """
+    found = {}
+    for name, speed in speeds.items():
+        scheme = named(table, name, stations)
+        heard = joined([stations[number] for number in scheme.stations])
+        found[name] = Entry(scheme, heard, speed, shard_bytes)
+    return found
+
+
+def _what(entry: Entry) -> dict:
+    scheme, stations, speed, shard_bytes = entry
     spectra = "+".join(SPECTRA[number] for number in scheme.spectra)
     return {
         "scheme": scheme.name, "backbone": speed["backbone"], "pixels": speed["size"], "spectra": spectra,
-        "stations": "".join(STATIONS[number] for number in scheme.stations), "steps": speed["steps"],
+        "stations": stations, "steps": speed["steps"],
         "parameters": speed["parameters"], "inference_ms_1": speed["inference_ms_1"],
         "inference_ms_64": speed["inference_ms_64"], "train_ms": speed["train_ms"],
         "network_bytes": len(scheme.columns) * speed["size"] ** 2, "shard_bytes": shard_bytes,
@@ -82,12 +111,12 @@ def _shares(run: Run, part: str) -> dict[str, float]:
     return {**table, "avg": float(np.mean(list(table.values())))} if table else {}
 
 
-def trained_rows(run: Run, base: Run, scheme: Scheme, speed: dict, shard_bytes: float, seed: int) -> list[dict]:
+def trained_rows(run: Run, base: Run, entry: Entry, seed: int) -> list[dict]:
     """Return one row an SNR and one for their average of a trained scheme, compared with `base` on the same samples."""
     if not np.array_equal(run.test.key, base.test.key):
         raise InputError(f"{run.scheme} and {base.scheme} were tested on different samples")
     same = {
-        **_what(scheme, speed, shard_bytes), "kind": "trained", "steps": run.about["steps"],
+        **_what(entry), "kind": "trained", "steps": run.about["steps"],
         "train_samples": run.about["train_samples"], "core_s_training": run.about["train_processor_s"],
     }  # fmt: skip
     seen, unseen = _shares(run, "seen_test"), _shares(run, "test")
@@ -104,11 +133,11 @@ def trained_rows(run: Run, base: Run, scheme: Scheme, speed: dict, shard_bytes: 
     return rows
 
 
-def timed_row(scheme: Scheme, speed: dict, shard_bytes: float) -> dict:
+def timed_row(entry: Entry) -> dict:
     """Return the row of a network that was timed and not trained; a whole training is that of its settings."""
     return {
-        **_what(scheme, speed, shard_bytes), "kind": "timed", "snr_db": "avg",
-        "core_s_training": speed["train_ms"] / 1e3 * speed["steps"] * speed["batch"],
+        **_what(entry), "kind": "timed", "snr_db": "avg",
+        "core_s_training": entry.speed["train_ms"] / 1e3 * entry.speed["steps"] * entry.speed["batch"],
     }  # fmt: skip
 
 
@@ -139,23 +168,23 @@ def _or_nan(value: float | None) -> float:
 
 
 def write(
-    runs: list[Run], schemes: dict[str, Scheme], speeds: dict[str, dict], shard_bytes: float, fidelity: list[dict],
-    out: str | Path, seed: int,
+    runs: list[Run], order: list[str], timed: dict[str, Entry], fidelity: list[dict], out: str | Path, seed: int
 ) -> None:  # fmt: skip
-    """Write accuracy_cost.csv: trained schemes in the table's order, then the timed ones, then `fidelity` rows.
+    """Write accuracy_cost.csv: trained schemes in `order`, then those only timed, then `fidelity` rows.
 
+    order: names of the table of schemes; timed: as `entries` gives it.
     Raises: InputError for a run without a scheme or a speed.
     """
-    order = [name for name in schemes if name in {run.scheme for run in runs}]
     by_name = {run.scheme: run for run in runs}
-    lacking = sorted(set(by_name) - set(order)) or sorted(set(order) - set(speeds))
+    order = [name for name in order if name in by_name]
+    lacking = sorted(set(by_name) - set(order)) or sorted(set(order) - set(timed))
     if lacking or not order:
         raise InputError(f"{lacking}: no row in the table of schemes, or no record of speed")
     base = by_name[order[0]]
     rows: list[dict] = []
     for name in order:
-        rows += trained_rows(by_name[name], base, schemes[name], speeds[name], shard_bytes, seed)
-    rows += [timed_row(schemes[name], speeds[name], shard_bytes) for name in speeds if name not in by_name]
+        rows += trained_rows(by_name[name], base, timed[name], seed)
+    rows += [timed_row(entry) for name, entry in timed.items() if name not in by_name]
     mark_front(rows)
     write_csv(out, COLUMNS, [[short(row.get(name)) for name in COLUMNS] for row in rows + fidelity])
 
@@ -171,11 +200,13 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
-    shards = json.loads(existing(given.index, "index").read_text())["shards"]
+    index = json.loads(existing(given.index, "index").read_text())
+    shards, stations = index["shards"], station_names(index["render"]["network"])
     size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
     runs, speeds = [Run(path) for path in given.predictions], read_speeds(given.speeds)
     fidelity = fidelity_rows(given.fidelity) if given.fidelity else []
-    write(runs, read(given.schemes), speeds, size, fidelity, given.out, seed)
+    timed = entries(given.schemes, stations, speeds, size)
+    write(runs, names(given.schemes), timed, fidelity, given.out, seed)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """What a scheme's network costs in time on this machine: inference a sample, and a training step a sample.
 
-    python -m lowalt.measure.network_speed --settings JSON --scheme NAME --out speed.json
+    python -m lowalt.measure.network_speed --settings JSON --scheme NAME --stations A B C
+        --out speed.json
 
 Settings: seed, size, colour_map, network, training, augmentation.
 The weights are untrained, since time does not depend on them. The images are in memory, so reading is not timed.
@@ -101,10 +102,11 @@ def main(arguments: list[str]) -> None:
     options = parser("lowalt.measure.network_speed", __doc__.splitlines()[0])
     options.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     options.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    options.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     options.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
     options.add_argument("--out", required=True, help="record to write (.json)")
     given = options.parse_args(arguments)
-    scheme = named(given.schemes, given.scheme)
+    scheme = named(given.schemes, given.scheme, given.stations)
     found = measure(scheme, scheme.settled(given.settings), given.limit_s)
     with replacing(given.out) as temporary:
         temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")

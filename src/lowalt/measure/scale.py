@@ -14,8 +14,9 @@ from lowalt.common.command import run
 from lowalt.common.config import load
 from lowalt.common.csv_tables import read_csv, write_csv
 from lowalt.common.errors import InputError
+from lowalt.common.network import station_names
 from lowalt.common.plan import Plan
-from lowalt.recognition.schemes import SPECTRA, STATIONS, read
+from lowalt.recognition.schemes import named
 from lowalt.targets.records import load_table
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
@@ -23,7 +24,7 @@ COLUMNS = (
     "configuration", "motion_models", "samples", "core_hours", "shards_gb", "noisy_gb", "measured_on",
     "trainings", "training_core_hours", "training_measured_on",
 )  # fmt: skip
-COST_COLUMNS = ("backbone", "pixels", "stations", "spectra", "snr_db", "train_ms", "hardware")
+COST_COLUMNS = ("backbone", "pixels", "network_bytes", "train_ms", "hardware")
 
 
 def samples_of(config: dict) -> tuple[int, int]:
@@ -36,29 +37,35 @@ def samples_of(config: dict) -> tuple[int, int]:
     return models, models * len(plan.snrs)
 
 
+def _images(row: dict[str, str]) -> int:
+    """Images of a sample that the network of a row takes in, a byte a pixel."""
+    return int(row["network_bytes"]) // int(row["pixels"]) ** 2
+
+
 def training_hours(costs: list[dict[str, str]], config: dict) -> tuple[int, float | None, str]:
     """Return (trainings, core-hours of them all, hardware) of a configuration; None and "" if a network was not timed.
 
-    costs: rows of accuracy_cost.csv; those of all nine images a sample count, and schemes of fewer take their share.
+    costs: rows of accuracy_cost.csv. Of each network the row of the most images a sample counts; a scheme of another
+    number of images takes time in proportion.
     """
-    block, views = config["recognition"], len(STATIONS) * len(SPECTRA)
-    known = {
-        (row["backbone"], int(row["pixels"])): row
-        for row in costs
-        if row["train_ms"] and len(row["stations"]) * (row["spectra"].count("+") + 1) == views
-    }
-    table = read(block["table"])
+    block, known = config["recognition"], {}
+    for row in costs:
+        key = row["backbone"], int(row["pixels"] or 0)
+        if row["train_ms"] and (key not in known or _images(row) > _images(known[key])):
+            known[key] = row
+    most = max(map(_images, known.values()), default=0)
+    stations = station_names(config["network"])
     number, hours, hardware = 0, 0.0, ""
-    for scheme in (table[name] for name in block["schemes"]):
+    for scheme in (named(block["table"], name, stations) for name in block["schemes"]):
         settings = scheme.settled(block)
         repeats = len(set(block["protocols"]) & set(scheme.protocols)) * len(block["seeds"])
         number += repeats
         measured = known.get((scheme.backbone or block["network"]["backbone"], settings["size"]))
-        if measured is None:
+        if measured is None or _images(measured) < most:
             hours = math.nan
             continue
         visits = repeats * settings["training"]["steps"] * settings["training"]["batch"]
-        hours += visits * float(measured["train_ms"]) * len(scheme.columns) / views / 3.6e6
+        hours += visits * float(measured["train_ms"]) * len(scheme.columns) / most / 3.6e6
         hardware = measured["hardware"]
     return (number, None, "") if math.isnan(hours) else (number, hours, hardware)
 

@@ -9,7 +9,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, read
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
 
 
 def _views(arguments: list[str]) -> None:
@@ -71,12 +71,13 @@ def _train(arguments: list[str]) -> None:
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     given = line.parse_args(arguments)
     if given.frozen:
         verify(given.frozen)
-    scheme = named(given.schemes, given.scheme)
+    scheme = named(given.schemes, given.scheme, given.stations)
     pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation")
     settings = scheme.settled(given.settings)
     samples = {
@@ -122,7 +123,7 @@ def _tables(arguments: list[str]) -> None:
     (seed,) = pick(given.settings, "seed")
     published = read_published(given.published) if given.published else {}
     runs = [tables.Run(path) for path in given.predictions]
-    tables.write(runs, list(read(given.schemes)), published, given.out, seed)
+    tables.write(runs, names(given.schemes), published, given.out, seed)
 
 
 def _transfer(arguments: list[str]) -> None:
@@ -142,7 +143,7 @@ def _transfer(arguments: list[str]) -> None:
     for other in others:
         transfer.check_folds(first, other)
     own, other = ([Run(path) for path in paths] for paths in (given.own, given.other))
-    transfer.write(own, other, list(read(given.schemes)), given.out, seed)
+    transfer.write(own, other, names(given.schemes), given.out, seed)
 
 
 def _distances(arguments: list[str]) -> None:

@@ -26,8 +26,9 @@ from torch import nn
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import SPECTRA, Scheme
+from lowalt.targets.cloud import CATEGORIES
 
-CLASSES = 4
+CLASSES = len(CATEGORIES)
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
 
 

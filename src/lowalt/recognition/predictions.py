@@ -20,8 +20,9 @@ from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.recognition.samples import Facts
+from lowalt.targets.cloud import CATEGORIES
 
-CLASSES = ("p_uav", "p_bird", "p_vehicle", "p_pedestrian")
+CLASSES = tuple(f"p_{name.lower()}" for name in CATEGORIES)
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg", *CLASSES)
 
 

@@ -21,7 +21,7 @@ from lowalt.common.hardware import describe
 from lowalt.recognition import augment, checkpoint, metrics, network, predictions, recipe
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import SPECTRA, STATIONS, Scheme
+from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
 from lowalt.targets.cloud import CATEGORIES
@@ -140,7 +140,7 @@ def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path
 
 
 def images_of(path: Path, settings: dict) -> np.ndarray:
-    """Return the nine index images (9, S, S) uint8 of a signal file or a tile.
+    """Return all index images (3 stations, S, S) uint8 of a signal file or a tile.
 
     path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
     Raises: InputError for another kind of file or a shape that does not fit.
@@ -167,8 +167,8 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     """Return the probability of each category for one signal file or tile, in full precision."""
     images = images_of(path, settings)
-    if len(images) != len(STATIONS) * len(SPECTRA):
-        raise InputError(f"{path}: {len(images)} images, expected {len(STATIONS) * len(SPECTRA)}")
+    if len(images) <= max(trained.scheme.columns):
+        raise InputError(f"{path}: {len(images)} images, the model needs at least {max(trained.scheme.columns) + 1}")
     views = resize(images, trained.size)[trained.scheme.columns]
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]

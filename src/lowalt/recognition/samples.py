@@ -4,7 +4,7 @@ Both sources answer the same calls: `facts` (labels and what is known of each sa
 `views(numbers, columns)`, uint8 index images of the scheme's size. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
-    views   (samples, 9, size, size) uint8, station-major, index images averaged over areas
+    views   (samples, 3 stations, size, size) uint8, station-major, index images averaged over areas
     one array (samples,) for every name of FACTS
 """
 
@@ -16,8 +16,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
-
-VIEWS = 9
+from lowalt.recognition.schemes import SPECTRA
 
 
 @dataclass(frozen=True)
@@ -115,8 +114,13 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
             images = data["views"]
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a views file ({error})") from error
-    if images.ndim != 4 or images.shape[:2] != (len(facts), VIEWS) or images.dtype != np.uint8:
-        raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {VIEWS}, S, S)")
+    count = len(SPECTRA) * facts.range_m.shape[1]
+    if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
+        raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)")
+    if max(columns) >= count:
+        raise InputError(
+            f"{path}: {facts.range_m.shape[1]} stations, the scheme needs {max(columns) // len(SPECTRA) + 1}"
+        )
     return images[keep][:, columns], facts.take(keep)
 
 

@@ -3,7 +3,7 @@
 The paper's rows stand in `config/schemes.csv`, one line a scheme:
 
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
-    stations    letters of the stations, in the order of the network's table
+    stations    names of stations of the run's network, joined by "+"; names of one letter may stand together, "ABC"
     spectra     spectra joined by "+"
     fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
@@ -16,16 +16,16 @@ A table may have more columns, which a row leaves empty to take the configuratio
     share       share of the motion models of each subtype that train, 0..1 (empty: all)
 """
 
-import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, slug
+from lowalt.common.files import slug
 
 TABLE = "config/schemes.csv"
 """Where the table of schemes stands if a command names no other."""
-STATIONS = ("A", "B", "C")
 SPECTRA = ("VRP", "TRP", "VT")
 FUSIONS = ("attention", "mean")
 PROTOCOLS = ("seen", "unseen")
@@ -35,8 +35,8 @@ OPTIONAL = ("size", "steps", "share")
 
 @dataclass(frozen=True)
 class Scheme:
-    """One row: `stations` and `spectra` are index tuples into STATIONS and SPECTRA; size and steps are 0 where the
-    row leaves them to the configuration."""
+    """One row: `stations` and `spectra` are index tuples into the network's stations and SPECTRA; size and steps are 0
+    where the row leaves them to the configuration."""
 
     name: str
     stations: tuple[int, ...]
@@ -60,7 +60,7 @@ class Scheme:
 
     @property
     def columns(self) -> list[int]:
-        """Positions of the scheme's views among the nine of a sample, station-major."""
+        """Positions of the scheme's views among all views of a sample, station-major."""
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
 
 
@@ -83,8 +83,18 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
     return value
 
 
-def scheme(row: dict, where: str) -> Scheme:
-    """Return the scheme of one table row (all values are strings).
+def _station_names(text: str, known: Sequence[str]) -> list[str]:
+    names = text.split("+")
+    return names if set(names) <= set(known) else list(text)
+
+
+def joined(names: Sequence[str]) -> str:
+    """Return names of stations as the table of schemes writes them: "ABC", "north+south"."""
+    return ("" if all(len(name) == 1 for name in names) else "+").join(names)
+
+
+def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
+    """Return the scheme of one table row (all values are strings) for a network of these stations, in its order.
 
     Raises: InputError naming `where`, the column and the value.
     """
@@ -95,9 +105,10 @@ def scheme(row: dict, where: str) -> Scheme:
         raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
     protocols = tuple(row["protocols"].split("+"))
     _indices(row["protocols"], list(protocols), PROTOCOLS, "protocols", where)
+    heard = _station_names(row["stations"], stations)
     return Scheme(
         name=row["scheme"],
-        stations=_indices(row["stations"], list(row["stations"]), STATIONS, "stations", where),
+        stations=_indices(row["stations"], heard, tuple(stations), "stations", where),
         spectra=_indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
         fusion=row["fusion"],
         backbone=row["backbone"],
@@ -108,30 +119,39 @@ def scheme(row: dict, where: str) -> Scheme:
     )
 
 
-def read(path: str | Path) -> dict[str, Scheme]:
-    """Return all schemes of a table by name, in its order.
-
-    Raises: InputError naming the file, the line and what is wrong, or a name that stands twice.
-    """
-    found: dict[str, Scheme] = {}
-    with existing(path, "schemes").open(newline="") as file:
-        for number, row in enumerate(csv.DictReader(file), start=2):
-            entry = scheme(row, f"{path} line {number}")
-            if entry.name in found or entry.slug in {other.slug for other in found.values()}:
-                raise InputError(f"{path} line {number}: scheme {entry.name!r} stands twice")
-            found[entry.name] = entry
+def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
+    """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
+    found: dict[str, tuple[dict, str]] = {}
+    for number, row in enumerate(read_csv(path, "scheme"), start=2):
+        name, where = row["scheme"], f"{path} line {number}"
+        if slug(name) in map(slug, found):
+            raise InputError(f"{where}: scheme {name!r} stands twice")
+        found[name] = row, where
     if not found:
         raise InputError(f"{path}: no schemes, expected at least one row")
     return found
 
 
-def named(path: str | Path, name: str) -> Scheme:
-    """Return the scheme called `name` (or with that slug) from a table.
+def names(path: str | Path) -> list[str]:
+    """Return the names of all schemes of a table, in its order. Raises: InputError for a name that stands twice."""
+    return list(_rows(path))
 
-    Raises: InputError naming the schemes there are.
+
+def read(path: str | Path, stations: Sequence[str]) -> dict[str, Scheme]:
+    """Return all schemes of a table by name, in its order, for a network of these stations.
+
+    Raises: InputError naming the file, the line and what is wrong, or a name that stands twice.
     """
-    table = read(path)
-    for entry in table.values():
-        if name in (entry.name, entry.slug):
-            return entry
-    raise InputError(f"scheme {name!r}: not in {path}, which has {list(table)}")
+    return {name: scheme(row, where, stations) for name, (row, where) in _rows(path).items()}
+
+
+def named(path: str | Path, name: str, stations: Sequence[str]) -> Scheme:
+    """Return the scheme called `name` (or with that slug) from a table; its other rows may name other stations.
+
+    Raises: InputError naming the schemes there are, or what is wrong with this one.
+    """
+    rows = _rows(path)
+    for known, (row, where) in rows.items():
+        if name in (known, slug(known)):
+            return scheme(row, where, stations)
+    raise InputError(f"scheme {name!r}: not in {path}, which has {list(rows)}")

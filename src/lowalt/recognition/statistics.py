@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-CLASSES = 4
-UAV = 0
+from lowalt.targets.cloud import CATEGORIES
+
+CLASSES = len(CATEGORIES)
+UAV = CATEGORIES.index("UAV")
 
 
 def cross_entropy(probabilities: np.ndarray, labels: np.ndarray) -> float:

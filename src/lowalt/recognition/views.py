@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.common.network import Network, station_names
 from lowalt.recognition import samples
-from lowalt.recognition.samples import VIEWS, Facts
-from lowalt.recognition.schemes import SPECTRA, STATIONS
+from lowalt.recognition.samples import Facts
+from lowalt.recognition.schemes import SPECTRA
 from lowalt.shards import ShardSet
 
 _KEY = re.compile(r"(.+)-\d{6}-snr")
@@ -50,7 +50,7 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     owner = np.searchsorted(ends, numbers, side="right")
     keys = np.array([key.decode() for key in shards.keys[numbers]])
     network = Network.from_settings(shards.index["render"]["network"])
-    blank = ([math.nan] * len(STATIONS), [math.nan] * len(STATIONS))
+    blank = ([math.nan] * len(network.stations), [math.nan] * len(network.stations))
     names: dict[str, str] = {}
     subtypes, places = [], []
     for key, number in zip(keys, numbers, strict=True):
@@ -89,7 +89,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path) -> int
     place = names.index(name)
     start = sum(shard["samples"] for shard in shards.shards[:place])
     numbers = np.arange(start, start + shards.shards[place]["samples"])
-    views = np.empty((len(numbers), VIEWS, size, size), dtype=np.uint8)
+    views = np.empty((len(numbers), len(shards.columns()), size, size), dtype=np.uint8)
     for row, number in enumerate(numbers):
         views[row] = shards.images(number, size)
     # The images' bytes have been checked: the records need no second look.
@@ -109,7 +109,10 @@ class ShardSamples:
         """
         groups, names = sorted({group for group, _ in folds}), sorted({fold for _, fold in folds})
         self.shards, self.size = ShardSet(index, groups, names), size
-        self.stations = [STATIONS[number] for number in sorted({column // len(SPECTRA) for column in columns})]
+        known = station_names(self.shards.index["render"]["network"])
+        if max(columns) >= len(SPECTRA) * len(known):
+            raise InputError(f"{index}: stations {known}, the scheme needs {max(columns) // len(SPECTRA) + 1} of them")
+        self.stations = [known[number] for number in sorted({column // len(SPECTRA) for column in columns})]
         self.spectra = [SPECTRA[number].lower() for number in sorted({column % len(SPECTRA) for column in columns})]
         flags = [[(shard["group"], shard["fold"]) in folds] * shard["samples"] for shard in self.shards.shards]
         self.numbers = np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)

@@ -2,6 +2,7 @@
 
 import functools
 
+from lowalt.common.network import station_names
 from lowalt.report.inputs import Inputs
 from lowalt.report.tables import stage_times
 from lowalt.shards import ShardSet
@@ -33,4 +34,4 @@ class Run:
     @property
     def stations(self) -> list[str]:
         """Names of the base stations, in the network's order."""
-        return list(self.config["network"]["stations"])
+        return station_names(self.config["network"])

@@ -18,6 +18,7 @@ from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.network import station_names
 from lowalt.shards import sums
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.read import ShardSet
@@ -100,7 +101,7 @@ def write_samples(shards: ShardSet, path: Path) -> None:
 
 def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
-    stations = list(shards.index["render"]["network"]["stations"])
+    stations = station_names(shards.index["render"]["network"])
     what = "3 x 3 tiles of time-frequency images" if shards.kind == "image" else "complex symbol-domain signals"
     return (
         f"Simulated echoes of low-altitude targets (UAVs, birds, vehicles, pedestrians) at the base stations "

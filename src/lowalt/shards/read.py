@@ -14,7 +14,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, sha256
-from lowalt.common.network import Network
+from lowalt.common.network import Network, station_names
 from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
 from lowalt.shards.index import load
@@ -183,15 +183,15 @@ class ShardSet:
         return images if size in (None, images.shape[-1]) else resize(images, size)
 
     def columns(self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None) -> list[int]:
-        """Return the numbers, among the nine images, of some stations and views (all by default).
+        """Return the numbers, among all images of a sample, of some stations and views (all by default).
 
         Raises: InputError naming an unknown one.
         """
-        known = list(self.index["render"]["network"]["stations"])
+        known = station_names(self.index["render"]["network"])
         stations, views = list(known if stations is None else stations), list(VIEWS if views is None else views)
         if set(stations) - set(known) or set(views) - set(VIEWS):
             raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(VIEWS)}")
-        return [3 * known.index(station) + VIEWS.index(view) for station in stations for view in views]
+        return [len(VIEWS) * known.index(station) + VIEWS.index(view) for station in stations for view in views]
 
     def _need(self, kind: str) -> None:
         if self.kind != kind:

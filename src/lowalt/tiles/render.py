@@ -202,14 +202,14 @@ def normalised(signal: np.ndarray) -> np.ndarray:
 
 
 def split(tile: np.ndarray) -> np.ndarray:
-    """Return the images of a tile, (3 S, 3 S) -> (9, S, S): station by station, VRP, TRP, VT."""
+    """Return the images of a tile, (stations S, 3 S) -> (3 stations, S, S): station by station, VRP, TRP, VT."""
     size = tile.shape[1] // len(VIEWS)
     grid = tile.reshape(tile.shape[0] // size, size, len(VIEWS), size)
     return np.ascontiguousarray(grid.swapaxes(1, 2)).reshape(-1, size, size)
 
 
 def join(images: np.ndarray) -> np.ndarray:
-    """Return the tile of images, (9, S, S) -> (3 S, 3 S): the inverse of `split`."""
+    """Return the tile of images, (3 stations, S, S) -> (stations S, 3 S): the inverse of `split`."""
     size = images.shape[-1]
     grid = images.reshape(-1, len(VIEWS), size, size).swapaxes(1, 2)
     return np.ascontiguousarray(grid).reshape(-1, len(VIEWS) * size)
