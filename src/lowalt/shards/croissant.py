@@ -5,6 +5,7 @@ Source: Croissant format specification 1.0 (MLCommons).
 
 from lowalt.shards.table import EXTENSIONS
 from lowalt.targets.cloud import CATEGORIES
+from lowalt.tiles import VIEWS
 
 CONTEXT = {
     "@language": "en",
@@ -62,7 +63,7 @@ FIELDS = {
 """Columns of the table of all samples: data type and meaning."""
 
 MEDIA = {
-    "image": ("image/png", "sc:ImageObject", "768 x 768 palette PNG: rows are stations, columns VRP, TRP, VT."),
+    "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns VRP, TRP, VT."),
     "signal": ("application/octet-stream", "sc:Text", "Signals (stations, symbols), complex64, as an .npy file."),
 }
 
@@ -82,6 +83,8 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     ]
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
     mime, data_type, meaning = MEDIA[kind]
+    size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
+    meaning = meaning.format(len(VIEWS) * size, stations * size)
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
     sets = [
         _files("records", inside, "application/json", "*.json", "JSON record of every sample: motion, geometry, seed."),
