@@ -1,42 +1,28 @@
 """The house: one street in one direction, light entrances, and nothing in the repository that does not belong there."""
 
 import ast
+import io
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
-from lowalt.workflow.sources import PACKAGE
+from lowalt.common.street import PACKAGE, STREET, modules, rooms_imported
+from lowalt.report.figures import house
 
 ROOT = Path(__file__).parent.parent
-STREET = [
-    "common", "targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition", "measure",
-    "report", "workflow",
-]  # fmt: skip
 STAGES = [name for name in STREET if name not in ("common", "measure", "workflow")]
-
-
-def stages_imported(path: Path) -> set[str]:
-    """Stage folders that a file's imports name."""
-    names = []
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module == "lowalt":
-            names += [f"lowalt.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names.append(node.module)
-    parts = [name.split(".") for name in names]
-    return {part[1] for part in parts if part[0] == "lowalt" and len(part) > 1 and part[1] in STREET}
 
 
 @pytest.mark.parametrize("stage", STREET)
 def test_a_stage_imports_only_what_stands_before_it(stage):
     allowed = set(STREET[: STREET.index(stage) + 1])
-    files = sorted((PACKAGE / stage).rglob("*.py"))
+    files = modules(stage)
     assert files
-    wrong = {path.name: stages_imported(path) - allowed for path in files if stages_imported(path) - allowed}
+    wrong = {path.name: rooms_imported(path) - allowed for path in files if rooms_imported(path) - allowed}
     assert not wrong
 
 
@@ -45,6 +31,18 @@ def test_who_only_wants_data_never_imports_torch(stage):
     program = f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "False"
+
+
+def test_the_street_holds_every_room():
+    assert {path.parent.name for path in PACKAGE.glob("*/__init__.py")} == set(STREET)
+
+
+def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
+    rows, columns = house.imports()
+    assert ("measure", "recognition") in zip(rows, columns, strict=True)
+    assert not {(room, other) for room, other in zip(rows, columns, strict=True) if room == "common"}
+    picture = np.asarray(Image.open(io.BytesIO(house.draw())).convert("L"))
+    assert picture.min() < 100 < 250 < picture.max()
 
 
 def test_every_module_says_what_it_holds():

@@ -1,1 +1,1 @@
-"""Measuring: what accuracy, effects and networks cost in time. Nothing here makes data or draws."""
+"""Measuring: the time that accuracy, effects and networks cost. Nothing here makes data or draws."""

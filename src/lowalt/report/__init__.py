@@ -1,1 +1,1 @@
-"""Report: one self-contained page of what a run made, how well it was recognised and what each stage cost."""
+"""Report: one self-contained page of a run, and the figures of all measured tables."""

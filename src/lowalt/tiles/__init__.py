@@ -1,4 +1,4 @@
-"""Images of spectra: index images, 3 x 3 tiles, palette PNG."""
+"""Images of spectra: index images, tiles of stations by spectra, palette PNG."""
 
 from lowalt.tiles.colour import colour_map, paint
 from lowalt.tiles.png import decode, encode

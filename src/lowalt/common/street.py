@@ -1,0 +1,38 @@
+"""The plan of the package: its rooms in the order in which data passes them, and which room imports which.
+
+A room imports only rooms that stand before it: `tests/test_house.py` checks this, and `lowalt.report.figures.house`
+draws it.
+"""
+
+import ast
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+STREET = (
+    "common", "targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition", "measure",
+    "report", "workflow",
+)  # fmt: skip
+
+
+def modules(room: str) -> list[Path]:
+    """Return the Python files of a room, those of its inner rooms included, sorted."""
+    return sorted((PACKAGE / room).rglob("*.py"))
+
+
+def rooms_imported(path: Path) -> set[str]:
+    """Return the rooms that the imports of one file name, its own included where it imports from there."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module == PACKAGE.name:
+            names += [f"{PACKAGE.name}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.append(node.module)
+    parts = [name.split(".") for name in names]
+    return {part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET}
+
+
+def purpose(path: Path) -> str:
+    """Return the first line of a file's docstring without its full stop."""
+    return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0].rstrip(".")
