@@ -11,6 +11,8 @@ from lowalt.common.config import merge, plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
+from lowalt.report.inputs import OPTIONAL
+from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import FIDELITY, Products
@@ -177,14 +179,30 @@ def test_the_table_of_other_runs_is_named_with_its_command_where_it_is_missing(t
 
 
 def test_options_stand_only_where_their_input_does():
-    none = Inputs(occluders="", powers="", cost=[], effects=[], index="i")
-    every = Inputs(occluders="o", powers="p", cost=list("abc"), effects=list("de"), views="v w", tiles="t")
-    found = {name: getattr(options, name) for name in ("occluders", "powers", "tiles", "cost", "effects")}
+    none = Inputs(occluders="", powers="", index="i")
+    every = Inputs(occluders="o", powers="p", views="v w", tiles="t")
+    found = {name: getattr(options, name) for name in ("occluders", "powers", "tiles")}
     assert {name: build(CHUNK, none) for name, build in found.items()} == dict.fromkeys(found, "")
     assert [build(CHUNK, every) for build in found.values()] == [
-        "--occluders o", "--powers p", "--tiles t", "--cost a b c", "--effects d e",
+        "--occluders o", "--powers p", "--tiles t",
     ]  # fmt: skip
     assert (options.samples(CHUNK, none), options.samples(CHUNK, every)) == ("--index i", "--views v w")
+
+
+def test_the_report_s_files_are_a_manifest_that_the_report_takes():
+    shown = {"cost": True, "effects": True, "accuracy": "a.csv", "published": "config/published_accuracy.csv"}
+    for overlay, names in (
+        ({"report": {"cost": False}}, set()),
+        (
+            {"report": shown, "recognition": {"transfer": ["other"]}},
+            {"transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects", "effects_figure"},
+        ),
+    ):
+        _, products, _ = parts(overlay)
+        files = ReportInputs(products.report(CHUNK)).files
+        assert names == (set(files) & set(OPTIONAL)) - {"published"}
+        assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
+    assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)
 
 
 def test_a_run_that_transfers_from_itself_is_refused():

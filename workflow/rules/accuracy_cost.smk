@@ -20,9 +20,10 @@ rule speed:
     threads: workflow.cores or 1
     params:
         settings=settings.training,
+        stations=RUN.stations,
     shell:
         "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme}"
-        " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        " --schemes {input.schemes:q} --stations {params.stations} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_table:

@@ -80,9 +80,10 @@ rule train:
         settings=settings.training,
         source=options.samples,
         events="--tensorboard" if config["recognition"]["tensorboard"] else "",
+        stations=RUN.stations,
     shell:
         "python -m lowalt.recognition train --settings {params.settings:q} {params.source} --frozen {input.frozen:q}"
-        " --schemes {input.schemes:q} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
+        " --schemes {input.schemes:q} --stations {params.stations} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
         " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"
 
 

@@ -1,11 +1,13 @@
 """The files each rule reads, by the plan of the run. Each method takes the wildcards of a job and can stand in a rule's
 `input:`. Nothing is read here; whether a file exists is asked only where no rule of the run can make it."""
 
+import os
 from pathlib import Path
 from typing import Any
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
+from lowalt.common.street import PACKAGE
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -110,15 +112,33 @@ class Products:
             raise InputError(f"no {FIDELITY}: it comes from runs of their own, `make accuracy-cost` makes it first")
         return FIDELITY
 
-    def cost(self, wildcards: Any) -> list[str]:
-        """Tables and figure of what the echo's accuracy costs, where the report shows them."""
-        stem = f"results/{wildcards.run}/cost"
-        return [stem + end for end in (".csv", "_pixels.csv", ".png")] if self._config["report"]["cost"] else []
+    def report(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """The files of the report by the names of its manifest (`lowalt.report.inputs`)."""
+        base, data, block = f"results/{wildcards.run}", f"results/{self._run.data}", self._config["report"]
+        files: dict[str, str | list[str]] = {
+            **{Path(name).stem: f"{base}/{name}" for name in (*TABLES, "seeds.csv", "ranges.csv", "aspects.csv")},
+            "published": block["published"],
+            "index": f"{data}/shards/index.json",
+            "clouds": [f"{data}/clouds/{subtype}.npz" for subtype in self._run.subtypes],
+            "gallery": f"{data}/clouds.png",
+            "motion": f"{data}/motion/{self._run.plan.chunks[0]}.csv",
+            "distances": f"{data}/distances.csv",
+            "benchmarks": self.benchmarks(wildcards),
+        }
+        if self._config["recognition"]["transfer"]:
+            files["transfer"] = f"{base}/transfer.csv"
+        if block["accuracy"]:
+            files["accuracy_cost"] = block["accuracy"]
+        if block["cost"]:
+            files["echo_cost"], files["echo_pixels"] = f"{base}/cost.csv", f"{base}/cost_pixels.csv"
+            files["echo_cost_figure"] = f"{base}/cost.png"
+        if block["effects"]:
+            files["effects"], files["effects_figure"] = f"{base}/effects.csv", f"{base}/effects.png"
+        return files
 
-    def effects(self, wildcards: Any) -> list[str]:
-        """Table and figure of what effects cost and do, where the report shows them."""
-        stem = f"results/{wildcards.run}/effects"
-        return [stem + end for end in (".csv", ".png")] if self._config["report"]["effects"] else []
+    def page_templates(self, wildcards: Any) -> list[str]:
+        """The templates of the page and of its sections."""
+        return [os.path.relpath(path) for path in sorted((PACKAGE / "report").rglob("*.html"))]
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from lowalt.common.config import check, plain
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
-from lowalt.common.network import Network
+from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, named
@@ -46,7 +46,10 @@ class Run:
         Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
         Images.from_settings(config["images"])
         block = config["recognition"]
-        schemes = {name: named(block["table"], name) for name in (*block["schemes"], *block["timed"])}
+        schemes = {
+            name: named(block["table"], name, station_names(config["network"]))
+            for name in (*block["schemes"], *block["timed"])
+        }
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
         if config["effects"]:
@@ -72,7 +75,7 @@ class Run:
     @cached_property
     def stations(self) -> list[str]:
         """Names of the base stations, in the network's order."""
-        return list(self.config["network"]["stations"])
+        return station_names(self.config["network"])
 
     @property
     def echo_per_station(self) -> bool:
