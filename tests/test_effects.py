@@ -168,16 +168,17 @@ def test_idle_effects_leave_every_bit(rng):
 
 NOTHING = {
     "rotor_spread": {"spread": 0, "wander": 0}, "gusts": {"wind_mps": 0}, "cross_sections": {"strength": 0},
+    "fluctuation": {"pattern": False, "spread_db": 0},
     "occlusion": {"strength": 0}, "ground_reflection": {"permittivity": 1, "conductivity_s_m": 0},
     "clutter": {"gamma": 0}, "receiver_noise": {"temperature_k": 0}, "timing_offset": {"sigma_s": 0},
     "clock_offset": {"sigma_ppm": 0}, "carrier_offset": {"sigma_ppm": 0}, "phase_noise": {"points": []},
     "iq_imbalance": {"gain_db": 0, "phase_deg": 0}, "adc": {"bits": 0}, "canceller": {"kind": "none"},
     "cell_error": {"probability": 0},
 }  # fmt: skip
-"""Every effect that has a strength, without any; physics by need is as it is."""
+"""Every effect that has a strength, without any."""
 
 
-@pytest.mark.parametrize("name", sorted(set(PLACES) - set(BY_NEED)))
+@pytest.mark.parametrize("name", sorted(set(PLACES) - set(BY_NEED) - {"mean_cross_section"}))
 def test_every_effect_is_idle_at_zero_strength_and_not_by_default(name):
     assert called({name: NOTHING[name]}) == []
     assert [effect.name for effect in called({name: {}})] == [name]
@@ -304,7 +305,7 @@ SWITCHES = {
 }
 
 
-@pytest.mark.parametrize("name", BY_NEED)
+@pytest.mark.parametrize("name", SWITCHES)
 def test_every_bound_switches_its_effect_on_and_off(rng, name):
     cloud, row = target(rng, points=2, size_m=0.01)
     row |= {"vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0}

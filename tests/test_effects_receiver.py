@@ -45,7 +45,7 @@ FAINT = [
     (timing_offset, lambda s: {"sigma_s": 2e-8 * s}),
     (clock_offset, lambda s: {"sigma_ppm": 0.017 * s}),
     (carrier_offset, lambda s: {"sigma_ppm": 0.017 * s}),
-    (phase_noise, lambda s: {"level_db": 20 * math.log10(s), "shared": False}),
+    (phase_noise, lambda s: {"level_db": 20 * math.log10(s), "shared": False, "loop_hz": 0.0}),
     (iq_imbalance, lambda s: {"gain_db": 0.5 * s, "phase_deg": 2 * s}),
     (adc, lambda s: {"bits": 12 - round(math.log2(s))}),
 ]

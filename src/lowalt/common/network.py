@@ -51,8 +51,9 @@ def station_names(block: dict) -> list[str]:
 class Network:
     """The stations and the signal they share.
 
-    `transmit` and `receive` are (horizontal, vertical) element counts; `power` is rho P, the part of the
-    transmitted power spent on sensing (W, 1 by default). Source: paper, section II-A and V-A.
+    `transmit` and `receive` are (horizontal, vertical) element counts; `power` is rho P, the power
+    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times as much.
+    Source: paper, section II-A and V-A.
     """
 
     carrier_hz: float

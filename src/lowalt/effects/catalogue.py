@@ -13,12 +13,15 @@ from lowalt.common.errors import InputError
 ORDER = (
     "motion/rotor_spread",
     "motion/gusts",
+    "channel/mean_cross_section",
+    "channel/fluctuation",
     "channel/cross_sections",
     "channel/occlusion",
     "channel/ground_reflection",
     "channel/squint",
     "channel/wavefront",
     "channel/symbol_motion",
+    "channel/cyclic_prefix",
     "channel/clutter",
     "receiver/receiver_noise",
     "receiver/timing_offset",
@@ -33,8 +36,12 @@ ORDER = (
 """Place and name of every effect, in the order of the chain: motion, channel, receiver, detection."""
 PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
 """Place of every effect by its name."""
-BY_NEED = ("squint", "wavefront", "symbol_motion")
+BY_NEED = ("squint", "wavefront", "symbol_motion", "cyclic_prefix")
 """Physics beyond Eq. 7 that is left out where its bound allows it."""
+
+
+ONE_OSCILLATOR = ("clock_offset", "carrier_offset")
+"""Effects that draw the same error of one oscillator, and so share a stream."""
 
 
 class NamedEffect(NamedTuple):
@@ -78,6 +85,11 @@ def called(block: dict[str, dict | None]) -> list[NamedEffect]:
         if not module.idle(settings):
             result.append(NamedEffect(name, place, module, settings))
     return result
+
+
+def stream_name(name: str) -> str:
+    """Return the name of an effect's random stream: its own, or the oscillator's."""
+    return "oscillator" if name in ONE_OSCILLATOR else name
 
 
 def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:

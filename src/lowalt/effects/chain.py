@@ -9,7 +9,7 @@ import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import need, waveform
-from lowalt.effects.catalogue import NamedEffect, placed, providing
+from lowalt.effects.catalogue import NamedEffect, placed, providing, stream_name
 from lowalt.effects.interface import (
     AddsEchoes,
     AddsPaths,
@@ -53,6 +53,7 @@ class Chain:
         power: float,
     ):
         self.view, self.draws, self.power, self.error = view, draws, power, EXACT
+        self.names = frozenset(effect.name for effect in effects)
         self.by_need = {effect.name: effect for effect in providing(effects, BoundsItself)}
         self.channel, self.receiver, self.detection = (
             placed(effects, place) for place in ("channel", "receiver", "detection")
@@ -63,7 +64,7 @@ class Chain:
         )
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
-            self.factor = self.factor * effect.module.visible(effect.settings, view)
+            self.factor = self.factor * effect.module.visible(effect.settings, view, draws(effect.name))
 
     @cached_property
     def peaks(self) -> np.ndarray:
@@ -84,25 +85,38 @@ class Chain:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
         return {
             name: float(
-                (effect.module.bound(effect.settings, self.view, names - {name}) * self.peaks).sum(axis=1).max()
+                (effect.module.bound(effect.settings, self.view, self.names - {name}) * self.peaks).sum(axis=1).max()
             )
             for name, effect in self.by_need.items()
             if name in names
         }
 
-    def run(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Outcome:
-        """Return the outcome with the physics `on`, of the symbols `chosen` (all by default)."""
+    def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
+        """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
         view, factor = self.view, self.factor
         rows = slice(None) if chosen is None else np.flatnonzero(chosen)
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[rows]
-        spectrum = self._moving(view, on, factor, rows) if "symbol_motion" in on else self._echo(view, on, factor)
-        if self._clutter is not None:
-            spectrum = spectrum + self._clutter[rows]
-        if self.receiver:
-            spectrum = self._received(spectrum)
-        cells = np.fft.ifft(spectrum, axis=1)
+        if on & {"symbol_motion", "cyclic_prefix"}:
+            samples = self._samples(view, on, factor, rows)
+            if self._clutter is not None:
+                samples = samples + self._clutter_samples("cyclic_prefix" in on)[rows]
+        else:
+            spectrum = self._echo(view, on, factor)
+            if self._clutter is not None:
+                spectrum = spectrum + self._clutter[rows]
+            if not self.receiver:
+                return np.fft.ifft(spectrum, axis=1)
+            samples = waveform.transmit(spectrum, self._sent)
+        for effect in self.receiver:
+            draws = self.draws(stream_name(effect.name))
+            samples = effect.module.receive(effect.settings, samples, self._frame, draws)
+        return np.fft.ifft(waveform.demodulate(samples, self._sent[rows]), axis=1)
+
+    def run(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Outcome:
+        """Return the outcome with the physics `on`, of the symbols `chosen` (all by default)."""
+        cells = self.cells(on, chosen)
         for effect in providing(self.detection, FiltersCells):
             cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
         best = abs(cells).argmax(axis=1)
@@ -138,26 +152,44 @@ class Chain:
             wavefront="wavefront" in on, error=self.error,
         )  # fmt: skip
 
-    def _moving(self, view: View, on: frozenset[str], factor: np.ndarray | float, rows) -> np.ndarray:
-        """Subcarriers (N, M) of a target that moves while a symbol lasts, interpolated from a few instants of it."""
-        sent = self._sent[rows]
-        delays, weights = self.by_need["symbol_motion"].module.instants(view, self.error)
+    def _samples(self, view: View, on: frozenset[str], factor: np.ndarray | float, rows) -> np.ndarray:
+        """Time samples (N, M) of the target's echo, with its motion inside a symbol and its cut by the cyclic prefix.
+
+        Points are summed in groups that lose equally many samples, and instants of a symbol are interpolated.
+        """
+        delays, weights = np.zeros(1), np.ones((1, view.network.subcarriers))
+        if "symbol_motion" in on:
+            delays, weights = self.by_need["symbol_motion"].module.instants(view, self.error)
+        groups: list[tuple[int, np.ndarray | float]] = [(0, factor)]
+        if "cyclic_prefix" in on:
+            cut = self.by_need["cyclic_prefix"]
+            first = cut.module.first_samples(cut.settings, view)
+            groups = [(int(count), factor * (first == count)) for count in np.unique(first)]
+            turned = cut.module.turn(cut.settings, view.network, self._frame.baseband_hz)
         # Visibility and reflection coefficients stay during a symbol; only places move.
         held = self._paths if view is self.view else self._paths_of(view)
-        samples = 0.0
+        samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
         for delay, weight in zip(delays, weights, strict=True):
-            later = view.at(view.times_s + delay)
+            later = view.at(view.times_s + delay) if "symbol_motion" in on else view
             moved = self._paths_of(later) if held else []
             paths = [ImagePath(new.places, old.coefficient) for new, old in zip(moved, held, strict=True)]
-            samples = samples + weight * waveform.transmit(self._echo(later, on, factor, paths), sent)
-        return waveform.demodulate(samples, sent)
+            for count, strength in groups:
+                spectrum = self._echo(later, on, strength, paths)
+                echo = waveform.transmit(spectrum, self._sent[rows])
+                if count:
+                    echo[:, :count] = waveform.transmit(spectrum * turned, self._before[rows])[:, :count]
+                samples += weight * echo
+        return samples
 
-    def _received(self, spectrum: np.ndarray) -> np.ndarray:
-        """Subcarriers (N, M) after the receiver's effects on time samples."""
-        samples = waveform.transmit(spectrum, self._sent)
-        for effect in self.receiver:
-            samples = effect.module.receive(effect.settings, samples, self._frame, self.draws(effect.name))
-        return waveform.demodulate(samples, self._sent)
+    def _clutter_samples(self, cut: bool) -> np.ndarray:
+        """Time samples (N, M) of the echoes of everything but the target, cut by the cyclic prefix or not."""
+        if not cut:
+            return waveform.transmit(self._clutter, self._sent)
+        effect, whole = self.by_need["cyclic_prefix"], np.ones_like(self._sent)
+        sent = waveform.transmit(whole, self._sent), waveform.transmit(whole, self._before)
+        # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
+        cells = np.fft.ifft(np.fft.ifftshift(self._clutter, axes=1), axis=1)
+        return effect.module.convolved(effect.settings, self.view.network, cells, sent)
 
     def _paths_of(self, view: View) -> list[ImagePath]:
         """All paths except the direct one."""
@@ -183,6 +215,11 @@ class Chain:
     def _sent(self) -> np.ndarray:
         """The data (N, M) that all symbols carry."""
         return waveform.sent(self.draws("waveform"), self.view.network.symbols, self.view.network.subcarriers)
+
+    @cached_property
+    def _before(self) -> np.ndarray:
+        """The data (N, M) of the symbol before each symbol of the look."""
+        return waveform.sent(self.draws("previous waveform"), *self._sent.shape)
 
     @cached_property
     def _frame(self) -> Frame:

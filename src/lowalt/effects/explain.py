@@ -11,14 +11,15 @@ import numpy as np
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.hardware import describe
-from lowalt.common.network import Network
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.streams import stream
 from lowalt.common.timing import median_s
 from lowalt.echo import echo_signal
 from lowalt.echo import explain as explain_echo
 from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
+from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.hear import Scene, hear, observe, with_cross_sections
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import CATEGORIES, Cloud
@@ -88,12 +89,14 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
 def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
     """Return lines that say what is computed for one sample at one station, and by which bounds."""
     station = scene.network.station(station_name)
-    view = observe(scene, station, sample.cloud, sample.row, sample.occluders)
-    own = echo_signal(scene.network, station, view.motion, sample.cloud.rcs_m2, view.aim_m, scene.tolerance)
+    cloud = with_cross_sections(scene, sample.cloud)
+    view = observe(scene, station, cloud, sample.row, sample.occluders)
+    own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, scene.tolerance)
     heard = hear(scene, station, sample.cloud, sample.row, sample.occluders)
     range_m = np.linalg.norm(view.aim_m - np.asarray(station.position_m))
     lines = [f"{sample.row['subtype']}, model {sample.row['model']}, station {station_name}, range {range_m:.0f} m"]
     lines += [f"  {line}" for line in explain_echo(own).splitlines()]
+    lines.append(f"  {prefix_line(scene, float(range_m))}")
     for decision in heard.decisions:
         verb = "computed" if decision.computed else "left out"
         bound = "" if np.isinf(decision.bound) else f", bound {decision.bound:.2g} of the largest value"
@@ -104,6 +107,24 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
         f"  against the target's echo alone: rms change {moved:.2g}, other range cell in {other:.1%} of symbols"
     )
     return lines
+
+
+def prefix_line(scene: Scene, range_m: float) -> str:
+    """Return a line that says whether the cyclic prefix covers an echo from `range_m`, and its loss otherwise."""
+    settings = {effect.name: effect.settings for effect in scene.effects}.get("cyclic_prefix")
+    network = scene.network
+    prefix = cyclic_prefix.length_s(settings or cyclic_prefix.DEFAULTS, network)
+    covered = f"cyclic prefix {1e6 * prefix:.3g} us, covers {0.5 * prefix * SPEED_OF_LIGHT:.0f} m"
+    lost = float(cyclic_prefix.lost(2 * range_m / SPEED_OF_LIGHT, prefix, network))
+    if lost == 0:
+        return f"{covered}: this echo is within it"
+    kept, spread = 1 - lost, max(1 - (1 - lost) ** 2, 1e-30)
+    level = f"{20 * np.log10(kept):.1f} dB" if kept > 0 else "gone"
+    modelled = "computed" if settings is not None else "not modelled, name effects.cyclic_prefix"
+    return (
+        f"{covered}: this echo loses {lost:.0%} of its window, {level}; interference {10 * np.log10(spread):.0f} dB a "
+        f"subcarrier, {10 * np.log10(spread / network.subcarriers):.0f} dB a range cell ({modelled})"
+    )
 
 
 def explain_scene(

@@ -5,7 +5,7 @@ scene names: no waveform without a receiver effect, no frequency response where 
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,10 +14,11 @@ from lowalt.common.network import Network, Station
 from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
+from lowalt.echo.api import Path
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
-from lowalt.effects.interface import AddsPaths
+from lowalt.effects.interface import AddsPaths, SetsCrossSections, WeighsPoints
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
@@ -43,8 +44,9 @@ class Scene:
 class Heard(NamedTuple):
     """The signal of one target at one station.
 
-    signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells; power: mean |Y_bin|^2 of the target's echo alone,
-    before any channel effect (W), which set SNRs refer to; decisions: which physics by need was computed, and why.
+    signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells; power: mean |Y_bin|^2 of the target's echo alone as
+    it arrives on the direct path (W), after occlusion, aspect and fluctuation; set SNRs refer to it; decisions: which
+    physics by need was computed, and why.
     """
 
     signal: np.ndarray
@@ -64,6 +66,7 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     asked = [effect.name for effect in beyond if effect.name in BY_NEED]
     # Half the tolerance is for physics that is left out, the other half for the echo engine's approximations.
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
+    cloud = with_cross_sections(scene, cloud)
     view = observe(scene, station, cloud, row, occluders)
     own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     # Measure the power after rounding to complex64, as the echo stage does; the noise level is then the same with and
@@ -72,6 +75,8 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     if not beyond:
         return Heard(own.signal, own.cell, power, [])
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
+    if providing(beyond, WeighsPoints):
+        chain.power = power = rms(seen_alone(chain, sample).astype(np.complex64)) ** 2
     if share is None or math.isinf(chain.amplification):
         outcome = chain.run(frozenset(asked))
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
@@ -87,6 +92,22 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
         trial = chain.run(frozenset())
     outcome, notes = settle(chain, asked, share, trial)
     return Heard(outcome.signal, outcome.cell, power, notes)
+
+
+def seen_alone(chain: Chain, sample: str) -> np.ndarray:
+    """Return the target's echo (N,) on the direct path with its visibility and aspect, exact; SNRs refer to it."""
+    view = chain.view
+    path = Path(0.0, np.broadcast_to(chain.factor, view.places.shape[:2]))
+    return echo_signal(
+        view.network, view.station, view.motion, view.cloud.rcs_m2, view.aim_m, paths=[path], sample=sample
+    ).signal  # fmt: skip
+
+
+def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
+    """Return the cloud with the cross sections that the scene gives its points."""
+    for effect in providing(scene.effects, SetsCrossSections):
+        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud))
+    return cloud
 
 
 def largest_of(outcome: Outcome) -> float:

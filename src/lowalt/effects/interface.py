@@ -66,11 +66,19 @@ class PerturbsMotion(Protocol):
 
 
 @runtime_checkable
+class SetsCrossSections(Protocol):
+    """Channel: an effect that replaces the points' mean cross sections."""
+
+    def cross_sections(self, settings: dict, cloud: Cloud) -> np.ndarray:
+        """Return each point's cross section (L,) in m2."""
+
+
+@runtime_checkable
 class WeighsPoints(Protocol):
     """Channel: an effect that changes the points' amplitudes (occlusion, aspect)."""
 
-    def visible(self, settings: dict, view: View) -> np.ndarray:
-        """Return the real factor (N, L) on every point's two-way amplitude."""
+    def visible(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+        """Return the real factor on every point's two-way amplitude, (N, L) or (N, 1)."""
 
 
 @runtime_checkable
@@ -94,9 +102,9 @@ class BoundsItself(Protocol):
     """Channel: physics beyond Eq. 7 that is left out where its bound allows it; `response` and `chain` compute it."""
 
     def bound(self, settings: dict, view: View, others: frozenset[str]) -> np.ndarray:
-        """Return the largest change of any range cell relative to each part's peak amplitudes, (N, P) or (N, 1).
+        """Return the largest change of any range cell relative to each part's peak amplitudes; (N, P) or broadcast.
 
-        others: the other physics by need of the scene, each of which may be computed or left out.
+        others: names of the scene's other effects beyond motion; physics by need among them may be left out or not.
         """
 
 
@@ -126,7 +134,7 @@ class ChoosesCells(Protocol):
 
 WORK = {
     "motion": (PerturbsMotion,),
-    "channel": (WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
+    "channel": (SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
     "receiver": (ChangesSamples,),
     "detection": (FiltersCells, ChoosesCells),
 }

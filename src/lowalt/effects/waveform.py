@@ -1,8 +1,9 @@
 """The OFDM waveform of a look: the data sent, the samples received, and the receiver's view of both.
 
 Samples are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in NR
-(3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept; its
-cyclic prefix is taken to cover every echo, as Eq. 7 assumes. Impairments are in `effects.receiver`.
+(3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
+Eq. 7 assumes that the cyclic prefix covers every echo; the effect `cyclic_prefix` treats echoes that are later.
+Impairments are in `effects.receiver`.
 """
 
 from dataclasses import dataclass

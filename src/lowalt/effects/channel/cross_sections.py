@@ -78,7 +78,7 @@ def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:
     return [(mine, facet_radius_m(cloud.points[mine])) for mine in found if len(mine) > 1]
 
 
-def visible(settings: dict, view: View) -> np.ndarray:
+def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect."""
     known = np.isfinite(view.cloud.normals).all(axis=1)
     if not known.any():

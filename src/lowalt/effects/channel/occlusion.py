@@ -56,7 +56,7 @@ def hidden(view: View) -> np.ndarray:
     return result
 
 
-def visible(settings: dict, view: View) -> np.ndarray:
+def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
 
     Raises: InputError where the target's surfaces are not given or are another target's.

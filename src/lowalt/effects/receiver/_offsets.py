@@ -9,6 +9,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
+from lowalt.effects.checks import CheckedScene
 
 CUT = 3.0
 """Standard deviations at which draws are cut."""
@@ -42,3 +43,13 @@ def check_stations(key: str, value: float | dict[str, float], network: Network) 
     unknown = sorted(set(value) - set(names)) if isinstance(value, dict) else []
     if unknown:
         raise InputError(f"{key}: station(s) {unknown} are not in the network, expected some of {names}")
+
+
+def check_oscillator(effect: str, scene: CheckedScene) -> None:
+    """Raise InputError naming `effect` where transmitter and receiver share one oscillator, and so have no offset."""
+    noise = scene.effects.get("phase_noise")
+    if noise and noise["shared"]:
+        raise InputError(
+            f"effects.{effect}: effects.phase_noise has shared: true, one oscillator for sending and receiving, which "
+            "has no offset against itself; expected shared: false (a receiver of its own) or no offset"
+        )

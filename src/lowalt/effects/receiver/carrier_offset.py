@@ -19,16 +19,18 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for an unknown station."""
+    """Raise InputError for an unknown station, or an offset of an oscillator against itself."""
     for key in ("fixed_hz", "fixed_ppm"):
         _offsets.check_stations(f"effects.carrier_offset.{key}", settings[key], scene.network)
+    _offsets.check_oscillator("carrier_offset", scene)
 
 
 def offset_hz(settings: dict, frame: Frame, rng: np.random.Generator) -> float:
     """Return by how much all frequencies rise (Hz): the sum of the parts in Hz and in ppm of the oscillator."""
     name = frame.station.name
-    hz = _offsets.fixed(settings["fixed_hz"], name) + settings["sigma_hz"] * _offsets.drawn(rng)
+    # The first draw is the oscillator's error, which the sampling clock shares.
     ppm = _offsets.fixed(settings["fixed_ppm"], name) + settings["sigma_ppm"] * _offsets.drawn(rng)
+    hz = _offsets.fixed(settings["fixed_hz"], name) + settings["sigma_hz"] * _offsets.drawn(rng)
     return hz + 1e-6 * ppm * frame.oscillator_hz
 
 

@@ -31,6 +31,14 @@ def idle(settings: dict) -> bool:
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for an unknown station, or a slip that leaves the cyclic prefix before the look ends."""
     _offsets.check_stations("effects.clock_offset.fixed_ppm", settings["fixed_ppm"], scene.network)
+    _offsets.check_oscillator("clock_offset", scene)
+    carrier = scene.effects.get("carrier_offset")
+    for key in ("fixed_ppm", "sigma_ppm"):
+        if carrier and carrier[key] != settings[key]:
+            raise InputError(
+                f"effects.clock_offset: {key} is {settings[key]} and effects.carrier_offset has {carrier[key]}, "
+                "expected the same: carrier and sampling clock come from one oscillator"
+            )
     network, timing = scene.network, scene.effects.get("timing_offset")
     rate = 1e-6 * _offsets.largest(settings["fixed_ppm"], settings["sigma_ppm"])
     slip = rate * network.symbols * network.symbol_interval_s

@@ -16,7 +16,8 @@ SOURCE = (
     "IEEE Std 1139-2008 (L(f)); D. Petrovic, W. Rave, G. Fettweis, Effects of phase noise on OFDM systems with and "
     "without PLL, IEEE Trans. Commun. 55(8), 2007; M. C. Budge, M. P. Burt, Range correlation effects on phase and "
     "amplitude noise, IEEE Southeastcon 1993; default: 3GPP TR 38.803, Table 6.1.10-1, scaled from 29.55 to 4.9 GHz by "
-    "20 log10"
+    "20 log10; loop: F. M. Gardner, Phaselock Techniques, 3rd ed. 2005, ch. 6; reference: an oven-controlled crystal "
+    "of -100, -130, -150 dBc/Hz at 1, 10, 100 Hz from 10 MHz, raised by 20 log10(490): estimate"
 )
 DEFAULTS = {
     "points": [
@@ -25,6 +26,8 @@ DEFAULTS = {
     ],
     "level_db": 0.0,
     "shared": True,
+    "loop_hz": 100.0,
+    "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
 
 
@@ -35,9 +38,10 @@ def idle(settings: dict) -> bool:
 
 def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for offsets that do not rise, or symbols too close together to tell slow from fast."""
-    offsets = [offset for offset, _ in settings["points"]]
-    if offsets[0] <= 0 or any(later <= earlier for earlier, later in pairwise(offsets)):
-        raise InputError(f"effects.phase_noise.points: offsets {offsets}, expected positive and rising (Hz)")
+    for key in ("points", "reference"):
+        offsets = [offset for offset, _ in settings[key]]
+        if not offsets or offsets[0] <= 0 or any(later <= earlier for earlier, later in pairwise(offsets)):
+            raise InputError(f"effects.phase_noise.{key}: offsets {offsets}, expected positive and rising (Hz)")
     network = scene.network
     band = network.subcarriers * network.subcarrier_spacing_hz
     if network.symbol_interval_s * band < _oscillator.SPACING:
@@ -47,9 +51,27 @@ def check(settings: dict, scene: CheckedScene) -> None:
         )
 
 
+def disciplined(settings: dict) -> tuple[tuple[float, float], ...]:
+    """Return the spectrum as (offset Hz, dBc/Hz) pairs of the oscillator locked to its reference.
+
+    A second-order loop passes the reference's noise by 1 / (1 + (f / loop)^4) and the oscillator's own by the rest, so
+    that slow wander is the reference's. Free-running (loop_hz 0), the given points alone. Source: Gardner 2005.
+    """
+    own = tuple((float(offset), float(level) + settings["level_db"]) for offset, level in settings["points"])
+    if settings["loop_hz"] == 0:
+        return own
+    reference = tuple((float(offset), float(level)) for offset, level in settings["reference"])
+    ends = [offset for offset, _ in own + reference]
+    between = np.geomspace(min(ends), 100.0 * settings["loop_hz"], 240)
+    offsets = np.unique([*(offset for offset, _ in own), *between[between < max(*ends, between[0])]])
+    follows = 1.0 / (1.0 + (offsets / settings["loop_hz"]) ** 4)
+    total = follows * _oscillator.density(reference, offsets) + (1.0 - follows) * _oscillator.density(own, offsets)
+    return tuple(zip(offsets.tolist(), (10 * np.log10(total)).tolist(), strict=True))
+
+
 def phase(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the drawn phase (N, M) in rad at every sample's instant."""
-    points = tuple((float(offset), float(level) + settings["level_db"]) for offset, level in settings["points"])
+    points = disciplined(settings)
     look = (*frame.sent.shape, frame.network.symbol_interval_s, frame.sample_s)
     return _oscillator.phase(points, look, frame.delay_s if settings["shared"] else None, rng)
 

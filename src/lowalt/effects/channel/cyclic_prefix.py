@@ -1,0 +1,78 @@
+"""Echoes later than the cyclic prefix: the receive window then begins with the end of the previous symbol.
+
+Symbols follow each other without a pause. An echo of delay tau has its own symbol from tau - T_cp on; before that it
+still carries the previous one, whose data are random too. The echo loses a share e = (tau - T_cp) / T_u of its window:
+its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interference, spread over all range cells. Every
+point is cut at its direct delay, on the reflected paths too; other echoes are cut at the delay of their range cell.
+"""
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.effects.view import View
+
+SOURCE = (
+    "3GPP TS 38.211, 5.3.1 (normal cyclic prefix, 144 of 2048 samples); interference beyond it: D. Kim, G. L. Stuber, "
+    "Residual ISI cancellation for OFDM with applications to HDTV broadcasting, IEEE J. Sel. Areas Commun. 16(8), 1998"
+)
+DEFAULTS = {"prefix_s": None}
+
+NORMAL = 144 / 2048
+"""Length of the normal cyclic prefix, in useful symbol lengths."""
+
+
+def idle(settings: dict) -> bool:
+    """Return False: a scene that names this effect gets it wherever an echo may be later than the prefix."""
+    return False
+
+
+def length_s(settings: dict, network: Network) -> float:
+    """Return the prefix's length (s): the given one, or NR's normal prefix."""
+    return NORMAL / network.subcarrier_spacing_hz if settings["prefix_s"] is None else settings["prefix_s"]
+
+
+def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
+    """Return the share of the receive window that an echo of this delay loses, 0 to 1; any shape."""
+    return np.clip((delay_s - prefix_s) * network.subcarrier_spacing_hz, 0.0, 1.0)
+
+
+def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
+    """Return a bound (N, P) of the cut's change of any range cell, relative to each part's peak amplitudes.
+
+    Nothing changes for echoes within the prefix. For others the window's first samples are replaced by samples of the
+    same 2-norm at most, so a range cell changes by at most 2. Echoes of the land always reach beyond: no bound.
+    """
+    if "clutter" in others:
+        return np.full((1, 1), np.inf)
+    farthest = np.linalg.norm(view.middles - np.asarray(view.station.position_m), axis=2) + view.radii
+    return np.where(2 * farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)
+
+
+def first_samples(settings: dict, view: View) -> np.ndarray:
+    """Return the number (N, L) of each point's samples, at the window's start, that carry the previous symbol."""
+    network = view.network
+    away = view.places - np.asarray(view.station.position_m)
+    delay = 2 * np.sqrt(np.einsum("nli,nli->nl", away, away)) / SPEED_OF_LIGHT
+    late = (delay - length_s(settings, network)) * network.subcarriers * network.subcarrier_spacing_hz
+    return np.clip(np.ceil(late), 0, network.subcarriers).astype(np.int64)
+
+
+def turn(settings: dict, network: Network, baseband_hz: np.ndarray) -> np.ndarray:
+    """Return the phase (M,) by which the previous symbol's end continues in the window: it ends a prefix earlier."""
+    return np.exp(2j * np.pi * baseband_hz * length_s(settings, network))
+
+
+def convolved(
+    settings: dict, network: Network, cells: np.ndarray, symbols: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
+    """Return the samples (N, M) of echoes in range cells (N, M): the linear convolution of the sent stream with them.
+
+    symbols: time samples (N, M) of the symbol and of the one before it. The prefix counts in whole samples.
+    """
+    now, before = symbols
+    count = now.shape[1]
+    prefix = min(round(length_s(settings, network) * count * network.subcarrier_spacing_hz), count)
+    # From one symbol length before the window: the previous symbol's end, the prefix, and the symbol itself.
+    stream = np.concatenate([before[:, prefix:], now[:, count - prefix :], now], axis=1)
+    spectrum = np.fft.fft(stream, axis=1) * np.fft.fft(cells, 2 * count, axis=1)
+    return np.fft.ifft(spectrum, axis=1)[:, count:]
