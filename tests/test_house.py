@@ -14,7 +14,7 @@ from lowalt.common.street import PACKAGE, STREET, modules, rooms_imported
 from lowalt.report.figures import house
 
 ROOT = Path(__file__).parent.parent
-STAGES = [name for name in STREET if name not in ("common", "measure", "workflow")]
+STAGES = [name for name in STREET if name not in ("common", "measure", "workflow", "commands")]
 
 
 @pytest.mark.parametrize("stage", STREET)

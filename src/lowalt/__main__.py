@@ -1,10 +1,12 @@
-"""The command `lowalt`: what a person asks of a scene; stages have commands of their own (python -m lowalt.STAGE)."""
+"""The command `lowalt`, for people: scenes explained, own targets made; stages have commands of their own
+(python -m lowalt.STAGE)."""
 
 import argparse
 import os
 import sys
 from pathlib import Path
 
+from lowalt.commands import target
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -17,8 +19,18 @@ def _sample(text: str) -> tuple[str, int]:
     return name, int(model)
 
 
+def _explained(given: argparse.Namespace) -> str:
+    from lowalt.effects.explain import explain_scene
+
+    inputs = os.environ.get("LOWALT_INPUTS")
+    return explain_scene(
+        [given.base, *given.scene], given.schema, inputs and Path(inputs), given.sample, given.station,
+        not given.no_cost,
+    )  # fmt: skip
+
+
 def main(arguments: list[str] | None = None) -> int:
-    """Run `lowalt explain SCENE`; returns the exit status."""
+    """Run `lowalt explain SCENE` or `lowalt target ACTION`; returns the exit status."""
     line = argparse.ArgumentParser(prog="lowalt", description=__doc__)
     commands = line.add_subparsers(dest="command", required=True)
     explain = commands.add_parser(
@@ -30,15 +42,10 @@ def main(arguments: list[str] | None = None) -> int:
     explain.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     explain.add_argument("--station", help="the station that listens (default: the first)")
     explain.add_argument("--no-cost", action="store_true", help="do not measure times")
+    target.add_to(commands)
     given = line.parse_args(arguments)
-    from lowalt.effects.explain import explain_scene
-
-    inputs = os.environ.get("LOWALT_INPUTS")
     try:
-        text = explain_scene(
-            [given.base, *given.scene], given.schema, inputs and Path(inputs), given.sample, given.station,
-            not given.no_cost,
-        )  # fmt: skip
+        text = target.run(given) if given.command == "target" else _explained(given)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

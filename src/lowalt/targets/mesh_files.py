@@ -1,11 +1,9 @@
 """Reading and repairing mesh files; every fault is named by file and reason. Nothing here knows a target.
 
-Who does what: trimesh reads all five formats and places a scene's geometries (pymeshlab flattens scenes and drops
-their names); pymeshlab repairs, since its filters keep two million triangles within seconds and a gigabyte;
-sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
+Files are read in `mesh_scene`; pymeshlab repairs, since its filters keep two million triangles within seconds and a
+gigabyte; sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
 """
 
-import logging
 import math
 import re
 import warnings
@@ -19,11 +17,10 @@ from scipy.sparse.csgraph import connected_components
 from lowalt.common import portable
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import existing
+from lowalt.targets.mesh_scene import HEADER_BYTES, selected
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
-HEADER_BYTES = 1 << 20
-"""Bytes at the start of a file in which its unit and its extensions stand."""
 LARGEST_TRIANGLES = 20_000_000
 """Above this a file is refused: its arrays alone would take over two gigabytes."""
 
@@ -83,47 +80,14 @@ def stated_unit_m(path: Path) -> float | None:
     return value if 0 < value < math.inf else None
 
 
-def _compressed(path: Path) -> bool:
-    """Whether a GLB needs the Draco decoder, which trimesh does not have."""
-    with path.open("rb") as file:
-        return path.suffix.lower() == ".glb" and b"KHR_draco_mesh_compression" in file.read(HEADER_BYTES)
-
-
 def _triangles(path: Path, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (V, 3) in file units and faces (F, 3) of a file, or of the named geometries of its scene."""
-    import trimesh  # only records with a mesh pay for the import
-
-    # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
-    logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    if _compressed(path):
-        raise InputError(f"{path}: is compressed by Draco, expected a plain GLB: export it without compression")
-    try:
-        scene = trimesh.load_scene(path, process=False)
-        names = sorted(scene.geometry)
-        parts = []
-        for node in sorted(scene.graph.nodes_geometry):
-            place, name = scene.graph[node]
-            # A chain of transforms is multiplied by the machine's BLAS; its last bits are rounded away.
-            place = np.round(place, 12)
-            if geometry is None or name in geometry:
-                mesh = scene.geometry[name]
-                if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                    # What is not finite is refused later, by name.
-                    with np.errstate(invalid="ignore"):
-                        vertices = portable.applied(place[:3, :3], mesh.vertices) + place[:3, 3]
-                    faces = np.asarray(mesh.faces)
-                    parts.append((vertices, faces[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else faces))
-    except Exception as error:  # trimesh's readers raise whatever their format brings
-        raise InputError(f"{path}: not a readable {path.suffix} mesh ({type(error).__name__}: {error})") from None
-    if geometry is not None and set(geometry) - set(names):
-        raise InputError(
-            f"{path}: geometry {sorted(set(geometry) - set(names))} is not in it, expected some of {names}"
-        )
+    """Return vertices (V, 3) in file units and faces (F, 3) of a file, or of the named pieces of its scene."""
+    parts = selected(path, geometry)
     if not parts:
         raise InputError(f"{path}: has no triangle, expected a surface")
-    starts = np.cumsum([0] + [len(vertices) for vertices, _ in parts[:-1]])
-    faces = np.concatenate([faces + start for (_, faces), start in zip(parts, starts, strict=True)])
-    return np.concatenate([vertices for vertices, _ in parts]).astype(float), faces.astype(np.int64)
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts, strict=True)])
+    return np.concatenate([part.vertices for part in parts]).astype(float), faces.astype(np.int64)
 
 
 def _merged(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -191,7 +155,8 @@ def read_mesh(path: str | Path, unit: str | float, geometry: list[str] | None = 
     """Return the repaired mesh of an STL, OBJ, PLY, DAE or GLB file in metres along the file's own axes.
 
     `unit` is the length unit of the file's numbers (m, cm, mm, in, ft, or its metres), `geometry` the names of the
-    scene's geometries to take (all by default). Open surfaces stay open: they are sampled as triangle soup.
+    scene's geometries, instances, objects or groups to take (all by default). Open surfaces stay open: they are
+    sampled as triangle soup.
     Raises: InputError naming the file and the reason: no such file, another format, unreadable, no or fewer than four
     triangles, no area, NaN or infinite vertices, too many triangles.
     Warns: InputWarning where the file states another unit than `unit`.

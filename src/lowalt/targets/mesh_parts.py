@@ -45,8 +45,9 @@ def placed(mesh: Mesh, item: dict) -> Mesh:
     matrix = np.eye(3)
     if "mirror" in item:
         matrix["xyz".index(item["mirror"])] *= -1
-    if "turn" in item:
-        matrix = portable.product(rotation(item["turn"]["axis"], np.radians(item["turn"]["deg"])), matrix)
+    turns = item.get("turn", [])
+    for turn in turns if isinstance(turns, list) else [turns]:
+        matrix = portable.product(rotation(turn["axis"], np.radians(turn["deg"])), matrix)
     return mesh.mapped(matrix, np.array(item.get("move", [0.0, 0, 0])))
 
 

@@ -14,7 +14,9 @@ scale_limit  largest factor either way between mesh and published size; a wrong 
 wheel_size   published (wheels get the table's diameter) or mesh (they are scaled like the car)
 moving_share share of the points on moving parts; flap: as for built-in birds
 parts        by name, one of them of kind body; each part has a kind and one of
-  meshes:    [{file, unit, geometry: [names], mirror: axis, turn: {axis, deg}, move: [x, y, z]}], in that order
+  meshes:    [{file, unit, geometry: [names], mirror: axis, turn: {axis, deg}, move: [x, y, z]}], done in that order;
+             names are those of geometries, instances, OBJ objects or groups; turn may be a list of turns, one after
+             the other
   region:    taken out of the body's surface, disjoint from the regions of other parts: {box: [[low], [high]]}
              (null: unbounded) or {cylinder: {centre, axis, radius, half_length}}; with `whole: true`
              only connected components that lie inside as a whole
@@ -63,13 +65,14 @@ _REGION = _object(
     whole={"type": "boolean"},
 ) | {"oneOf": [{"required": ["box"]}, {"required": ["cylinder"]}]}
 _UNIT = {"anyOf": [{"enum": list(UNITS_M)}, _POSITIVE | {"maximum": 1e6}]}
+_TURN = _object(["axis", "deg"], axis=_PLAIN, deg={"type": "number"})
 _MESH = _object(
     ["file"],
     file=_TEXT,
     unit=_UNIT,
     geometry={"type": "array", "items": _TEXT, "minItems": 1},
     mirror=_PLAIN,
-    turn=_object(["axis", "deg"], axis=_PLAIN, deg={"type": "number"}),
+    turn={"anyOf": [_TURN, {"type": "array", "items": _TURN, "minItems": 1}]},
     move=_POINT,
 )
 _PART = _object(

@@ -1,0 +1,124 @@
+"""`lowalt target inspect | new | make | show`: from a user's mesh to a cloud and a picture of it."""
+
+import argparse
+import os
+from pathlib import Path
+
+import yaml
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing, slug
+from lowalt.targets.cloud import read, write
+from lowalt.targets.draft import drafted
+from lowalt.targets.inspection import described, inspect_mesh
+from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.records import load_table, merge, read_records
+
+TABLE = Path("config/targets.csv")
+
+
+def _unit(text: str) -> str | float:
+    if text in UNITS_M:
+        return text
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value <= 1e6:
+        raise argparse.ArgumentTypeError(f"{text!r}, expected one of {list(UNITS_M)} or metres")
+    return value
+
+
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add `target` and its four commands to a parser's commands."""
+    target = commands.add_parser("target", help="your own mesh or recording: look, draft a record, make its cloud")
+    actions = target.add_subparsers(dest="action", required=True)
+    inspect = actions.add_parser("inspect", help="what a mesh file holds: unit, sizes, pieces, what may move")
+    inspect.add_argument("file", type=Path)
+    inspect.add_argument("--category", default="UAV", choices=("UAV", "Bird", "Vehicle"))
+    inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
+    new = actions.add_parser("new", help="draft a record of a mesh file, with what must be confirmed marked")
+    new.add_argument("file", type=Path)
+    new.add_argument("--subtype", required=True, help="the published target whose place the mesh takes")
+    new.add_argument("--unit", type=_unit)
+    new.add_argument("--out", type=Path, help="record file to write (default: print it)")
+    make = actions.add_parser("make", help="one record to one cloud and a picture")
+    make.add_argument("record", type=Path, help="YAML file of records")
+    make.add_argument("--subtype", help="which record of the file (default: its only one)")
+    make.add_argument("--seed", type=int, default=20260701)
+    make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
+    show = actions.add_parser("show", help="picture of a cloud with axes, hinges, normals, its motion and its spectra")
+    show.add_argument("cloud", type=Path)
+    show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
+    for parser in (new, make):
+        parser.add_argument("--table", type=Path, default=TABLE, help=f"published targets (default: {TABLE})")
+        parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
+                            help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
+
+
+def _row(table: Path, subtype: str) -> dict:
+    rows = load_table(table)
+    if subtype not in rows:
+        raise InputError(f"--subtype is {subtype!r}, expected one of {list(rows)}")
+    return rows[subtype]
+
+
+def _new(given: argparse.Namespace) -> str:
+    row = _row(given.table, given.subtype)
+    if row["category"] == "Pedestrian":
+        raise InputError(f"--subtype is {given.subtype!r}, a pedestrian, expected a UAV, a bird or a vehicle")
+    try:
+        name = given.file.resolve().relative_to(given.inputs.resolve()).as_posix()
+    except ValueError:
+        raise InputError(
+            f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it"
+        ) from None
+    text = drafted(inspect_mesh(given.file, row["category"], given.unit), given.subtype, row, name)
+    record = yaml.safe_load(text)[given.subtype]
+    merge(row, record, f"draft: {given.subtype}")
+    if given.out is None:
+        return text
+    if given.out.exists():
+        raise InputError(f"{given.out}: is there already, expected a new file")
+    with replacing(given.out) as temporary:
+        temporary.write_text(text)
+    moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
+    return f"{given.out}: {moving} moving parts drafted; confirm the {marks} marked lines"
+
+
+def _make(given: argparse.Namespace) -> str:
+    from lowalt.targets.__main__ import make
+
+    records = read_records(given.record)
+    subtype = given.subtype or (next(iter(records)) if len(records) == 1 else None)
+    if subtype not in records:
+        raise InputError(f"{given.record}: --subtype is {subtype!r}, expected one of {list(records)}")
+    record = merge(_row(given.table, subtype), records[subtype], f"{given.record}: {subtype}")
+    cloud = make(record, given.inputs, given.seed)
+    out = given.out or Path(f"{slug(subtype)}.npz")
+    write(out, cloud)
+    picture = _picture(out, out.with_suffix(".png"))
+    return f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}"
+
+
+def _picture(cloud: Path, out: Path) -> str:
+    from lowalt.report.figures.target import target_animation, target_picture
+
+    draw = target_animation if out.suffix == ".gif" else target_picture
+    with replacing(out) as temporary:
+        temporary.write_bytes(draw(read(cloud)))
+    return str(out)
+
+
+def run(given: argparse.Namespace) -> str:
+    """Run the command that the parsed arguments name and return what it says.
+
+    Raises: InputError naming the file, key or value that is wrong.
+    """
+    if given.action == "inspect":
+        return described(inspect_mesh(given.file, given.category, given.unit))
+    if given.action == "new":
+        return _new(given)
+    if given.action == "make":
+        return _make(given)
+    return _picture(given.cloud, given.out or given.cloud.with_suffix(".png"))

@@ -1,0 +1,223 @@
+"""A first look at a user's mesh: its unit, extents, named pieces and connected components, and what they may be.
+
+Everything that the file does not state is a guess and is called one; nothing here changes a record.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.files import existing
+from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
+from lowalt.targets.mesh_scene import Piece, pieces
+
+USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
+"""Largest extent of whole targets (m) by category: the smallest and the largest that are met."""
+
+ALIKE = 0.1
+"""Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
+FLAT = 0.35
+"""A propeller is at most this thick, in parts of its length."""
+ROUND = 0.12
+"""The two extents of a wheel across its axis differ by at most this share."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
+    named piece it belongs to, and what it may be (rotor, wheel or nothing)."""
+
+    number: int
+    low: np.ndarray
+    high: np.ndarray
+    triangles: int
+    closed: bool
+    piece: str
+    guess: str = ""
+
+    @property
+    def extent(self) -> np.ndarray:
+        """Size (3,) in m along the file's axes."""
+        return self.high - self.low
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Middle (3,) in m of the extents."""
+        return (self.low + self.high) / 2
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What a look at a file found; lengths in metres along the file's axes.
+
+    `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
+    `pieces` the names with triangles and extents (3,), `components` from the largest down.
+    """
+
+    path: Path
+    unit: str | float
+    unit_from: str
+    low: np.ndarray
+    high: np.ndarray
+    triangles: int
+    up: str
+    front: str
+    pieces: list[tuple[str, int, np.ndarray]]
+    components: list[Component] = field(default_factory=list)
+
+
+def guessed_unit(size: float, category: str) -> str:
+    """Return the unit of UNITS_M in which a largest extent of `size` (file units) is most usual for the category: the
+    one that brings it nearest, as a ratio, to the geometric mean of the smallest and the largest that are met."""
+    usual = float(np.sqrt(np.prod(USUAL_M[category])))
+    return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
+
+
+def guessed_axes(extent: np.ndarray, category: str) -> tuple[str, str]:
+    """Return the axes of the file that may point up and to the front, from the extents (3,) alone; signs are unknown.
+
+    A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
+    across.
+    """
+    order = np.argsort(extent, kind="stable")
+    up = int(order[0])
+    front = int(order[2] if category == "Vehicle" else order[1])
+    if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
+        front = next(axis for axis in range(3) if axis != up)
+    return "xyz"[up], "xyz"[front]
+
+
+def _alike(one: Component, other: Component) -> bool:
+    """Whether two components have the same three sizes in any order."""
+    a, b = np.sort(one.extent), np.sort(other.extent)
+    return bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
+
+
+def _may_be(component: Component, up: int, whole: np.ndarray, category: str) -> str:
+    """What one component may be by its own shape and size."""
+    extent = component.extent
+    if category == "UAV":
+        across = np.delete(extent, up).max()
+        if extent[up] < FLAT * across and 0.04 * whole.max() < across < 0.7 * whole.max():
+            return "rotor"
+    if category == "Vehicle":
+        small, *large = np.sort(extent)
+        if large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3:
+            return "wheel"
+    return ""
+
+
+def candidates(components: list[Component], up: int, whole: np.ndarray, category: str) -> dict[int, str]:
+    """Return what components may be, by number: sets of at least two alike ones at one height, the largest such set.
+
+    `up` the index of the axis that points up, `whole` (3,) the extents of the target in metres.
+    """
+    able = [(part, _may_be(part, up, whole, category)) for part in components]
+    able = [(part, kind) for part, kind in able if kind]
+    best: list[tuple[Component, str]] = []
+    for part, kind in able:
+        same = [
+            (other, kind)
+            for other, its in able
+            if its == kind and _alike(part, other) and abs(other.centre[up] - part.centre[up]) < 0.1 * whole.max()
+        ]
+        larger = len(same) > len(best) or (len(same) == len(best) and part.extent.max() > best[0][0].extent.max())
+        if len(same) >= 2 and larger:
+            best = same
+    return {part.number: kind for part, kind in best}
+
+
+def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
+    """Return the connected components of a repaired mesh, those with the largest extent first.
+
+    `names`: the name of the piece that each component lies in, (C,).
+    """
+    result = []
+    for number in range(len(mesh.closed)):
+        mask = mesh.component == number
+        points = mesh.vertices[mesh.faces[mask]].reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        result.append(Component(number, low, high, int(mask.sum()), bool(mesh.closed[number]), names[number]))
+    return sorted(result, key=lambda part: -float(part.extent.max()))
+
+
+def _named(path: Path) -> list[Piece]:
+    """The pieces of a file under the most telling names it has: an OBJ's objects and groups, else the scene's."""
+    return pieces(path, groups=path.suffix.lower() == ".obj")
+
+
+def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
+    """For each component the piece whose box it lies in, the smallest such one; empty where there is none."""
+    boxes = [
+        (piece.instance, piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres) for piece in found
+    ]
+    names = []
+    for number in range(len(mesh.closed)):
+        points = mesh.vertices[mesh.faces[mesh.component == number]].reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        slack = 1e-5 * np.ptp(mesh.vertices, axis=0).max()
+        inside = [(float(np.prod(top - base + slack)), name) for name, base, top in boxes
+                  if (low >= base - slack).all() and (high <= top + slack).all()]  # fmt: skip
+        names.append(min(inside)[1] if inside else "")
+    return names
+
+
+def inspect_mesh(path: str | Path, category: str, unit: str | float | None = None) -> Inspection:
+    """Return what a mesh file holds, for a target of the category UAV, Bird or Vehicle.
+
+    `unit` where the user knows it; else the file's own statement, else a guess from the size.
+    Raises: InputError naming the file and the reason where it cannot be read.
+    """
+    path = existing(path, "mesh")
+    found = _named(path)
+    corners = [piece.vertices for piece in found] or [np.zeros((1, 3))]
+    size = float(np.ptp(np.concatenate(corners), axis=0).max())
+    stated = stated_unit_m(path)
+    known = {metres: name for name, metres in UNITS_M.items()}
+    if unit is not None:
+        source = "given"
+    elif stated is not None:
+        unit, source = known.get(stated, stated), "stated by the file"
+    else:
+        unit, source = guessed_unit(max(size, 1e-12), category), "guessed from the size"
+    metres = UNITS_M[unit] if isinstance(unit, str) else unit
+    mesh = read_mesh(path, unit)
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    up, front = guessed_axes(high - low, category)
+    parts = components_of(mesh, _piece_names(mesh, found, metres))
+    guesses = candidates(parts, "xyz".index(up), high - low, category)
+    parts = [Component(**{**vars(part), "guess": guesses.get(part.number, "")}) for part in parts]
+    named = [(piece.instance, len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
+    return Inspection(path, unit, source, low, high, len(mesh.faces), up, front, named, parts)
+
+
+def _size(values: np.ndarray) -> str:
+    return " x ".join(f"{value:.4g}" for value in values)
+
+
+def described(found: Inspection, most: int = 30) -> str:
+    """Return an inspection as text, at most `most` components, the largest and those with a guess first."""
+    lines = [
+        f"{found.path}: {found.triangles} triangles, {len(found.components)} connected components",
+        f"unit     {found.unit} ({found.unit_from})",
+        f"extent   {_size(found.high - found.low)} m along x, y, z, from {np.round(found.low, 4).tolist()} to "
+        f"{np.round(found.high, 4).tolist()}",
+        f"up       {found.up} (guessed: the smallest extent; the sign is unknown)",
+        f"front    {found.front} (guessed; the sign is unknown)",
+        "",
+        "named pieces (for `geometry:`)",
+        *(f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in found.pieces),
+        "",
+        "connected components (for `region:` with `whole: true`)",
+    ]
+    ranked = sorted(found.components, key=lambda part: (not part.guess, -float(part.extent.max())))
+    for part in ranked[:most]:
+        guess = f"  may be a {part.guess}" if part.guess else ""
+        lines.append(
+            f"  {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
+            f"{np.round(part.centre, 4).tolist()}, {'closed' if part.closed else 'open'}{guess}"
+        )
+    if len(ranked) > most:
+        lines.append(f"  and {len(ranked) - most} smaller ones")
+    return "\n".join(lines)
