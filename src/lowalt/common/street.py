@@ -9,8 +9,8 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 STREET = (
-    "common", "targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition", "measure",
-    "report", "workflow", "commands",
+    "common", "targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition",
+    "recordings", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 
 

@@ -32,7 +32,13 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
     front = np.array([-math.sin(yaw), math.cos(yaw)])
     ranges, aspects = [], []
     for station in network.stations:
-        ranges.append(record["geometry"][station.name]["range_m"])
+        distance = record["geometry"][station.name]["range_m"]
+        # A recording does not know where its target was.
+        if distance is None:
+            ranges.append(math.nan)
+            aspects.append(math.nan)
+            continue
+        ranges.append(distance)
         towards = np.array(station.position_m[:2]) - [motion["x_m"], motion["y_m"]]
         length = float(np.hypot(*towards))
         cosine = float(front @ towards) / length if length else 1.0

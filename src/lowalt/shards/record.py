@@ -45,13 +45,14 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
     """Return what each station sees of the target's reference point at the first symbol.
 
     range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis; radial_mps,
-    positive receding. Source: paper, Eq. 4, written with direction cosines.
+    positive receding; NaN where the row has no place, as a measured target's. Source: paper, Eq. 4, written with
+    direction cosines.
     """
     result = {}
     for station in network.stations:
         offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
         distance = float(np.sqrt(offset @ offset))
-        towards = offset / distance if distance > 0 else np.zeros(3)
+        towards = offset / distance if distance != 0 else np.zeros(3)
         speed = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
         result[station.name] = {
             "range_m": distance,
@@ -68,7 +69,7 @@ def record(row: dict, snr_db: float, fold: str, seed: int, network: Network) -> 
     row: a row of the motion table (NaN becomes null). An infinite SNR is the string "inf".
     """
     names = ("subtype", "category", "group", "model")
-    motion = {name: value for name, value in row.items() if name not in names}
+    motion = {name: value for name, value in row.items() if name not in (*names, "fold")}
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
         "label": CATEGORIES.index(row["category"]),
@@ -77,7 +78,10 @@ def record(row: dict, snr_db: float, fold: str, seed: int, network: Network) -> 
         "snr_db": "inf" if math.isinf(snr_db) else snr_db,
         "seed": seed,
         "motion": {name: None if math.isnan(value) else value for name, value in motion.items()},
-        "geometry": geometry(row, network),
+        "geometry": {
+            station: {name: None if math.isnan(value) else value for name, value in seen.items()}
+            for station, seen in geometry(row, network).items()
+        },
         "versions": versions(),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()

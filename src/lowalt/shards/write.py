@@ -29,7 +29,9 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
     chosen = []
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
-            if fold(split, seed, row["subtype"], row["model"], snr_db) == wanted:
+            # A measured sample brings its fold; a simulated one is dealt.
+            dealt = row.get("fold") or fold(split, seed, row["subtype"], row["model"], snr_db)
+            if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
     return [(number, level) for _, number, level in sorted(chosen)]
 

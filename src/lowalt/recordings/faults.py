@@ -1,0 +1,100 @@
+"""What makes a recording unusable, found before anything is computed from it, each by its name.
+
+Swapped channels cannot be told in general: I and Q exchanged is the conjugate signal, which is as good a recording of a
+target that moves the other way, and a hovering or reciprocating target has both signs. Two cases can be told and are:
+both channels hold the same signal (no quadrature at all), and the record knows whether the target moves towards the
+radar or away, and the energy lies on the other side.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+
+RATE_SHARE = 1e-3
+"""Largest relative difference between the rate of the record and that of the file."""
+CLIPPED_RUN = 3
+"""So many equal samples in a row at the extreme value are a clipped peak."""
+CLIPPED_SHARE = 1e-4
+"""Share of all samples in clipped peaks from which on a recording is refused."""
+SAME_SHARE = 0.999
+"""Squared correlation of I and Q from which on they are the same signal."""
+SIDE_RATIO = 4.0
+"""How many times stronger the wrong side of the Doppler axis must be to call the channels swapped (6 dB)."""
+
+
+def agreed_rate(path: Path, stated_hz: float | None, header_hz: float | None, times_s: np.ndarray | None) -> float:
+    """Return the sampling rate (Hz) on which record, file header and sample times (s) agree.
+
+    Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly spaced.
+    """
+    found = {"record": stated_hz, "file": header_hz}
+    if times_s is not None:
+        steps = np.diff(times_s)
+        if len(steps) < 1 or not np.isfinite(steps).all() or steps.min() <= 0:
+            raise InputError(f"{path}: the sample times do not increase, expected evenly spaced seconds")
+        middle = (times_s[-1] - times_s[0]) / len(steps)
+        if abs(steps - middle).max() > 0.5 * middle:
+            place = int(abs(steps - middle).argmax())
+            raise InputError(f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
+                             f"{middle:.4g} s everywhere")  # fmt: skip
+        found["times"] = float(1 / middle)
+    known = {name: rate for name, rate in found.items() if rate is not None}
+    if not known:
+        raise InputError(f"{path}: nothing says the sampling rate, expected rate_hz in the record")
+    low, high = min(known.values()), max(known.values())
+    if high > low * (1 + RATE_SHARE):
+        words = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in known.items())
+        raise InputError(f"{path}: wrong rate, {words}, expected one rate")
+    # The record's own digits where it has some: sample times are often rounded.
+    return float(next(iter(known.values())))
+
+
+def _clipped(values: np.ndarray) -> float:
+    """Share of samples that lie in runs of equal samples at the largest or the smallest value."""
+    share = 0.0
+    for extreme in (values.max(), values.min()):
+        at = np.flatnonzero(values == extreme)
+        runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
+        share += sum(len(run) for run in runs if len(run) >= CLIPPED_RUN) / len(values)
+    return share
+
+
+def _sides(values: np.ndarray) -> tuple[float, float]:
+    """Energy at positive and at negative Doppler of a complex signal, without its mean."""
+    power = np.abs(np.fft.fft(values - values.mean())) ** 2
+    half = len(power) // 2
+    return float(power[1:half].sum()), float(power[len(power) - half + 1 :].sum())
+
+
+def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
+    """Refuse samples (samples,) that no spectrum should be made of.
+
+    moves: "towards", "away" or None. Positive Doppler approaches, as everywhere in this project.
+    Raises: InputError naming the file and the fault: not finite, silent, clipped, channels swapped.
+    """
+    if not np.isfinite(values).all():
+        place = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise InputError(f"{path}: sample {place} is {values[place]}, expected finite numbers")
+    channels = {"channel": values} if not np.iscomplexobj(values) else {"I": values.real, "Q": values.imag}
+    for name, channel in channels.items():
+        if np.ptp(channel) == 0:
+            raise InputError(f"{path}: silent, all {len(channel)} samples of {name} are {channel[0]}")
+        share = _clipped(channel)
+        if share > CLIPPED_SHARE:
+            raise InputError(f"{path}: clipped, {100 * share:.3g} % of the samples of {name} stick to its extremes "
+                             f"{channel.min():.6g} and {channel.max():.6g}")  # fmt: skip
+    if np.iscomplexobj(values):
+        shifted = values - values.mean()
+        alike = np.mean(shifted.real * shifted.imag) ** 2 / (np.mean(shifted.real**2) * np.mean(shifted.imag**2))
+        if alike > SAME_SHARE:
+            raise InputError(f"{path}: I and Q hold the same signal (squared correlation {alike:.6f}), expected "
+                             "in-phase and quadrature, or channel 'real'")  # fmt: skip
+        if moves is not None:
+            towards, away = _sides(values)
+            right, wrong = (towards, away) if moves == "towards" else (away, towards)
+            if wrong > SIDE_RATIO * right:
+                raise InputError(f"{path}: channels swapped, the record says the target moves {moves}, but the other "
+                                 f"side of the Doppler axis holds {wrong / max(right, 1e-300):.3g} times the energy; "
+                                 "expected the two columns in the order I, Q")  # fmt: skip

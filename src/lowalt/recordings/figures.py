@@ -1,0 +1,243 @@
+"""Figures of spectra that a radar engineer reads off: edges, lines, widths, cycles, kurtosis and entropy.
+
+All take signals or magnitudes of spectra with their axes and give numbers in m/s, Hz or s; measured and simulated
+signals go through the same functions.
+"""
+
+import numpy as np
+
+from lowalt.spectra import magnitudes
+from lowalt.spectra.settings import Fourier
+
+INTERVAL = ("edge_mps", "line_mps", "width_mps", "kurtosis", "entropy")
+"""Figures of one coherent interval, for every class."""
+EDGE_SHARE = 0.95
+
+
+SIDES = ("both", "positive", "wrapped")
+
+
+def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of the speeds that are shown, in order, and the speeds (m/s) that they stand for.
+
+    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", negative ones stand for
+    speeds twice the edge higher.
+    """
+    if sides == "positive":
+        shown = np.flatnonzero(speeds > 0)
+        return shown, speeds[shown]
+    if sides == "wrapped":
+        meant = np.mod(speeds, 2 * edge_mps)
+        shown = np.argsort(meant, kind="stable")
+        return shown, meant[shown]
+    return np.arange(len(speeds)), speeds
+
+
+def spectrum(interval: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return radial speeds (m/s, positive approaches) and power (n,) of an interval (symbols,), Hann window.
+
+    edge_mps: the unambiguous speed; sides: as `speeds_shown` has them.
+    """
+    count = len(interval)
+    power = np.abs(np.fft.fftshift(np.fft.fft(interval * np.hanning(count)))) ** 2
+    speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * edge_mps
+    shown, meant = speeds_shown(speeds, edge_mps, sides)
+    return meant, power[shown]
+
+
+def above_floor(power: np.ndarray) -> np.ndarray:
+    """Return power (n,) less the noise floor, its median; nothing below zero."""
+    return np.maximum(power - np.median(power), 0.0)
+
+
+def _quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np.ndarray:
+    """Values at cumulative shares of the weights, values ascending, linear inside a bin."""
+    total = np.cumsum(weights)
+    if total[-1] <= 0:
+        return np.zeros(len(shares))
+    return np.interp(shares, (total - weights / 2) / total[-1], values)
+
+
+def interval_figures(interval: np.ndarray, edge_mps: float, sides: str) -> dict[str, float]:
+    """Return the figures `INTERVAL` of a coherent interval (symbols,).
+
+    edge: |speed| below which 95 % of the energy above the floor lies; line: |speed| of the strongest bin; width: from
+    the quarter to the three quarters of that energy (all m/s). kurtosis: of the magnitudes, 3 for a Gaussian; entropy:
+    of the power as a distribution, over its largest value (0 for one line, 1 for white noise).
+    """
+    speeds, power = spectrum(interval, edge_mps, sides)
+    shown = above_floor(power)
+    order = np.argsort(np.abs(speeds), kind="stable")
+    magnitude = np.sqrt(power)
+    centred = magnitude - magnitude.mean()
+    share = power / max(power.sum(), 1e-300)
+    low, high = _quantile(speeds, shown, [0.25, 0.75])
+    return {
+        "edge_mps": float(_quantile(np.abs(speeds)[order], shown[order], [EDGE_SHARE])[0]),
+        "line_mps": float(abs(speeds[power.argmax()])),
+        "width_mps": float(high - low),
+        "kurtosis": float((centred**4).mean() / max((centred**2).mean() ** 2, 1e-300)),
+        "entropy": float(-(share * np.log(share + 1e-300)).sum() / np.log(len(share))),
+    }
+
+
+def spectrogram(signal: np.ndarray, rate_hz: float, window: int, hop: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times (s), frequencies (Hz) and magnitudes (frequencies, times) of a signal; the project's transform.
+
+    window: symbols, a power of two; times are the middles of the windows.
+    """
+    shown = magnitudes(signal, Fourier(window, hop, 2 * window), "picture")
+    frequencies = np.fft.fftshift(np.fft.fftfreq(2 * window, 1 / rate_hz))
+    times = (np.arange(shown.shape[1]) * hop + window / 2) / rate_hz
+    return times, frequencies, shown
+
+
+def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: float) -> float:
+    """Return the spacing (Hz) of the lines of a comb in a signal's spectrum, searched between two bounds.
+
+    The autocorrelation over frequency of the log spectrum less its running median; of spacings that do almost as well,
+    the smallest, since every multiple of a spacing is one too.
+    """
+    from scipy.ndimage import median_filter
+    from scipy.signal import find_peaks, welch
+
+    length = min(len(signal), 1 << int(np.log2(rate_hz)))
+    frequency, power = welch(signal, rate_hz, nperseg=length, return_onesided=False, detrend="constant")
+    order = np.argsort(frequency)
+    level = 10 * np.log10(power[order] + 1e-300)
+    step = rate_hz / length
+    level -= median_filter(level, 2 * round(high_hz / step) + 1)
+    level = np.clip(level, 0.0, 20.0)
+    level -= level.mean()
+    spread = np.fft.ifft(np.abs(np.fft.fft(level, 2 * len(level))) ** 2).real
+    first, last = round(low_hz / step), round(high_hz / step)
+    peaks, _ = find_peaks(spread[first - 1 : last + 2])
+    if not len(peaks):
+        return float("nan")
+    found = peaks + first - 1
+    good = found[spread[found] >= 0.7 * spread[found].max()]
+    at = int(good.min())
+    # A parabola through three points places the peak between bins.
+    before, top, after = spread[at - 1 : at + 2]
+    return float((at + 0.5 * (before - after) / (before - 2 * top + after)) * step)
+
+
+def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> float:
+    """Return the time (s) after which a spectrogram (frequencies, times) repeats itself, between two bounds.
+
+    The mean autocorrelation over time of the rows' magnitudes, each row weighted by its own variance.
+    """
+    from scipy.signal import find_peaks
+
+    rows = shown - shown.mean(axis=1, keepdims=True)
+    count = rows.shape[1]
+    alike = np.fft.ifft(np.abs(np.fft.fft(rows, 2 * count, axis=1)) ** 2, axis=1).real.sum(axis=0)[:count]
+    alike /= np.arange(count, 0, -1)
+    first, last = max(1, round(low_s / hop_s)), min(count - 2, round(high_s / hop_s))
+    peaks, _ = find_peaks(alike[first : last + 1])
+    if not len(peaks):
+        return float("nan")
+    found = peaks + first
+    good = found[alike[found] >= 0.8 * alike[found].max()]
+    return float(good.min() * hop_s)
+
+
+def tracks(shown: np.ndarray, speeds: np.ndarray, slowest_mps: float) -> dict[str, np.ndarray]:
+    """Return by time, each (times,), the strongest line (m/s), its width (m/s), the edge (m/s) and whether it counts.
+
+    shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left out: there stands
+    the static part. width: between the points 6 dB below the line; edge: 95 % of the energy above the floor lies below
+    it; counts: the line is 15 dB above the frame's median.
+    """
+    keep = np.abs(speeds) >= slowest_mps
+    power, kept = shown[keep] ** 2, np.abs(speeds[keep])
+    top = power.argmax(axis=0)
+    floor = np.median(power, axis=0)
+    line, width, edge = (np.empty(power.shape[1]) for _ in range(3))
+    order = np.argsort(kept, kind="stable")
+    step = abs(speeds[1] - speeds[0])
+    for frame in range(power.shape[1]):
+        column, at = power[:, frame], top[frame]
+        low, high = at, at
+        while low > 0 and column[low - 1] > column[at] / 4:
+            low -= 1
+        while high < len(column) - 1 and column[high + 1] > column[at] / 4:
+            high += 1
+        line[frame], width[frame] = kept[at], (high - low + 1) * step
+        shown_here = np.maximum(column - 4 * floor[frame], 0.0)[order]
+        edge[frame] = _quantile(kept[order], shown_here, [EDGE_SHARE])[0]
+    strength = power[top, np.arange(power.shape[1])]
+    return {"line": line, "width": width, "edge": edge, "counts": strength > 10**1.5 * floor}
+
+
+def rotor_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
+    """Return spacing of the blade lines (Hz) and the Doppler edge (m/s) of a hovering craft.
+
+    The edge leaves out the body line, |speed| below spec["slowest_mps"]; spec["spacing_hz"] bounds the spacing.
+    """
+    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
+    speeds = frequency * wavelength_m / 2
+    power = (shown**2).mean(axis=1)
+    keep = (np.abs(speeds) >= spec["slowest_mps"]) & (np.abs(speeds) <= spec.get("fastest_mps", np.inf))
+    order = np.argsort(np.abs(speeds[keep]), kind="stable")
+    edge = _quantile(np.abs(speeds[keep])[order], above_floor(power[keep])[order], [EDGE_SHARE])[0]
+    return {
+        "line_spacing_hz": line_spacing_hz(signal - signal.mean(), rate_hz, *spec["spacing_hz"]),
+        "edge_mps": float(edge),
+    }
+
+
+def wing_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
+    """Return wing-beat rate (Hz) and Doppler edge (m/s), median over time, of a flapping bird; spec["cycle_s"] bounds
+    the beat's time."""
+    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
+    speeds = frequency * wavelength_m / 2
+    fast = (speeds >= spec["slowest_mps"]) & (speeds <= spec["fastest_mps"])
+    track = tracks(shown[speeds > 0], speeds[speeds > 0], 0.0)
+    return {
+        "beat_hz": 1 / cycle_s(shown[fast], spec["hop"] / rate_hz, *spec["cycle_s"]),
+        "edge_mps": float(np.quantile(track["edge"], 0.9)),
+    }
+
+
+def drive_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
+    """Return driving speed and width of the body line (m/s) of what drives away: where its line is fastest."""
+    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
+    speeds = frequency * wavelength_m / 2
+    track = tracks(shown[speeds > 0], speeds[speeds > 0], spec["slowest_mps"])
+    line = track["line"][track["counts"]]
+    if not len(line):
+        return {"speed_mps": float("nan"), "width_mps": float("nan")}
+    speed = np.quantile(line, 0.9)
+    steady = track["counts"] & (np.abs(track["line"] - speed) < 0.1 * speed)
+    return {"speed_mps": float(speed), "width_mps": float(np.median(track["width"][steady]))}
+
+
+def gait_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
+    """Return torso and limb speed (m/s) and the time of a step (s) of a walker; spec["cycle_s"] bounds the step.
+
+    Torso: median of the strongest line while it is above spec["slowest_mps"]; limbs: 95th percentile of the edge.
+    """
+    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
+    speeds = frequency * wavelength_m / 2
+    keep = (speeds > 0) & (speeds <= spec["fastest_mps"])
+    track = tracks(shown[keep], speeds[keep], spec["slowest_mps"])
+    walks = track["counts"] & (track["line"] > spec["torso_mps"])
+    limbs = (speeds >= spec["torso_mps"]) & (speeds <= spec["fastest_mps"])
+    # Frames count alike, near or far: the echo falls by 40 dB along a walk.
+    level = shown[limbs] / np.maximum(shown[keep].max(axis=0), 1e-300)
+    return {
+        "torso_mps": float(np.median(track["line"][walks])) if walks.any() else float("nan"),
+        "limb_mps": float(np.quantile(track["edge"][walks], 0.95)) if walks.any() else float("nan"),
+        "step_s": cycle_s(level, spec["hop"] / rate_hz, *spec["cycle_s"]),
+    }
+
+
+KINDS = {"rotor": rotor_figures, "wing": wing_figures, "drive": drive_figures, "gait": gait_figures}
+"""Figures of a class by the name that a pair of pictures gives."""
+UNITS = {"mps": "m/s", "hz": "Hz", "s": "s"}
+
+
+def unit(figure: str) -> str:
+    """Return the unit of a figure, which its name ends on; "" for a number."""
+    return UNITS.get(figure.rpartition("_")[2], "")

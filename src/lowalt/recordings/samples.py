@@ -1,0 +1,131 @@
+"""A recording as samples of the data set: signals, tiles and shards, by the functions that simulated signals use."""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.motion.table import NUMBERS
+from lowalt.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.recordings.files import read
+from lowalt.recordings.record import Record
+from lowalt.recordings.sets import at_carrier
+from lowalt.recordings.twin import Twin
+from lowalt.shards.index import build
+from lowalt.shards.write import write_shard
+from lowalt.spectra import trp, vrp, vt
+from lowalt.targets.cloud import CATEGORIES
+from lowalt.tiles.png import encode
+from lowalt.tiles.render import Renderer
+from lowalt.tiles.settings import Images
+
+SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
+
+
+def signals(record: Record, twin: Twin) -> np.ndarray:
+    """Return a recording's coherent intervals (n, symbols) complex64 at the twin's symbol rate, its mean removed.
+
+    Raises: InputError as `read`, where the channel is not the twin's kind, or the recording is shorter than a window.
+    """
+    if record.channel != twin.channel:
+        raise InputError(f"{record.file}: channel {record.channel!r}, but the radar has a {twin.channel} channel")
+    values, rate = read(record)
+    signal = symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
+    return coherent_intervals(signal, twin.symbols, name=str(record.file)).astype(np.complex64)
+
+
+def spectra(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:
+    """Return the three spectra of intervals (n, symbols): vrp, trp and vt, each (n, rows, windows)."""
+    settings = twin.spectra()
+    return {
+        "vrp": vrp(intervals, settings),
+        "trp": trp(intervals, settings),
+        "vt": vt(intervals, twin.carrier_hz, twin.symbol_interval_s, settings),
+    }
+
+
+def _row(record: Record, number: int) -> dict:
+    """The motion row of a window: nobody knows where the target was, so every number is NaN."""
+    return {
+        "subtype": record.name, "category": record.label, "group": "seen", "model": number,
+        **dict.fromkeys(NUMBERS, math.nan),
+    }  # fmt: skip
+
+
+def write(record: Record, twin: Twin, images: dict, folder: str | Path) -> int:
+    """Write a recording's signals.npy, spectra.npz (of the first window), tile PNGs and, where it has a label, a shard
+    with its index below `folder`; return the number of windows.
+
+    images: the configuration's `images` block. Raises: InputError as `signals`.
+    """
+    own, folder = at_carrier(twin, record.carrier_hz), Path(folder)
+    intervals = signals(record, own)
+    settings = Images.from_settings(images)
+    network = own.network(own.symbols)
+    renderer = Renderer(network, own.spectra(), settings)
+    tiles = [encode(renderer.tile(interval[None]), settings.palette) for interval in intervals]
+    with replacing(folder / "signals.npy") as temporary:
+        np.save(temporary, intervals)
+    with replacing(folder / "spectra.npz") as temporary:
+        np.savez(temporary, **{name: values[0] for name, values in spectra(intervals[:1], own).items()})
+    for number, tile in enumerate(tiles):
+        with replacing(folder / "tiles" / f"{number:06d}.png") as temporary:
+            temporary.write_bytes(tile)
+    if record.label is not None:
+        rows = [_row(record, number) | {"fold": "test"} for number in range(len(tiles))]
+        shard = folder / "shards" / "recording.tar"
+        write_shard(
+            shard, rows, [math.inf], SPLIT, 0, network, "test", "image", lambda number, _: tiles[number]
+        )  # fmt: skip
+        build(
+            [shard],
+            {"network": block(own), "spectra": spectra_block(own), "images": images},
+            folder / "shards/index.json",
+        )
+    return len(tiles)
+
+
+def block(twin: Twin) -> dict:
+    """Return the twin's network as a configuration's `network` block, which an index of shards carries."""
+    return {
+        "carrier_hz": twin.carrier_hz, "subcarrier_spacing_hz": 1.0, "subcarriers": 1, "guard_subcarriers": 0,
+        "symbol_interval_s": twin.symbol_interval_s, "symbols": twin.symbols, "transmit_array": [1, 1],
+        "receive_array": [1, 1], "power_w": 1.0, "stations": {"A": {"position_m": [0.0, 0.0, 0.0], "normal_deg": 90.0}},
+    }  # fmt: skip
+
+
+def spectra_block(twin: Twin) -> dict:
+    """Return the twin's spectra as a configuration's `spectra` block."""
+    settings = twin.spectra()
+    fourier = {
+        name: {key: getattr(getattr(settings, name), key) for key in ("window", "hop", "points")}
+        for name in ("vrp", "trp")
+    }
+    keys = ("window", "hop", "speed_min_mps", "speed_max_mps", "speed_step_mps")
+    return {**fourier, "vt": {key: getattr(settings.vt, key) for key in keys}}
+
+
+def write_table(path: str | Path, columns: tuple[str, ...], rows: list) -> None:
+    """Write rows as CSV; numbers that are not whole with five significant digits, NaN as an empty cell."""
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            writer.writerow([_cell(value) for value in row])
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.5g}"
+    return value
+
+
+def predictions(probabilities: np.ndarray, starts_s: np.ndarray) -> list[list]:
+    """Return one row a window: its start (s), the class named, and the four probabilities."""
+    return [
+        [float(start), CATEGORIES[int(row.argmax())], *map(float, row)]
+        for start, row in zip(starts_s, probabilities, strict=True)
+    ]

@@ -1,0 +1,153 @@
+"""Scenes of a twin: who stands in front of the radar, on which course, drawn from the ranges of a configuration.
+
+A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene:
+    subtypes       names of targets, one drawn a sample
+    course         hover | straight | pass | to_and_fro, and the course's own keys:
+                   hover: distance_m, height_m, sway_m, sway_hz, rock_deg
+                   straight: distance_m, height_m, speed_mps, climb_mps (any heading)
+                   pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
+                   to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
+    rate_hz        of rotors or wings; wheels roll with the speed
+    spread, wander, of the rotors' rates
+    strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
+    texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
+    beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
+    foils          patterns of foil, one drawn a sample (optional)
+    flap           changes of the wing beat, degrees (optional)
+    receiver       settings of `lowalt.recordings.receiver`
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.recordings.courses import Course, hover, straight, to_and_fro
+from lowalt.recordings.receiver import Receiver, received
+from lowalt.recordings.twin import Twin, beam_gain, echo, still_row, strengthened, textured
+from lowalt.targets.builtin import builtin_cloud
+from lowalt.targets.cloud import Cloud
+from lowalt.targets.gait import gait_cloud
+
+MARGIN = 40
+"""Symbols simulated before and behind a stretch: the ends of filters and of the analytic signal lie in them."""
+
+
+def value(setting: float | list[float], rng: np.random.Generator) -> float:
+    """Return a setting's value: the number, or a uniform draw between the two of a list.
+
+    Raises: InputError for anything else.
+    """
+    if isinstance(setting, list) and len(setting) == 2 and all(isinstance(end, (int, float)) for end in setting):
+        return float(rng.uniform(*setting))
+    if isinstance(setting, bool) or not isinstance(setting, (int, float)):
+        raise InputError(f"scene: value is {setting!r}, expected a number or [low, high]")
+    return float(setting)
+
+
+def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str, Cloud]:
+    """Return the clouds of some subtypes of merged records, built in.
+
+    Raises: InputError naming a subtype without a built-in record.
+    """
+    found = {}
+    for name in names:
+        if name not in records or records[name]["source"] not in ("builtin", "gait"):
+            raise InputError(f"scene: subtype {name!r}, expected one with a built-in record of {sorted(records)}")
+        make = builtin_cloud if records[name]["source"] == "builtin" else gait_cloud
+        found[name] = make(records[name], seed)
+    return found
+
+
+def _course(scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Generator) -> tuple[Course, float]:
+    """The course at the times, and the target's speed (m/s)."""
+    take = lambda name: value(scene[name], rng)  # noqa: E731
+    kind, heading = scene["course"], rng.uniform(0, 2 * np.pi)
+    if kind == "hover":
+        place = np.array([0.0, take("distance_m"), take("height_m")])
+        rock = math.radians(take("rock_deg"))
+        return hover(times_s, place, heading, take("sway_m"), take("sway_hz"), rock, rng), 0.0
+    if kind == "straight":
+        place, speed = np.array([0.0, take("distance_m"), take("height_m")]), take("speed_mps")
+        return straight(times_s, place, speed, heading, take("climb_mps")), speed
+    if kind == "pass":
+        place, speed = np.array([take("lateral_m"), take("ahead_m"), take("height_m")]), take("speed_mps")
+        return straight(times_s, place, abs(speed), 0.0 if speed > 0 else math.pi), abs(speed)
+    if kind == "to_and_fro":
+        own = cloud.record["track_speed_mps"]
+        walk = [take(name) for name in ("near_m", "far_m", "speed_mps", "turn_s")]
+        return to_and_fro(times_s, *walk, own, 0.0, take("height_m")), walk[2]
+    raise InputError(f"scene: course is {kind!r}, expected hover, straight, pass or to_and_fro")
+
+
+def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
+    if cloud.category == "Vehicle":
+        return speed / (math.pi * cloud.record["wheel_diameter_m"])
+    return value(scene["rate_hz"], rng) if "rate_hz" in scene else 0.0
+
+
+def heard(
+    twin: Twin, scene: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+) -> tuple[np.ndarray, str]:
+    """Return the complex echo (N,) of one drawn scene at the receiver's rate, margins included, and the subtype's name.
+
+    seconds: length without the margins. Raises: InputError for a scene with a wrong key or value.
+    """
+    try:
+        name = scene["subtypes"][int(rng.integers(len(scene["subtypes"])))]
+        cloud = clouds[name]
+        if "flap" in scene:
+            flap = {key: value(setting, rng) for key, setting in scene["flap"].items()}
+            cloud = replace(cloud, record=cloud.record | {"flap": cloud.record["flap"] | flap})
+        strength = {kind: value(setting, rng) for kind, setting in scene.get("strength_db", {}).items()}
+        foils = scene.get("foils")
+        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "")
+        cloud = textured(cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng)
+        margin = 2 * MARGIN * twin.symbol_interval_s
+        times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
+        times += value(scene.get("start_s", 0.0), rng)
+        course, speed = _course(scene, cloud, times, rng)
+        row = still_row(cloud, _rate(scene, cloud, speed, rng), rng)
+        if "node" in cloud.kinds:
+            row["start_s"] = float(rng.uniform(0, len(cloud.track) / cloud.record["track_rate_hz"]))
+        wander = [value(scene.get(key, 0.0), rng) for key in ("spread", "wander")]
+        signal = echo(twin, cloud, row, course, times, *wander, rng)
+        if "beam" in scene:
+            signal *= beam_gain(course.place_m, value(scene["beam"]["width_deg"], rng), scene["beam"]["floor_db"])
+    except KeyError as error:
+        raise InputError(f"scene {scene.get('course')!r} of {scene.get('subtypes')}: {error} is missing") from None
+    return signal, name
+
+
+def samples(twin: Twin, receiver: dict, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Return what the receiver records (N,) of an echo (N,), its settings drawn from their ranges."""
+    settings = Receiver.from_settings({key: value(item, rng) for key, item in receiver.items()})
+    return received(signal, twin.rate_hz, settings, twin.channel == "real", rng)
+
+
+def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
+    """Return the signal at the symbol rate of simulated samples, its margins cut off."""
+    signal = symbol_rate(values, twin.rate_hz, twin.symbol_interval_s, twin.sampling)
+    return signal[MARGIN : MARGIN + math.floor(seconds / twin.symbol_interval_s + 1e-6)]
+
+
+def intervals(
+    twin: Twin, scene: dict, clouds: dict[str, Cloud], seed: int, keys: tuple, count: int, receivers: int = 1
+) -> tuple[np.ndarray, list[str]]:
+    """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
+
+    Each of `count` scenes is drawn once, and its echo heard by so many receivers, each drawn from the scene's ranges.
+    """
+    seconds = twin.symbols * twin.symbol_interval_s
+    found, names = np.empty((count, receivers, twin.symbols), np.complex128), []
+    for number in range(count):
+        signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
+        for again in range(receivers):
+            rng = stream(seed, "twin-receiver", *keys, number, again)
+            values = samples(twin, scene["receiver"], signal, rng)
+            found[number, again] = coherent_intervals(stretch(values, twin, seconds), twin.symbols, name=name)[0]
+        names.append(name)
+    return found, names
