@@ -84,6 +84,15 @@ def simulated(library: Library, name: str, block: dict, fold: str) -> Windows:
     return Windows(np.concatenate(parts), told)
 
 
+def recogniser(block: dict):
+    """Return a network of the settings' scheme with fresh weights, and the scheme."""
+    from lowalt.recognition.network import Recogniser
+
+    scheme = named(block["table"], block["scheme"])
+    palette = Images.from_settings(block["images"]).palette
+    return Recogniser(scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS))), scheme
+
+
 def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path):
     """Return the network trained on simulated windows {"train": ..., "validation": ...} of the twin `name`.
 
@@ -91,24 +100,35 @@ def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder
     """
     from lowalt.recognition.checkpoint import identity
     from lowalt.recognition.inference import Machine
-    from lowalt.recognition.network import Recogniser
     from lowalt.recognition.recipe import seeded
     from lowalt.recognition.training import Trainer
 
-    scheme = named(block["table"], block["scheme"])
     keys = ("recordings", name, seed)
     seeded(block["seed"], keys, block["training"]["threads"])
-    palette = Images.from_settings(block["images"]).palette
-    model = Recogniser(scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS)))
+    model, scheme = recogniser(block)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    trainer = Trainer(
-        model, windows, scheme.columns, {key: block[key] for key in ("seed", "training", "augmentation")}, keys,
-        identity(twin=name, seed=seed, settings=block), folder, Machine.here(block["training"]["precision"]),
-    )  # fmt: skip
+    own = {key: block[key] for key in ("seed", "training", "augmentation")}
+    machine, run = Machine.here(block["training"]["precision"]), identity(twin=name, seed=seed, settings=block)
+    trainer = Trainer(model, windows, scheme.columns, own, keys, run, folder, machine)
     trainer.fit()
     weights = trainer.best_weights
-    trainer.finish({"classes": list(CATEGORIES)})
+    trainer.finish({"twin": name})
     model.load_state_dict(weights)
+    return model.eval()
+
+
+def load_model(path: str | Path, name: str, block: dict):
+    """Return the network in a file that `train` wrote.
+
+    Raises: InputError where the file is missing, damaged, or was trained on another twin than `name`.
+    """
+    from lowalt.recognition.checkpoint import load
+
+    _, state = load(path)
+    if state.get("twin") != name:
+        raise InputError(f"{path}: trained on the twin {state.get('twin')!r}, expected {name!r}")
+    model, _ = recogniser(block)
+    model.load_state_dict(state["weights"])
     return model.eval()
 
 

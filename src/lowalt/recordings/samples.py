@@ -1,11 +1,11 @@
 """A recording as samples of the data set: signals, tiles and shards, by the functions that simulated signals use."""
 
-import csv
 import math
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.motion.table import NUMBERS
@@ -110,11 +110,7 @@ def spectra_block(twin: Twin) -> dict:
 
 def write_table(path: str | Path, columns: tuple[str, ...], rows: list) -> None:
     """Write rows as CSV; numbers that are not whole with five significant digits, NaN as an empty cell."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(columns)
-        for row in rows:
-            writer.writerow([_cell(value) for value in row])
+    write_csv(path, columns, ([_cell(value) for value in row] for row in rows))
 
 
 def _cell(value: object) -> object:

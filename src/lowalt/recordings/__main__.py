@@ -1,0 +1,143 @@
+"""`python -m lowalt.recordings import | predict | pairs | compare | recognise`: recordings in, and held against twins.
+
+import and predict are for a user's own recording, the others for the measured sets below a folder.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.command import run
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.recordings import compare, samples
+from lowalt.recordings.library import Library
+from lowalt.recordings.pairs import pair_of
+from lowalt.recordings.recognise import settings
+from lowalt.recordings.record import read_record
+from lowalt.recordings.sets import at_carrier, recordings
+from lowalt.targets.cloud import CATEGORIES
+from lowalt.targets.records import load_records
+
+FOLDER = "config/measured"
+
+
+def _line(name: str, description: str, *, inputs: bool = False) -> argparse.ArgumentParser:
+    options = argparse.ArgumentParser(prog=f"python -m lowalt.recordings {name}", description=description)
+    options.add_argument("--twins", default=f"{FOLDER}/twins.yaml", help="radars and scenes")
+    options.add_argument("--recognition", default=f"{FOLDER}/recognition.yaml", help="network and training")
+    options.add_argument("--out", required=True, type=Path, help="folder to write")
+    if inputs:
+        options.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
+        options.add_argument("--sets", default=f"{FOLDER}/sets.yaml")
+        options.add_argument("--split", default=f"{FOLDER}/split.yaml")
+        options.add_argument("--pairs", default=f"{FOLDER}/pictures.yaml")
+    else:
+        options.add_argument("--record", required=True, type=Path, help="record of the recording (.yaml)")
+        options.add_argument("--radar", required=True, help="the twin whose symbol rate the signals get")
+    return options
+
+
+def _twin(library: Library, name: str):
+    if name not in library.twins:
+        raise InputError(f"--radar {name!r}: no such twin, expected one of {sorted(library.twins)}")
+    return library.twins[name]
+
+
+def import_(arguments: list[str]) -> None:
+    """Turn one recording into signals, spectra, tiles and, with a label, a shard and its index."""
+    given = _line("import", import_.__doc__).parse_args(arguments)
+    library, record = Library.read(given.twins), read_record(given.record)
+    count = samples.write(record, _twin(library, given.radar), settings(given.recognition)["images"], given.out)
+    print(f"{given.out}: {count} windows of {record.file.name}")
+
+
+def predict(arguments: list[str]) -> None:
+    """Name the class of every window of one recording by a network of `recognise`, into predictions.csv."""
+    options = _line("predict", predict.__doc__)
+    options.add_argument("--model", required=True, type=Path, help="network that was trained on the radar's twin (.pt)")
+    given = options.parse_args(arguments)
+    from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered
+    from lowalt.tiles.settings import Images
+
+    library, record, block = Library.read(given.twins), read_record(given.record), settings(given.recognition)
+    twin = at_carrier(_twin(library, given.radar), record.carrier_hz)
+    intervals = samples.signals(record, twin)
+    images, count = rendered(intervals, twin, Images.from_settings(block["images"]), block["size"]), len(intervals)
+    told = facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), "test")
+    found = guesses(load_model(given.model, given.radar, block), Windows(images, told), block)
+    starts = np.arange(count) * twin.symbols * twin.symbol_interval_s
+    rows = samples.predictions(found, starts)
+    samples.write_table(given.out / "predictions.csv", ("start_s", "class", *CATEGORIES), rows)
+    named = np.bincount(found.argmax(1), minlength=len(CATEGORIES))
+    print(", ".join(f"{category} {share}" for category, share in zip(CATEGORIES, named, strict=True)))
+
+
+def pairs(arguments: list[str]) -> None:
+    """Compute the pairs of pictures, measured and simulated, into one pair-NAME.npz each."""
+    given = _line("pairs", pairs.__doc__, inputs=True).parse_args(arguments)
+    block, found = load_yaml(given.pairs), recordings(given.inputs, given.sets, given.split)
+    records = load_records(block["targets"]["table"], block["targets"]["records"])
+    for name, pair in block["pairs"].items():
+        before = {**pair, "scene": compare.plain(pair["scene"], block["mended"])}
+        drawn = [pair_of(name, version, found, records, block["seed"]) for version in (before, pair)]
+        if drawn[1] is None:
+            print(f"{name}: {pair['file']} is not there, left out")
+            continue
+        (measured, simulated), plain = drawn[1], drawn[0][1]
+        with replacing(given.out / f"pair-{name}.npz") as temporary:
+            np.savez(
+                temporary, caption=np.array(pair["caption"]), times_s=measured.times_s, speeds_mps=measured.speeds_mps,
+                measured=measured.level_db.astype(np.float32), simulated=simulated.level_db.astype(np.float32),
+                before=plain.level_db.astype(np.float32),
+            )  # fmt: skip
+
+
+def compare_(arguments: list[str]) -> None:
+    """Compute measured-figures.csv, measured-files.csv and measured-distances.csv."""
+    options = _line("compare", compare_.__doc__, inputs=True)
+    options.add_argument("--count", type=int, default=60, help="simulated intervals a class")
+    given = options.parse_args(arguments)
+    block, found = load_yaml(given.pairs), recordings(given.inputs, given.sets, given.split)
+    library = Library.read(given.twins)
+    rows, files = [], []
+    for name, pair in block["pairs"].items():
+        more = compare.class_figures(name, pair, found, library.records, block)
+        rows += more[0]
+        files += more[1]
+    apart = [
+        row for name in library.twins for row in compare.distances(name, found, library, block["mended"], given.count)
+    ]
+    samples.write_table(given.out / "measured-figures.csv", compare.FIGURES, rows)
+    samples.write_table(given.out / "measured-files.csv", ("pair", "half", "file", "figure", "value"), files)
+    samples.write_table(given.out / "measured-distances.csv", compare.DISTANCES, apart)
+
+
+def recognise(arguments: list[str]) -> None:
+    """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
+    options = _line("recognise", recognise.__doc__, inputs=True)
+    options.add_argument("--models", required=True, type=Path, help="folder for the trained networks")
+    given = options.parse_args(arguments)
+    from lowalt.recordings.reality import ACCURACY, RECOGNITION, accuracy, radar
+
+    library, block = Library.read(given.twins), settings(given.recognition)
+    found = recordings(given.inputs, given.sets, given.split)
+    rows = [row for name in library.twins for row in radar(name, found, library, block, given.models)]
+    samples.write_table(given.out / "measured-recognition.csv", RECOGNITION, rows)
+    samples.write_table(given.out / "measured-accuracy.csv", ACCURACY, accuracy(rows, block["seed"]))
+
+
+COMMANDS = {"import": import_, "predict": predict, "pairs": pairs, "compare": compare_, "recognise": recognise}
+
+
+def main(arguments: list[str]) -> None:
+    """Run one command of the stage."""
+    if not arguments or arguments[0] not in COMMANDS:
+        raise InputError(f"lowalt.recordings: {arguments[:1]}, expected one of {list(COMMANDS)}")
+    COMMANDS[arguments[0]](arguments[1:])
+
+
+if __name__ == "__main__":
+    run(main)
