@@ -115,7 +115,8 @@ def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: 
     if not len(peaks):
         return float("nan")
     found = peaks + first - 1
-    good = found[spread[found] >= 0.7 * spread[found].max()]
+    best = spread[found].max()
+    good = found[spread[found] >= best - 0.3 * abs(best)]
     at = int(good.min())
     # A parabola through three points places the peak between bins.
     before, top, after = spread[at - 1 : at + 2]
@@ -138,7 +139,8 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
     if not len(peaks):
         return float("nan")
     found = peaks + first
-    good = found[alike[found] >= 0.8 * alike[found].max()]
+    best = alike[found].max()
+    good = found[alike[found] >= best - 0.2 * abs(best)]
     return float(good.min() * hop_s)
 
 
