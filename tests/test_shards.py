@@ -20,7 +20,8 @@ from lowalt.common.splits import fold
 from lowalt.motion import COLUMNS, write_table
 from lowalt.shards import ShardSet, card, faults
 from lowalt.shards.__main__ import main
-from lowalt.shards.record import geometry, record, sample_key, snr_label
+from lowalt.shards.read import complex_signals
+from lowalt.shards.record import geometry, record, row_of, sample_key, snr_label
 from lowalt.shards.size import main as size_main
 from lowalt.shards.size import models_per_chunk, sample_bytes
 from lowalt.shards.table import map_samples
@@ -120,7 +121,7 @@ def test_every_sample_stands_once_in_the_fold_that_is_its_own(images):
         for name in ("train", "val", "test"):
             for sample in webdataset.WebDataset(str(images / f"{group}-{name}-00000.tar"), shardshuffle=False):
                 entry = json.loads(sample["json"])
-                found.append((entry["subtype"], entry["model"], float(entry["snr_db"])))
+                found.append((entry["subtype"], entry["model"], row_of(entry)[1]))
                 assert sample["__key__"] == entry["key"] and "." not in entry["key"]
                 assert entry["fold"] == name == fold(SPLIT, SEED, entry["subtype"], entry["model"])
                 assert entry["group"] == group
@@ -170,14 +171,45 @@ def test_record_tells_motion_geometry_and_versions():
     network = Network.from_settings(NETWORK)
     entry = json.loads(record(row, math.inf, "val", SEED, network))
     assert entry["key"] == "dji-mavic-3-000000-snrinf"
-    assert (entry["label"], entry["category"], entry["snr_db"], entry["seed"]) == (0, "UAV", "inf", SEED)
-    assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] is None
+    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (0, "UAV", 300.0, False)
+    assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] == 0.0
+    assert entry["seed"] == SEED
     seen = entry["geometry"]["A"]
     # Station A stands at (0, 0, 25): range 50 m, level, receding at 5 m/s.
     assert seen["range_m"] == 50 and seen["omega"] == 0
     assert seen["radial_mps"] == pytest.approx(5)
     assert seen["psi"] == pytest.approx(-math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8)
-    assert {"lowalt", "numpy", "numba"} <= set(entry["versions"])
+    assert set(entry["versions"]) == {"lowalt"}
+
+
+def types(value):
+    """The tree of a record's types, a leaf for each value."""
+    return {name: types(item) for name, item in value.items()} if isinstance(value, dict) else type(value)
+
+
+def test_every_field_has_one_type_in_all_records():
+    network = Network.from_settings(NETWORK)
+    rows = [*motion_rows("seen"), *motion_rows("unseen")]
+    trees = [types(json.loads(record(row, snr, "val", SEED, network))) for row in rows for snr in (3, 3.5, math.inf)]
+    assert all(tree == trees[0] for tree in trees)
+    assert type(None) not in trees[0]["motion"].values()
+
+
+def test_a_record_tells_row_and_snr_back():
+    row = motion_rows("seen")[0]
+    for snr_db in (3.0, math.inf):
+        text = record(row, snr_db, "val", SEED, Network.from_settings(NETWORK))
+        again, snr = row_of(json.loads(text))
+        assert snr == snr_db
+        assert record(again, snr, "val", SEED, Network.from_settings(NETWORK)) == text
+    with pytest.raises(InputError, match=r"of lowalt 0\.1\.0, expected"):
+        row_of({"key": "crow", "snr_db": "inf", "versions": {"lowalt": "0.1.0"}})
+
+
+def test_signals_of_an_older_data_set_are_read(signals):
+    stored = ShardSet(signals / "index.json").signal(0)
+    assert (complex_signals(stored.view(np.float32).reshape(3, 400, 2)) == stored).all()
+    assert complex_signals(stored) is stored
 
 
 def test_geometry_above_a_station_is_finite():
@@ -217,7 +249,7 @@ def test_shard_set_reads_any_sample(images):
         entry = shards.record(number)
         assert shards.keys[number].decode() == entry["key"]
         assert (shards.labels[number], shards.models[number]) == (entry["label"], entry["model"])
-        assert shards.snrs_db[number] == float(entry["snr_db"])
+        assert shards.snrs_db[number] == row_of(entry)[1]
         tile, palette = decode(shards.png(number))
         np.testing.assert_array_equal(shards.images(number), split(tile))
         np.testing.assert_array_equal(shards.palette, palette)

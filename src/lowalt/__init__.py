@@ -3,4 +3,13 @@
 One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, tiles, shards, recognition, report.
 """
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
+
+
+def __getattr__(name: str):
+    # Imports wait: a stage's command line must not pay for the whole street.
+    if name in ("Dataset", "Endless"):
+        from lowalt.shards import dataset
+
+        return getattr(dataset, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -41,7 +41,7 @@ rule index:
     conda:
         "../../envs/environment.yaml"
     params:
-        settings=settings.images,
+        settings=settings.index,
     shell:
         "python -m lowalt.shards index --settings {params.settings:q} --shards {input.tars:q} --out {output:q} 2> {log:q}"
 

@@ -1,6 +1,8 @@
-"""`python -m lowalt.shards write | index | verify`: pack a chunk's samples, list the shards, check every byte."""
+"""`python -m lowalt.shards write | index | verify | remake`: pack samples, list, check and make them again."""
 
 import argparse
+from collections.abc import Iterable
+from pathlib import Path
 
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
@@ -49,30 +51,77 @@ def write(arguments: list[str]) -> None:
 def index(arguments: list[str]) -> None:
     """Write the index of shards.
 
-    Settings: network, spectra, images (how a loader renders signals).
+    Settings: network, spectra, images (how a loader renders signals), and echo {tolerance, effects} where it is known.
     """
     options = parser("lowalt.shards index", "List shards with counts and checksums.")
     options.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables beside them")
     options.add_argument("--out", required=True, help="index to write (.json)")
     given = options.parse_args(arguments)
+    echo = given.settings.pop("echo", None)
     pick(given.settings, "network", "spectra", "images")
-    build(given.shards, given.settings, given.out)
+    build(given.shards, given.settings, given.out, echo)
 
 
-def verify(arguments: list[str]) -> None:
-    """Check every byte of a data set; print every fault and end with status 1 where there is one."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards verify", description=verify.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    given = options.parse_args(arguments)
+def _clouds_option(options: argparse.ArgumentParser) -> None:
+    options.add_argument("--clouds", help="folder of the run's cloud files (default: ../clouds)")
+    options.add_argument("--occluders", help="folder of the run's surface files, where the scene hides points")
+
+
+def _remaker(given: argparse.Namespace):
+    """What makes the samples of the index again."""
+    # Imports wait: packing shards must not pay for the echo engine.
+    from lowalt.shards.read import ShardSet
+    from lowalt.shards.remake import CloudFolder, Remaker
+
+    occluders = None
+    if given.occluders:
+        from lowalt.targets.occluders import read_all
+
+        occluders = read_all(sorted(Path(given.occluders).glob("*.npz")))
+    clouds = given.clouds or Path(given.index).resolve().parent.parent / "clouds"
+    return Remaker(ShardSet(given.index), CloudFolder(clouds), occluders)
+
+
+def _ended(lines: Iterable[str]) -> None:
+    """Print every fault and end with status 1 where there is one."""
     found = 0
-    for line in faults(given.index):
+    for line in lines:
         print(line)
         found += 1
     if found:
         raise SystemExit(1)
 
 
-COMMANDS = {"write": write, "index": index, "verify": verify}
+def verify(arguments: list[str]) -> None:
+    """Check every byte of a data set; print every fault and end with status 1 where there is one."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards verify", description=verify.__doc__)
+    options.add_argument("--index", required=True, help="the data set's index")
+    options.add_argument("--remake", type=int, default=0, metavar="N", help="also make N random samples again")
+    _clouds_option(options)
+    given = options.parse_args(arguments)
+    _ended(faults(given.index))
+    if given.remake:
+        from lowalt.shards.remake import some
+
+        remaker = _remaker(given)
+        _ended(line for number in some(remaker.shards, given.remake) for line in remaker.faults(number))
+
+
+def remake(arguments: list[str]) -> None:
+    """Make samples again from their records; print what differs and end with status 1 where anything does."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards remake", description=remake.__doc__)
+    options.add_argument("--index", required=True, help="the data set's index")
+    options.add_argument("--sample", required=True, nargs="+", metavar="KEY", help="keys of the samples")
+    _clouds_option(options)
+    given = options.parse_args(arguments)
+    from lowalt.shards.remake import number_of
+
+    remaker = _remaker(given)
+    _ended(line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key)))
+    print(f"{len(given.sample)} samples made again, equal in every byte")
+
+
+COMMANDS = {"write": write, "index": index, "verify": verify, "remake": remake}
 
 
 def main(arguments: list[str]) -> None:

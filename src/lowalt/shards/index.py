@@ -12,14 +12,17 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
 from lowalt.shards.table import read_header, table_path
 
-FORMAT = "lowalt-shards-1"
+FORMAT = "lowalt-shards-2"
+READABLE = ("lowalt-shards-1", FORMAT)
+"""Formats that are read; records of the first have nulls, an SNR of \"inf\", and its signals are complex64."""
 
 
-def build(shards: list[str | Path], render: dict, out: str | Path) -> dict:
+def build(shards: list[str | Path], render: dict, out: str | Path, echo: dict | None = None) -> dict:
     """Write the index of these shards to `out` and return it.
 
-    render: the settings that turn signals into tiles ({network, spectra, images}). Paths in the index are relative
-    to its folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
+    render: the settings that turn signals into tiles ({network, spectra, images}); echo: those that turn motion into
+    echoes ({tolerance, effects}), without which no sample can be made again. Paths in the index are relative to its
+    folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
     """
     entries = []
     for shard in map(Path, shards):
@@ -40,6 +43,7 @@ def build(shards: list[str | Path], render: dict, out: str | Path) -> dict:
         "samples": sum(entry["samples"] for entry in entries),
         "bytes": sum(entry["bytes"] for entry in entries),
         "render": render,
+        "echo": echo,
         "shards": sorted(entries, key=lambda entry: entry["name"]),
     }
     index["sha256"] = _checksum(index)
@@ -72,8 +76,8 @@ def load(path: str | Path) -> dict:
         found, checksum = index["format"], index["sha256"]
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: not an index of shards ({error})") from error
-    if found != FORMAT:
-        raise InputError(f"{path}: format {found!r}, expected {FORMAT!r}")
+    if found not in READABLE:
+        raise InputError(f"{path}: format {found!r}, expected one of {READABLE}")
     if checksum != _checksum(index):
         raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
     return index

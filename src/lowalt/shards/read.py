@@ -26,6 +26,13 @@ from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
 
 
+def complex_signals(stored: np.ndarray) -> np.ndarray:
+    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version 0.1 wrote them."""
+    if stored.dtype == np.complex64:
+        return stored
+    return np.ascontiguousarray(stored).view(np.complex64)[..., 0]
+
+
 class ShardSet:
     """The samples of some groups and folds of a data set, numbered in the order of the index.
 
@@ -130,6 +137,13 @@ class ShardSet:
         """SNRs of all samples, (n,) float64."""
         return self._column("snr_db").astype(float)
 
+    def members(self, number: int) -> tuple[bytes, bytes]:
+        """Return record and data of a sample as they are stored.
+
+        Raises: InputError naming shard and sample where it is damaged.
+        """
+        return self._bytes(number, "record"), self._bytes(number, "data")
+
     def record(self, number: int) -> dict:
         """Return the JSON record of a sample.
 
@@ -151,7 +165,7 @@ class ShardSet:
         Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
         """
         self._need("signal")
-        return np.lib.format.read_array(io.BytesIO(self._bytes(number, "data")))
+        return complex_signals(np.lib.format.read_array(io.BytesIO(self._bytes(number, "data"))))
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered: the same pixels from both kinds.

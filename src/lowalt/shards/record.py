@@ -1,15 +1,18 @@
-"""What a sample says about itself: its key, its place in the shuffled order, its JSON record."""
+"""What a sample says about itself: its key, its place in the shuffled order, its JSON record.
 
-import functools
-import importlib.metadata
+Every field has one type in all records, and no value is missing, so that tables with typed columns (Arrow) hold them.
+"""
+
 import json
 import math
 
 import numpy as np
 
 from lowalt import __version__
+from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.network import Network
+from lowalt.common.portable import dot, norm
 from lowalt.common.streams import digest
 from lowalt.targets.cloud import CATEGORIES
 
@@ -34,11 +37,13 @@ def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
     return digest(seed, "order", subtype, model, "inf" if math.isinf(snr_db) else float(snr_db))
 
 
-@functools.cache
+NO_NOISE_DB = 300.0
+"""The SNR (dB) in records of samples without noise: noise at 300 dB would be far below complex64's rounding."""
+
+
 def versions() -> dict[str, str]:
-    """Versions of what decides a sample's bytes."""
-    names = ("numpy", "numba", "deflate", "matplotlib")
-    return {"lowalt": __version__, **{name: importlib.metadata.version(name) for name in names}}
+    """Return the versions of all that decides a sample's bytes: this package alone."""
+    return {"lowalt": __version__}
 
 
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
@@ -51,14 +56,14 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
     result = {}
     for station in network.stations:
         offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
-        distance = float(np.sqrt(offset @ offset))
+        distance = float(norm(offset))
         towards = offset / distance if distance != 0 else np.zeros(3)
         speed = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
         result[station.name] = {
             "range_m": distance,
-            "psi": float(towards @ station.horizontal),
+            "psi": float(dot(towards, station.horizontal)),
             "omega": float(towards[2]),
-            "radial_mps": float(towards @ speed),
+            "radial_mps": float(dot(towards, speed)),
         }
     return result
 
@@ -66,18 +71,22 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
 def record(row: dict, snr_db: float, fold: str, seed: int, network: Network) -> bytes:
     """Return the JSON record of one sample: who it is, how it moves, what each station sees, what made it.
 
-    row: a row of the motion table (NaN becomes null). An infinite SNR is the string "inf".
+    row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
+    whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Of a recorded target whose place nobody knows,
+    unknown numbers are null.
     """
     names = ("subtype", "category", "group", "model")
     motion = {name: value for name, value in row.items() if name not in (*names, "fold")}
+    blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
         "label": CATEGORIES.index(row["category"]),
         **{name: row[name] for name in names},
         "fold": fold,
-        "snr_db": "inf" if math.isinf(snr_db) else snr_db,
+        "snr_db": NO_NOISE_DB if math.isinf(snr_db) else float(snr_db),
+        "noise": not math.isinf(snr_db),
         "seed": seed,
-        "motion": {name: None if math.isnan(value) else value for name, value in motion.items()},
+        "motion": {name: blank if math.isnan(value) else float(value) for name, value in motion.items()},
         "geometry": {
             station: {name: None if math.isnan(value) else value for name, value in seen.items()}
             for station, seen in geometry(row, network).items()
@@ -85,3 +94,16 @@ def record(row: dict, snr_db: float, fold: str, seed: int, network: Network) -> 
         "versions": versions(),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+
+
+def row_of(entry: dict) -> tuple[dict, float]:
+    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a record tells.
+
+    Raises: InputError naming the sample where the record is of an older format.
+    """
+    if "noise" not in entry:
+        made_by = entry.get("versions", {}).get("lowalt", "an unknown version")
+        raise InputError(f"sample {entry.get('key')}: record of lowalt {made_by}, expected of 0.2 or later")
+    names = ("subtype", "category", "group", "model")
+    snr_db = entry["snr_db"] if entry["noise"] else math.inf
+    return {**{name: entry[name] for name in names}, **entry["motion"]}, snr_db

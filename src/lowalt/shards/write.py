@@ -1,6 +1,5 @@
 """One shard: the samples of a chunk that belong to one fold, shuffled by their names, with their table."""
 
-import io
 from collections.abc import Callable
 from pathlib import Path
 
@@ -15,13 +14,16 @@ from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Writer
 from lowalt.targets.cloud import CATEGORIES
+from lowalt.tiles.files import npy_header
 
 
 def npy(signals: np.ndarray) -> bytes:
-    """Return a signal array as the bytes of an .npy file."""
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, np.ascontiguousarray(signals), version=(1, 0))
-    return buffer.getvalue()
+    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32 (stations, symbols, 2).
+
+    The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
+    """
+    parts = np.ascontiguousarray(signals, "<c8").view("<f4").reshape(*signals.shape, 2)
+    return npy_header("<f4", parts.shape) + parts.tobytes()
 
 
 def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> list[tuple[int, int]]:

@@ -17,9 +17,9 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 
 
-def _header(dtype: str, count: int) -> bytes:
-    """The .npy header of a one-dimensional array."""
-    text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': ({count},), }}"
+def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
+    """Return the .npy header (format 1.0) of an array; NumPy's own has paddings that changed between versions."""
+    text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {tuple(map(int, shape))}, }}"
     text = text.ljust(-(-(11 + len(text)) // 64) * 64 - 11) + "\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
 
@@ -34,7 +34,7 @@ def _crc_behind(header: bytes, size: int) -> int:
 
 def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
     """Write encoded images in their order; return their number and bytes. Equal images give equal files."""
-    offsets, blank = [0], _header("|u1", 0)
+    offsets, blank = [0], npy_header("|u1", (0,))
     with replacing(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as archive:
         info = zipfile.ZipInfo("data.npy")
         with archive.open(info, "w", force_zip64=True) as member:
@@ -44,12 +44,12 @@ def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
                 offsets.append(offsets[-1] + len(image))
         # The array's length is known only now; its header has room for it. A CRC is linear, so what the header
         # changes in it does not depend on the data.
-        header = _header("|u1", offsets[-1])
+        header = npy_header("|u1", (offsets[-1],))
         info.CRC ^= _crc_behind(blank, offsets[-1]) ^ _crc_behind(header, offsets[-1])
         archive.fp.seek(info.header_offset)
         archive.fp.write(info.FileHeader(zip64=True) + header)
         table = np.array(offsets, "<i8")
-        archive.writestr(zipfile.ZipInfo("offsets.npy"), _header("<i8", len(table)) + table.tobytes())
+        archive.writestr(zipfile.ZipInfo("offsets.npy"), npy_header("<i8", (len(table),)) + table.tobytes())
     return len(offsets) - 1, offsets[-1]
 
 

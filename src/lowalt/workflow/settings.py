@@ -63,8 +63,13 @@ class Settings:
         return self._text("noise", **self._blocks("seed"), stations=self._run.stations, snr_db=snrs)
 
     def images(self, wildcards: Any) -> str:
-        """Network, spectra and images, for tiles and for the index that describes them."""
+        """Network, spectra and images."""
         return self._text("images", **self._blocks("network", "spectra", "images"))
+
+    def index(self, wildcards: Any) -> str:
+        """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""
+        echo = {"tolerance": self._config["echo"]["tolerance"], "effects": self._config["effects"]}
+        return self._text("index", **self._blocks("network", "spectra", "images"), echo=echo)
 
     def shard(self, wildcards: Any) -> str:
         """The fold of each sample, its name and its form."""

@@ -17,7 +17,7 @@ def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
         if len(numbers):
             best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]
             record = shards.record(int(best))
-            noise = "no noise" if record["snr_db"] == "inf" else f"SNR {record['snr_db']} dB"
+            noise = "no noise" if np.isinf(shards.snrs_db[best]) else f"SNR {shards.snrs_db[best]:g} dB"
             caption = f"{category}: {record['subtype']}, motion model {record['model']}, {noise}"
             chosen.append((caption, _picture(shards, int(best))))
     return chosen

@@ -1,0 +1,56 @@
+"""A whole data set written from its configuration and clouds alone, without a workflow: the same bytes, one process."""
+
+import sys
+from pathlib import Path
+
+from lowalt.common.files import slug
+from lowalt.motion.table import write_table
+from lowalt.shards.dataset import Dataset, Place
+from lowalt.shards.index import build
+from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.write import npy, write_shard
+from lowalt.targets.cloud import write as write_cloud
+
+
+def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = True) -> dict:
+    """Write the shards of all groups and folds of a data set, its motion tables and clouds below `folder`, as the
+    workflow does; return the index.
+
+    kind: "image" or "signal"; clouds: whether cloud files are written too.
+    Raises: InputError naming the sample that cannot be computed.
+    """
+    folder, plan = Path(folder), dataset.plan
+    if clouds:
+        for group in plan.groups.values():
+            for subtype in group:
+                write_cloud(folder / "clouds" / f"{slug(subtype)}.npz", dataset.clouds[subtype])
+    written = []
+    for chunk in plan.chunks:
+        written += write_chunk(dataset, folder, chunk, kind)
+        print(f"{chunk}: written", file=sys.stderr)
+    render = {key: dataset.config[key] for key in ("network", "spectra", "images")}
+    return build(written, render, folder / "shards" / "index.json", dataset.maker.echo)
+
+
+def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
+    """Write the motion table and the shards of one chunk; return the shards' paths."""
+    plan, maker = dataset.plan, dataset.maker
+    group, _, part = chunk.partition("-")
+    first, count = plan.span(chunk)
+    places = [
+        Place(group, subtype, model, 0.0) for model in range(first, first + count) for subtype in plan.groups[group]
+    ]
+    rows = [dataset.row(place) for place in places]
+    write_table(folder / "motion" / f"{chunk}.csv", rows)
+    # A shard's samples are shuffled, so the echoes of all its motion models are kept meanwhile.
+    maker.kept = len(rows)
+
+    def content(number: int, level: int) -> bytes:
+        signal = maker.signal(rows[number], plan.snrs[level])
+        return npy(signal) if EXTENSIONS[kind] == "npy" else maker.png(signal)
+
+    paths = []
+    for name in plan.folds(chunk):
+        paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
+        write_shard(paths[-1], rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
+    return paths

@@ -1,0 +1,221 @@
+"""A data set as a function: every sample is made when it is asked for, the same bytes as in the shards.
+
+No torch here: `Dataset` has a length and numbered samples, which is what `torch.utils.data.DataLoader` takes, and
+`Endless` is an iterable; both can be pickled, so workers of any framework make samples of their own.
+"""
+
+import functools
+import itertools
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.plan import GROUPS, Plan
+from lowalt.common.splits import FOLDS, fold
+from lowalt.common.streams import stream
+from lowalt.common.yaml_files import load_yaml
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.shards.maker import Maker
+from lowalt.shards.record import record, sample_key
+from lowalt.shards.remake import CloudFolder
+from lowalt.shards.write import npy
+from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.records import load_records
+
+
+class Sample(NamedTuple):
+    """One sample: `image` its tile of index values, (3 S, 3 S) uint8; `signal` (stations, symbols) complex64; `record`
+    a dict, as in the shards."""
+
+    image: np.ndarray
+    signal: np.ndarray
+    record: dict
+
+
+class Place(NamedTuple):
+    """Which sample a number means."""
+
+    group: str
+    subtype: str
+    model: int
+    snr_db: float
+
+
+def made_clouds(records: dict[str, dict], seed: int, inputs: Path | None) -> dict[str, Cloud]:
+    """Return the cloud of each record by subtype, made from the sources that the records name.
+
+    Raises: InputError where a record or an input is wrong.
+    """
+    from lowalt.targets.__main__ import make
+
+    return {name: make(item, inputs, seed) for name, item in records.items()}
+
+
+class Dataset:
+    """The samples of a configuration by number: group by group, model by model, subtype by subtype, SNR by SNR."""
+
+    def __init__(
+        self,
+        config: dict | str | Path,
+        clouds: Mapping[str, Cloud] | str | Path | None = None,
+        groups: Iterable[str] = GROUPS,
+        folds: Iterable[str] = FOLDS,
+        inputs: str | Path | None = None,
+        occluders: dict | None = None,
+    ) -> None:
+        """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and choose groups and folds.
+
+        clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
+        that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
+        surfaces, where the scene hides points behind them.
+        Raises: InputError naming the key, value or file that is wrong.
+        """
+        config = load_yaml(config) if isinstance(config, (str, Path)) else config
+        self.config, self.folds = config, tuple(folds)
+        records = load_records(config["targets"]["table"], config["targets"]["records"])
+        self.published = {name: item["published"] for name, item in records.items()}
+        self.plan = Plan.of(config, self.published)
+        for what, given, known in (("group", tuple(groups), GROUPS), ("fold", self.folds, FOLDS)):
+            if set(given) - set(known):
+                raise InputError(f"{what}s {given}, expected some of {known}")
+        self.groups = tuple(name for name in self.plan.groups if name in groups)
+        if clouds is None:
+            wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
+            clouds = made_clouds(wanted, config["seed"], Path(inputs) if inputs else None)
+        self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
+        stations = config["network"]["stations"].values()
+        self._masts = np.array([place["position_m"][:2] for place in stations], float)
+        self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
+        render = {key: config[key] for key in ("network", "spectra", "images")}
+        echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
+        self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
+
+    @functools.cached_property
+    def _numbers(self) -> np.ndarray | None:
+        """Numbers, counted over all folds, of the samples of the chosen folds; None where all are chosen."""
+        if set(self.folds) == set(FOLDS):
+            return None
+        return np.array([n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64)
+
+    @property
+    def _all(self) -> int:
+        subtypes = sum(len(self.plan.groups[group]) for group in self.groups)
+        return subtypes * self.plan.models * len(self.plan.snrs)
+
+    def __len__(self) -> int:
+        return self._all if self._numbers is None else len(self._numbers)
+
+    def _place(self, number: int) -> Place:
+        """Which sample a number over all folds means."""
+        rest, level = divmod(number, len(self.plan.snrs))
+        for group in self.groups:
+            names = self.plan.groups[group]
+            if rest < len(names) * self.plan.models:
+                model, index = divmod(rest, len(names))
+                return Place(group, names[index], model, self.plan.snrs[level])
+            rest -= len(names) * self.plan.models
+        raise IndexError(number)
+
+    def place(self, number: int) -> Place:
+        """Return group, subtype, motion model and SNR of a sample.
+
+        Raises: IndexError where there is no sample of this number.
+        """
+        number = int(number)
+        if not 0 <= number < len(self):
+            raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
+        return self._place(number if self._numbers is None else int(self._numbers[number]))
+
+    def _fold(self, place: Place) -> str:
+        return fold(self.plan.split, self.plan.seed, place.subtype, place.model, place.snr_db)
+
+    def row(self, place: Place) -> dict:
+        """Return the motion table's row of a sample; models beyond the configuration's count are drawn likewise."""
+        rng = stream(self.plan.seed, "motion", place.subtype, place.model)
+        published, settings = self.published[place.subtype], self.config["motion"]
+        cloud = self.clouds[place.subtype]
+        row = draw(rng, cloud, published, self._masts, self._corners, settings)
+        return {**row, "group": place.group, "model": place.model}
+
+    def made_signal(self, place: Place) -> np.ndarray:
+        """Return the noisy signals of a sample, (stations, symbols) complex64."""
+        return self.maker.signal(self.row(place), place.snr_db)
+
+    def made_record(self, place: Place) -> bytes:
+        """Return the JSON record of a sample."""
+        return record(self.row(place), place.snr_db, self._fold(place), self.plan.seed, self.maker.network)
+
+    def made(self, place: Place) -> Sample:
+        """Return a sample by its group, subtype, motion model and SNR.
+
+        Raises: InputError naming the sample that cannot be computed.
+        """
+        signal = self.made_signal(place)
+        return Sample(self.maker.renderer.tile(signal), signal, json.loads(self.made_record(place)))
+
+    def __getitem__(self, number: int) -> Sample:
+        return self.made(self.place(number))
+
+    def key(self, number: int) -> str:
+        """Return the key of a sample, as in the shards."""
+        place = self.place(number)
+        return sample_key(place.subtype, place.model, place.snr_db)
+
+    @property
+    def labels(self) -> np.ndarray:
+        """Labels 0 .. 3 of all samples, (n,) int64; nothing is made for them."""
+        numbers = {name: CATEGORIES.index(item["category"]) for name, item in self.published.items()}
+        return np.array([numbers[self.place(number).subtype] for number in range(len(self))], np.int64)
+
+    def signal(self, number: int) -> np.ndarray:
+        """Return the noisy signals of a sample, (stations, symbols) complex64."""
+        return self.made_signal(self.place(number))
+
+    def record(self, number: int) -> dict:
+        """Return the record of a sample."""
+        return json.loads(self.made_record(self.place(number)))
+
+    def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
+        """Return record and data of a sample, byte for byte as a shard of a kind ("image" or "signal") stores them."""
+        place = self.place(number)
+        signal = self.made_signal(place)
+        return self.made_record(place), npy(signal) if kind == "signal" else self.maker.png(signal)
+
+    def tile(self, number: int) -> np.ndarray:
+        """Return the tile of a sample, (3 S, 3 S) uint8 index values."""
+        return self.maker.renderer.tile(self.signal(number))
+
+
+class Endless:
+    """Samples without end: motion models from a first number on, each at all SNRs, every subtype once a model number.
+
+    `part` of `parts` (a worker, a rank) takes every `parts`-th motion model, so no two parts make the same sample.
+    """
+
+    def __init__(self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1) -> None:
+        """Begin at model `first`, by default at the first that the configuration does not count.
+
+        Raises: InputError where the part is not below the number of parts.
+        """
+        if not 0 <= part < parts:
+            raise InputError(f"part {part} of {parts}, expected 0 <= part < parts")
+        self.dataset, self.part, self.parts = dataset, part, parts
+        self.first = dataset.plan.models if first is None else first
+
+    def places(self) -> Iterator[Place]:
+        """Yield which sample comes next; nothing is made."""
+        plan = self.dataset.plan
+        for model in itertools.count(self.first + self.part, self.parts):
+            for group in self.dataset.groups:
+                for subtype in plan.groups[group]:
+                    for snr_db in plan.snrs:
+                        place = Place(group, subtype, model, snr_db)
+                        if self.dataset._fold(place) in self.dataset.folds:
+                            yield place
+
+    def __iter__(self) -> Iterator[Sample]:
+        return map(self.dataset.made, self.places())

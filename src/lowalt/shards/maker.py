@@ -1,0 +1,88 @@
+"""One sample made on the spot, from a row of the motion table and the target's cloud: echo, noise, image.
+
+It runs the stages' own functions on one row, so its bytes are those that the stages write.
+"""
+
+import functools
+from collections.abc import Mapping
+
+import numpy as np
+
+from lowalt.common.network import Network
+from lowalt.echo.__main__ import signals as echoes
+from lowalt.noise.__main__ import noisy_signals
+from lowalt.spectra import Spectra
+from lowalt.targets.cloud import Cloud
+from lowalt.tiles.png import encode
+from lowalt.tiles.render import Renderer
+from lowalt.tiles.settings import Images
+
+KEPT = 16
+"""Motion models whose clean echoes are kept by default, 10 kB each; a model's samples differ only in their noise."""
+
+
+class Maker:
+    """Makes samples of one configuration; it keeps the clean echoes of the last motion models."""
+
+    def __init__(
+        self, render: dict, echo: dict, seed: int, clouds: Mapping[str, Cloud], occluders: dict | None = None
+    ) -> None:
+        """Take the settings {network, spectra, images} and {tolerance, effects}, the root seed and clouds by subtype.
+
+        occluders: each subtype's surfaces, where the scene hides points behind them.
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        self.render, self.echo, self.seed = render, echo, seed
+        self.clouds, self.occluders = clouds, occluders
+        self.network = Network.from_settings(render["network"])
+        self.kept = KEPT
+        self.images = Images.from_settings(render["images"])
+        self._heard: dict[tuple[str, int], tuple[np.ndarray, np.ndarray | None]] = {}
+
+    def __getstate__(self) -> dict:
+        # Workers prepare tables of their own.
+        return {**{name: value for name, value in self.__dict__.items() if name != "renderer"}, "_heard": {}}
+
+    @functools.cached_property
+    def renderer(self) -> Renderer:
+        """What turns signals into tiles."""
+        return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
+
+    def heard(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
+        refer to, None where they are the echoes' own.
+
+        Raises: InputError naming the sample that cannot be computed.
+        """
+        key = row["subtype"], row["model"]
+        if key not in self._heard:
+            if len(self._heard) >= self.kept:
+                del self._heard[next(iter(self._heard))]
+            self._heard[key] = self._listen(row)
+        return self._heard[key]
+
+    def _listen(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
+        names = [station.name for station in self.network.stations]
+        tolerance = self.echo["tolerance"]
+        if not self.echo["effects"]:
+            return echoes(self.network, names, self.clouds, [row], tolerance)[:, 0], None
+        from lowalt.effects.__main__ import signals
+        from lowalt.effects.catalogue import called
+        from lowalt.effects.hear import Scene
+
+        scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
+        found = [signals(scene, name, self.clouds, [row], self.occluders) for name in names]
+        return np.stack([signal[0] for signal, _ in found]), np.stack([power for _, power in found])
+
+    def signal(self, row: dict, snr_db: float) -> np.ndarray:
+        """Return the noisy signals of one sample, (stations, symbols) complex64.
+
+        Raises: InputError naming the sample that cannot be computed.
+        """
+        clean, powers = self.heard(row)
+        names = [station.name for station in self.network.stations]
+        return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers)[0, 0]
+
+    def png(self, signal: np.ndarray) -> bytes:
+        """Return the PNG file of the tile of one sample's signals."""
+        return encode(self.renderer.tile(signal), self.images.palette)

@@ -1,0 +1,102 @@
+"""The manifest of a run: the SHA-256 of every file that follows from configuration and version alone.
+
+One line a file, as `sha256sum` writes and checks it, in the order of the stages; a rebuilt run is compared with it, and
+the first stage that differs is named: the stages after it differ because it does.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, sha256
+
+STAGES = {
+    "clouds": ("clouds/*.npz",), "motion": ("motion/*.csv",), "echo": ("echo/*/*.npy",), "noise": ("noisy/*.npy",),
+    "tiles": ("tiles/*.npz",), "shards": ("shards/*.tar", "shards/*.npz", "shards/index.json", "shards/samples.csv"),
+}  # fmt: skip
+"""Stages in pipeline order, and the files each leaves in a run's folder; tiles go into shards and are then deleted."""
+
+
+def files(folder: str | Path) -> Iterator[str]:
+    """Yield the paths of all covered files of a run, relative to its folder, stage by stage."""
+    folder = Path(folder)
+    for patterns in STAGES.values():
+        for pattern in patterns:
+            yield from sorted(path.relative_to(folder).as_posix() for path in folder.glob(pattern))
+
+
+def text(folder: str | Path) -> str:
+    """Return the manifest of a run's folder.
+
+    Raises: InputError where the folder has none of the covered files.
+    """
+    lines = [f"{sha256(Path(folder) / name)}  {name}\n" for name in files(folder)]
+    if not lines:
+        raise InputError(f"{folder}: no cloud, motion table, signal or shard, expected the folder of a run")
+    return "".join(lines)
+
+
+def read(path: str | Path) -> dict[str, str]:
+    """Return the checksums of a manifest by file.
+
+    Raises: InputError naming the file and the line that is no checksum and name.
+    """
+    result = {}
+    for number, line in enumerate(existing(path, "manifest").read_text().splitlines(), start=1):
+        digest, _, name = line.partition("  ")
+        if len(digest) != 64 or not name:
+            raise InputError(f"{path}, line {number}: {line!r}, expected a SHA-256, two spaces and a file")
+        result[name] = digest
+    return result
+
+
+def stage_of(name: str) -> str:
+    """Return the stage that makes a file of a manifest."""
+    folder = name.partition("/")[0]
+    return "noise" if folder == "noisy" else folder
+
+
+def faults(path: str | Path, folder: str | Path, temporary: tuple[str, ...] = ("tiles",)) -> list[str]:
+    """Return one line for each file that is missing, differs or is not in the manifest, in the order of the stages.
+
+    Files of the stages in `temporary` may be missing. An empty list means that all bytes are equal.
+    Raises: InputError where the manifest cannot be read.
+    """
+    expected, present = read(path), set(files(folder))
+    lines = []
+    for stage in STAGES:
+        for name in [name for name in expected if stage_of(name) == stage]:
+            if name not in present:
+                lines += [] if stage in temporary else [f"{stage}: {name} is missing"]
+            elif sha256(Path(folder) / name) != expected[name]:
+                lines.append(f"{stage}: {name} differs")
+        extra = sorted(name for name in present - set(expected) if stage_of(name) == stage)
+        lines += [] if stage in temporary else [f"{stage}: {name} is not in the manifest" for name in extra]
+    return lines
+
+
+def main(arguments: list[str]) -> None:
+    """Write the manifest of a run, or compare a run with one and end with status 1 where a byte differs."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards.manifest", description=main.__doc__)
+    options.add_argument("command", choices=("write", "check"))
+    options.add_argument("--run", required=True, help="folder of the run, such as results/default")
+    options.add_argument("--manifest", required=True, help="manifest, such as results/reference/default.sha256")
+    given = options.parse_args(arguments)
+    if given.command == "write":
+        with replacing(given.manifest) as temporary:
+            temporary.write_text(text(given.run))
+        return
+    lines = faults(given.manifest, given.run)
+    for line in lines:
+        print(line)
+    if lines:
+        print(f"first stage that differs: {lines[0].partition(':')[0]}", file=sys.stderr)
+        raise SystemExit(1)
+    print(f"{given.run}: all {len(read(given.manifest))} files are equal to {given.manifest}")
+
+
+if __name__ == "__main__":
+    run(main)

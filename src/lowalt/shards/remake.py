@@ -1,0 +1,104 @@
+"""Making a stored sample again from its record, the index and the target's cloud, and comparing every byte."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, slug
+from lowalt.common.network import Network
+from lowalt.common.streams import stream
+from lowalt.shards.maker import Maker
+from lowalt.shards.read import ShardSet
+from lowalt.shards.record import record, row_of
+from lowalt.shards.write import npy
+from lowalt.targets.cloud import Cloud, read
+
+
+class CloudFolder(Mapping):
+    """The clouds of a run's folder by subtype, each read when it is asked for first."""
+
+    def __init__(self, folder: str | Path) -> None:
+        """Name the folder; nothing is read yet."""
+        self.folder, self._found = Path(folder), {}
+
+    def __getitem__(self, subtype: str) -> Cloud:
+        if subtype not in self._found:
+            path = existing(self.folder / f"{slug(subtype)}.npz", f"cloud of {subtype}")
+            self._found[subtype] = read(path)
+        return self._found[subtype]
+
+    def __contains__(self, subtype: object) -> bool:
+        return (self.folder / f"{slug(str(subtype))}.npz").is_file()
+
+    def __iter__(self) -> Iterator[str]:
+        return (read(path).subtype for path in sorted(self.folder.glob("*.npz")))
+
+    def __len__(self) -> int:
+        return len(list(self.folder.glob("*.npz")))
+
+
+class Remaker:
+    """Makes the samples of one data set again."""
+
+    def __init__(self, shards: ShardSet, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> None:
+        """Take the data set and the clouds by subtype; occluders are each subtype's surfaces, where a scene has them.
+
+        Raises: InputError where the index does not say how echoes were computed.
+        """
+        if not shards.index.get("echo"):
+            raise InputError(
+                f"{shards.index_path}: does not say how echoes were computed, expected an index that lowalt 0.2 or "
+                f"later wrote, found format {shards.index['format']}"
+            )
+        self.shards, self.clouds, self.occluders = shards, clouds, occluders
+        self.network = Network.from_settings(shards.index["render"]["network"])
+        self._makers: dict[int, Maker] = {}
+
+    def made(self, entry: dict) -> tuple[bytes, bytes]:
+        """Return record and data (PNG or .npy) of the sample that a record tells of.
+
+        Raises: InputError naming the sample whose record is too old or whose cloud is missing.
+        """
+        row, snr_db = row_of(entry)
+        seed = entry["seed"]
+        if seed not in self._makers:
+            index = self.shards.index
+            self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)
+        maker = self._makers[seed]
+        signal = maker.signal(row, snr_db)
+        data = npy(signal) if self.shards.kind == "signal" else maker.png(signal)
+        return record(row, snr_db, entry["fold"], seed, self.network), data
+
+    def faults(self, number: int) -> list[str]:
+        """Return one line for each member of a sample that comes out otherwise than it is stored.
+
+        Raises: InputError as `made`, or where the stored sample is damaged.
+        """
+        stored, data = self.shards.members(number)
+        found = self.made(json.loads(stored))
+        key = self.shards.keys[number].decode()
+        names = "record", self.shards.kind
+        pairs = zip(names, (stored, data), found, strict=True)
+        return [f"sample {key}: its {name} comes out otherwise" for name, old, new in pairs if old != new]
+
+
+def number_of(shards: ShardSet, key: str) -> int:
+    """Return the number of the sample with this key.
+
+    Raises: InputError where the data set has none.
+    """
+    places = np.flatnonzero(shards.keys == key.encode())
+    if not len(places):
+        raise InputError(
+            f"--sample {key!r}: not in {shards.index_path}, expected a key such as {shards.keys[0].decode()!r}"
+        )
+    return int(places[0])
+
+
+def some(shards: ShardSet, count: int) -> list[int]:
+    """Return the numbers of `count` samples drawn by the index's own checksum, or of all where there are no more."""
+    draws = stream(0, "remake", shards.index["sha256"])
+    return sorted(draws.choice(len(shards), min(count, len(shards)), replace=False).tolist())
