@@ -168,7 +168,7 @@ def test_idle_effects_leave_every_bit(rng):
 
 NOTHING = {
     "rotor_spread": {"spread": 0, "wander": 0}, "gusts": {"wind_mps": 0}, "cross_sections": {"strength": 0},
-    "fluctuation": {"pattern": False, "spread_db": 0},
+    "fluctuation": {"pattern": False, "spread_db": 0}, "element_pattern": {"gain_dbi": 0.0, "back_db": 0.0},
     "occlusion": {"strength": 0}, "ground_reflection": {"permittivity": 1, "conductivity_s_m": 0},
     "clutter": {"gamma": 0}, "receiver_noise": {"temperature_k": 0}, "timing_offset": {"sigma_s": 0},
     "clock_offset": {"sigma_ppm": 0}, "carrier_offset": {"sigma_ppm": 0}, "phase_noise": {"points": []},

@@ -13,6 +13,7 @@ from lowalt.common.errors import InputError
 ORDER = (
     "motion/rotor_spread",
     "motion/gusts",
+    "channel/element_pattern",
     "channel/mean_cross_section",
     "channel/fluctuation",
     "channel/cross_sections",

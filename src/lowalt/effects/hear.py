@@ -18,7 +18,7 @@ from lowalt.echo.api import Path
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
-from lowalt.effects.interface import AddsPaths, SetsCrossSections, WeighsPoints
+from lowalt.effects.interface import AddsPaths, SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
@@ -124,7 +124,9 @@ def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: 
         for effect in placed(scene.effects, "motion")
     )
     reflected = bool(providing(scene.effects, AddsPaths))
-    return View(scene.network, station, cloud, row, times_s, grid_s, moved, occluders, reflected)
+    shaped = [effect.module.element(effect.settings) for effect in providing(scene.effects, ShapesElements)]
+    element = shaped[0] if shaped else None
+    return View(scene.network, station, cloud, row, times_s, grid_s, moved, occluders, element, reflected)
 
 
 def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tuple[Outcome, list[Decision]]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 if TYPE_CHECKING:
     import numpy as np
 
+    from lowalt.effects.antenna import Element as AntennaElement
     from lowalt.effects.checks import CheckedScene
     from lowalt.effects.response import ImagePath
     from lowalt.effects.view import View
@@ -79,6 +80,14 @@ class WeighsPoints(Protocol):
 
     def visible(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         """Return the real factor on every point's two-way amplitude, (N, L) or (N, 1)."""
+
+
+@runtime_checkable
+class ShapesElements(Protocol):
+    """Channel, optional: an effect that gives antenna elements a pattern, which `View.element` passes to the others."""
+
+    def element(self, settings: dict) -> AntennaElement:
+        """Return the element (`antenna.Element`)."""
 
 
 @runtime_checkable

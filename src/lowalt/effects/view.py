@@ -7,6 +7,7 @@ import numpy as np
 
 from lowalt.common.network import Network, Station
 from lowalt.echo import Rigid
+from lowalt.effects.antenna import Element, gain
 from lowalt.motion.poses import Perturbation, placed, poses, rotated
 from lowalt.targets.cloud import Cloud
 
@@ -27,6 +28,8 @@ class View:
     grid_s: np.ndarray | None = None
     perturbations: tuple[Perturbation, ...] = ()
     occluders: dict | None = field(default=None, repr=False)
+    element: Element | None = None
+    """The antenna elements' pattern, None for isotropic ones."""
     reflected: bool = False
     """Whether the station also sees images of the points; their directions are then not bounded by the target's."""
 
@@ -57,6 +60,12 @@ class View:
     def aim_m(self) -> np.ndarray:
         """Where both beams point: the target's origin at the first symbol, (3,) m."""
         return np.array([self.row["x_m"], self.row["y_m"], self.row["z_m"]])
+
+    def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
+        """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""
+        if self.element is None:
+            return 1.0
+        return np.sqrt(gain(self.element, self.station, images) / gain(self.element, self.station, self.places))
 
     def at(self, times_s: np.ndarray) -> "View":
         """Return the same target seen at other times (K,) s of the look."""

@@ -15,6 +15,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
+from lowalt.effects.antenna import Element, gain, local_gain
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
@@ -45,11 +46,14 @@ def check(settings: dict, scene: CheckedScene) -> None:
         raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
 
 
-def cell_power(settings: dict, network: Network, station: Station, aim_m: np.ndarray) -> np.ndarray:
+def cell_power(
+    settings: dict, network: Network, station: Station, aim_m: np.ndarray, element: Element | None = None
+) -> np.ndarray:
     """Return the mean power (cells,) (W) of the land in every slant-range cell out to `reach_m`, beyond M too.
 
-    The integral of G_T^2 G_R^2 sigma0 / r^4 over the cell's ring: Gauss-Legendre over its range, and over azimuth the
-    trapezoidal rule, exact for the arrays' trigonometric patterns. Source: radar equation, sigma0 = gamma h / r.
+    element: the antenna elements' pattern, None for isotropic ones. The integral of G_T G_R sigma0 / r^4 over the
+    cell's ring: Gauss-Legendre over its range, and over azimuth the trapezoidal rule, exact for the arrays'
+    trigonometric patterns. Source: radar equation, sigma0 = gamma h / r.
     """
     radio = radar(network, station)
     height = float(station.position_m[2])
@@ -65,13 +69,27 @@ def cell_power(settings: dict, network: Network, station: Station, aim_m: np.nda
     azimuth = np.pi * (np.arange(turns) + 0.5) / turns
     level = np.sqrt(np.maximum(1.0 - (height / r) ** 2, 0.0))
     around = np.empty(r.shape)
+    sides = (
+        None if element is None else _element_gain(element, height, tuple(r.ravel()), turns).reshape(*r.shape, turns)
+    )
     for cell in range(cells):
         psi = level[cell][:, None] * np.cos(azimuth)
-        gain = _pattern(radio.kappa * (psi - psi0), network.transmit[0], network.receive[0])
-        around[cell] = 2 * np.pi * gain.mean(axis=1)
+        beam = _pattern(radio.kappa * (psi - psi0), network.transmit[0], network.receive[0])
+        around[cell] = 2 * np.pi * (beam if sides is None else beam * sides[cell]).mean(axis=1)
     around *= _pattern(radio.kappa * (-height / r - omega0), network.transmit[1], network.receive[1])
     ring = around * settings["gamma"] * height / r * r / r**4 * 0.5 * (high - low)[:, None]
     return radio.scale**2 * ring @ weight
+
+
+@lru_cache(maxsize=8)
+def _element_gain(element: Element, height: float, ranges: tuple[float, ...], turns: int) -> np.ndarray:
+    """Two-way element gain (ranges, turns) toward the land, mean of the front's and the back's, which share Psi."""
+    r = np.array(ranges)[:, None]
+    azimuth = np.pi * (np.arange(turns) + 0.5) / turns
+    flat = np.sqrt(np.maximum(r * r - height * height, 0.0))
+    side, ahead = flat * np.cos(azimuth), flat * np.sin(azimuth)
+    down = np.broadcast_to(-height, side.shape)
+    return 0.5 * (local_gain(element, ahead, side, down) ** 2 + local_gain(element, -ahead, side, down) ** 2)
 
 
 def _pattern(x: np.ndarray, transmit: int, receive: int) -> np.ndarray:
@@ -152,7 +170,7 @@ def speckle(
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
     network, station = view.network, view.station
-    power = cell_power(settings, network, station, view.aim_m)
+    power = cell_power(settings, network, station, view.aim_m, view.element)
     if settings["clutter_to_signal_db"] is not None:
         wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
         power = power * (wanted / power.sum())
@@ -174,4 +192,5 @@ def target_power(view: View) -> float:
     radio = radar(view.network, view.station)
     elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
     range_m = float(np.linalg.norm(view.aim_m - radio.station))
-    return (radio.scale * elements) ** 2 * float(view.cloud.rcs_m2.sum()) / range_m**4
+    shaped = 1.0 if view.element is None else float(gain(view.element, view.station, view.aim_m))
+    return (radio.scale * elements * shaped) ** 2 * float(view.cloud.rcs_m2.sum()) / range_m**4

@@ -76,4 +76,4 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     coefficient = fresnel(np.clip(sine, 0.0, 1.0), *ground)
     if settings["roughness_m"] > 0:
         coefficient *= roughness(sine, settings["roughness_m"], frequency)
-    return [ImagePath(images, coefficient)]
+    return [ImagePath(images, coefficient * view.relative_gain(images))]

@@ -1,0 +1,44 @@
+"""The gain of one antenna element by direction; array sums are in `response`."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.network import Station
+
+
+class Element(NamedTuple):
+    """An element: largest gain (dBi), 3 dB width (degrees), depth of back and side lobes (dB), downtilt (degrees)."""
+
+    gain_dbi: float = 8.0
+    width_deg: float = 65.0
+    back_db: float = 30.0
+    downtilt_deg: float = 0.0
+
+
+def pattern_db(element: Element, azimuth_deg: np.ndarray, zenith_deg: np.ndarray) -> np.ndarray:
+    """Return the gain (dBi) at azimuths and zenith angles from the element's own boresight (0, 90); any shape.
+
+    Source: 3GPP TR 38.901, Table 7.3-1.
+    """
+    up = np.minimum(12.0 * ((zenith_deg - 90.0) / element.width_deg) ** 2, element.back_db)
+    across = np.minimum(12.0 * (azimuth_deg / element.width_deg) ** 2, element.back_db)
+    return element.gain_dbi - np.minimum(up + across, element.back_db)
+
+
+def local_gain(element: Element, ahead: np.ndarray, side: np.ndarray, up: np.ndarray) -> np.ndarray:
+    """Return the power gain for components along the array's normal, its horizontal axis and up; any shape and length.
+
+    The panel stays vertical; the downtilt turns the element's boresight.
+    """
+    tilt = np.radians(element.downtilt_deg)
+    ahead, up = np.cos(tilt) * ahead - np.sin(tilt) * up, np.sin(tilt) * ahead + np.cos(tilt) * up
+    azimuth, zenith = np.degrees(np.arctan2(side, ahead)), np.degrees(np.arctan2(np.hypot(ahead, side), up))
+    return 10 ** (pattern_db(element, azimuth, zenith) / 10)
+
+
+def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
+    """Return the power gain (...) toward places (..., 3) m."""
+    d = places - np.asarray(station.position_m)
+    normal = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
+    return local_gain(element, d @ normal, d @ station.horizontal, d[..., 2])
