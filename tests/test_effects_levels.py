@@ -8,15 +8,22 @@ import pytest
 
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import fluctuation, mean_cross_section
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.explain import samples
+from lowalt.effects.hear import Scene, hear, observe, with_cross_sections
+from lowalt.effects.interface import SetsCrossSections, ShapesElements, WeighsPoints
+from lowalt.effects.levels import levels
 from lowalt.targets.__main__ import make
 from lowalt.targets.records import load_records
 from test_effects import network, target
 
 ROOT = Path(__file__).parent.parent
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+OWN = (SetsCrossSections, ShapesElements, WeighsPoints)
+"""Protocols of the effects that act on the target's own echo on the direct path."""
 CAR_ROW = {"x_m": 100.0, "y_m": 0.0, "z_m": 0.5, "vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0, "yaw_rad": 0.0,
            "pitch_rad": 0.0, "roll_rad": 0.0}  # fmt: skip
 
@@ -24,7 +31,7 @@ CAR_ROW = {"x_m": 100.0, "y_m": 0.0, "z_m": 0.5, "vx_mps": 0.0, "vy_mps": 0.0, "
 @pytest.fixture(scope="module")
 def builtin():
     """Clouds of a few built-in targets."""
-    settings = load([ROOT / "config/default.yaml"], ROOT / "workflow/schemas/config.schema.yaml")["targets"]
+    settings = load([ROOT / "config/default.yaml"], SCHEMA)["targets"]
     records = load_records(ROOT / settings["table"], [ROOT / path for path in settings["records"]])
     names = ["DJI Mini 2", "DJI Mavic 3 Pro", "EH 216 S", "Sparrow", "Pigeon", "Audi A6L 2019", "Walking Pedestrian 1"]
     return {name: make(records[name], None, 1) for name in names}
@@ -103,3 +110,38 @@ def test_set_snrs_refer_to_the_echo_as_it_arrives():
     varied = hear(scene({"fluctuation": {"pattern": False, "spread_db": 6.0}}), station, cloud, row)
     assert varied.power == pytest.approx(np.mean(abs(varied.signal) ** 2), rel=1e-6)
     assert abs(10 * np.log10(varied.power / plain.power)) > 1.0
+
+
+def documented():
+    """The table of levels in the design note: name -> (value, unit)."""
+    rows = {}
+    for line in (ROOT / "design/effects.md").read_text().splitlines():
+        cells = [cell.strip() for cell in line.replace(r"\|", "!").strip("|").split("|")]
+        if len(cells) == 3 and cells[1].split()[-1] in ("dBm", "dB", "dBi", "dBsm"):
+            rows[cells[0].replace("!", "|")] = (float(cells[1].split()[0]), cells[1].split()[1])
+    return rows
+
+
+def test_the_levels_worked_by_hand_are_the_codes():
+    config = load([ROOT / "config/default.yaml", ROOT / "config/scenes/worst.yaml"], SCHEMA)
+    config["targets"]["table"] = str(ROOT / config["targets"]["table"])
+    config["targets"]["records"] = [str(ROOT / path) for path in config["targets"]["records"]]
+    every = tuple(called(config["effects"]))
+    alone = tuple(one for one in every if one.place == "motion" or isinstance(one.module, OWN))
+    sample = samples(config, None, [("DJI Mavic 3 Pro", 0)])[0]
+    given = Network.from_settings(config["network"])
+    whole = Scene(given, config["seed"], None, alone)
+    view = observe(whole, given.stations[0], with_cross_sections(whole, sample.cloud), sample.row, sample.occluders)
+    power = hear(whole, given.stations[0], sample.cloud, sample.row, sample.occluders).power
+    found = {level.name: level for level in levels(view, {one.name: one for one in every}, power)}
+    table = documented()
+    assert len(table) == len(found) - 1
+    for name, (value, unit) in table.items():
+        assert (found[name].value, found[name].unit) == (pytest.approx(value, abs=0.051), unit)
+    by_hand = {
+        "path out and back, 415.6 m, 1 m2": 20 * np.log10(0.0611821) - 30 * np.log10(4 * np.pi) - 40 * np.log10(415.6),
+        "noise, one subcarrier": -228.6 + 10 * np.log10(290) + 30 + 10 * np.log10(120e3) + 9,
+        "transmit array": 10 * np.log10(64), "expected echo": 30 + 2 * 18.06 + 2 * 5.6 - 162.0 - 14.1,
+    }  # fmt: skip
+    for name, value in by_hand.items():
+        assert found[name].value == pytest.approx(value, abs=0.15)

@@ -20,6 +20,7 @@ from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
 from lowalt.effects.hear import Scene, hear, observe, with_cross_sections
+from lowalt.effects.levels import levels, table
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import CATEGORIES, Cloud
@@ -101,6 +102,8 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
         verb = "computed" if decision.computed else "left out"
         bound = "" if np.isinf(decision.bound) else f", bound {decision.bound:.2g} of the largest value"
         lines.append(f"  {decision.name}: {verb}{bound} ({decision.reason})")
+    named = {effect.name: effect for effect in scene.effects}
+    lines += [f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, heard.power)))]
     moved = np.sqrt(np.mean(abs(heard.signal - own.signal) ** 2) / heard.power) if heard.power > 0 else np.nan
     other = np.mean(heard.cell != own.cell)
     lines.append(

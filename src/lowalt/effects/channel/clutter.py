@@ -167,13 +167,19 @@ def speckle(
     return np.sqrt(still / (1 + still)) * kept + np.sqrt(1 / (1 + still)) * moving
 
 
+def mean_power(settings: dict, view: View) -> np.ndarray:
+    """Return the mean power (cells,) (W) of the land in every slant-range cell, at the level that settings ask for."""
+    power = cell_power(settings, view.network, view.station, view.aim_m, view.element)
+    if settings["clutter_to_signal_db"] is None:
+        return power
+    wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
+    return power * (wanted / power.sum())
+
+
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
     network, station = view.network, view.station
-    power = cell_power(settings, network, station, view.aim_m, view.element)
-    if settings["clutter_to_signal_db"] is not None:
-        wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
-        power = power * (wanted / power.sum())
+    power = mean_power(settings, view)
     frequency = radar(network, station).centre_hz
     uniform = 1.0 - rng.random((2, len(power)))
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))

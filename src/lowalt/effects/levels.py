@@ -1,0 +1,92 @@
+"""The levels of one sample at one station, as a link budget lists them: watts and gains in decibels.
+
+Powers are those of one subcarrier, as the echo's amplitudes are. A range cell is the mean of M subcarriers, so an echo
+keeps its level in its cell, while noise falls by 10 lg M.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.effects import antenna
+from lowalt.effects.catalogue import NamedEffect
+from lowalt.effects.view import View
+
+
+class Level(NamedTuple):
+    """One line of the table: its value, and the unit it is in (dBm, dB, dBi, dBsm)."""
+
+    name: str
+    value: float
+    unit: str
+
+
+def dbm(power_w: float) -> float:
+    """Return a power in dBm, -inf for none."""
+    return 10 * math.log10(power_w) + 30 if power_w > 0 else -math.inf
+
+
+def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[Level]:
+    """Return the levels of a sample.
+
+    view: the sample, with the cross sections that the scene gives; effects: the scene's, by name; echo_w: mean
+    |Y_bin|^2 of the target's echo as it arrives (W). The expected echo adds the points in mid-beam without their
+    phases.
+    Source: radar equation, spec: alpha and a0; Skolnik, Introduction to Radar Systems, 3rd ed. 2001, ch. 1.
+    """
+    network, station = view.network, view.station
+    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
+    wavelength = SPEED_OF_LIGHT / network.carrier_hz
+    sent = dbm(network.power)
+    arrays = [10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive)]
+    element = 0.0 if view.element is None else 10 * math.log10(float(antenna.gain(view.element, station, view.aim_m)))
+    path = 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * range_m**4))
+    section = 10 * math.log10(float(view.cloud.rcs_m2.sum()))
+    expected = sent + sum(arrays) + 2 * element + path + section
+    result = [
+        Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm"),
+        Level("transmit power, one subcarrier", sent, "dBm"),
+        Level("transmit array", arrays[0], "dB"),
+        Level("receive array", arrays[1], "dB"),
+        Level("element toward the target, each way", element, "dBi"),
+        Level(f"path out and back, {range_m:.1f} m, 1 m2", path, "dB"),
+        Level("mean cross section", section, "dBsm"),
+        Level("expected echo", expected, "dBm"),
+        Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
+    ]
+    if "cyclic_prefix" in effects:
+        cut = effects["cyclic_prefix"]
+        prefix = cut.module.length_s(cut.settings, network)
+        lost = float(cut.module.lost(2 * range_m / SPEED_OF_LIGHT, prefix, network))
+        kept = 20 * math.log10(1 - lost) if lost < 1 else -math.inf
+        result.append(Level("loss beyond the cyclic prefix", kept, "dB"))
+    if "clutter" in effects:
+        result += _clutter(view, effects["clutter"], range_m)
+    if "receiver_noise" in effects:
+        noisy = effects["receiver_noise"]
+        noise = dbm(noisy.module.variance(noisy.settings, network.subcarrier_spacing_hz))
+        cell = noise - 10 * math.log10(network.subcarriers)
+        result += [
+            Level("noise, one subcarrier", noise, "dBm"),
+            Level("noise, one range cell", cell, "dBm"),
+            Level("expected echo over noise, in a range cell", expected - cell, "dB"),
+        ]
+    return result
+
+
+def _clutter(view: View, effect: NamedEffect, range_m: float) -> list[Level]:
+    """Mean levels of the land: all of it, and in the target's range cell."""
+    power = effect.module.mean_power(effect.settings, view)
+    own = power[min(round(range_m / view.network.cell_m), len(power) - 1)]
+    return [
+        Level("land, all range cells", dbm(float(power.sum())), "dBm"),
+        Level("land, the target's range cell", dbm(float(own)), "dBm"),
+    ]
+
+
+def table(found: list[Level]) -> list[str]:
+    """Return the levels as aligned lines of text."""
+    width = max(len(level.name) for level in found)
+    return [f"{level.name:<{width}} {level.value:8.1f} {level.unit}" for level in found]
