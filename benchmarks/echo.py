@@ -11,7 +11,6 @@ symbols, stations and cores. One thread a process; run it on a quiet machine.
 """
 
 import argparse
-import csv
 import dataclasses
 import functools
 import os
@@ -19,13 +18,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.config import canonical
-from lowalt.common.files import replacing
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.network import Network
 from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
@@ -58,14 +57,6 @@ def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> lis
     }  # fmt: skip
     rows = cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
     return [{name: (row | {"seconds_a_sample": row["seconds"]})[name] for name in COLUMNS} for row in rows]
-
-
-def write(path: Path, columns: Sequence[str], rows: list[dict]) -> None:
-    """Write a table as CSV."""
-    with replacing(path) as temporary, temporary.open("w", newline="") as file:
-        table = csv.DictWriter(file, columns, lineterminator="\n")
-        table.writeheader()
-        table.writerows(rows)
 
 
 def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
@@ -180,7 +171,7 @@ def main() -> None:
     if lacking:
         raise SystemExit(f"--clouds: no cloud of {sorted(lacking)}, expected all subtypes (`make data`)")
     if not given.stage_only:
-        write(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
+        write_csv(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
     everyone = list(config["network"]["stations"])
     first = {cloud.category: cloud for cloud in reversed(clouds)}
@@ -202,7 +193,7 @@ def main() -> None:
                for name, value in inside(config, clouds, rows).items()]  # fmt: skip
     path = given.out.with_name("echo_stage.csv")
     columns = ("what", "seconds", "models_per_s", "paper_minutes", "share", "hardware")
-    write(path, columns, [row | {"hardware": cost.hardware()} for row in result])
+    write_csv(path, columns, [row | {"hardware": cost.hardware()} for row in result])
     print(path.read_text(), end="")
 
 

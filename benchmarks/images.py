@@ -8,7 +8,6 @@ decoded by Pillow and its RGB pixels held against the tile it came from; bytes a
 """
 
 import argparse
-import csv
 import io
 import os
 import tarfile
@@ -27,7 +26,7 @@ import yaml
 from PIL import Image
 from zlib_ng import zlib_ng
 
-from lowalt.common.files import replacing
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.shards.tar import Writer
@@ -209,13 +208,14 @@ def main() -> None:
         rows.append(measure("usual: scipy STFT, Pillow, RGB PNG 6", common, few, render, code, usual, palette))
         off = np.array([np.abs(render(s).astype(int) - tiles.tile(s)) for s in few])
         rows[-1]["pixels_off_usual_percent"], rows[-1]["largest_off_usual"] = 100 * (off > 0).mean(), off.max()
-    with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
-        writer.writeheader()
-        for row in rows:
-            row["hardware"] = describe()
-            writer.writerow({k: f"{v:.4g}" if isinstance(v, float) else v for k, v in row.items()})
-            print(*(f"{v:.4g}" if isinstance(v, float) else v for v in list(row.values())[:10]), sep="  ")
+    table = [
+        {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+        | {"hardware": describe()}
+        for row in rows
+    ]
+    for row in table:
+        print(*list(row.values())[:10], sep="  ")
+    write_csv(given.out, COLUMNS, table)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ and resized by Pillow. Then harms copies of the shards 1 000 times (a byte, or a
 """
 
 import argparse
-import csv
 import io
 import json
 import shutil
@@ -22,13 +21,16 @@ import yaml
 from PIL import Image
 from torch.utils.data import DataLoader, Dataset
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 from lowalt.common.hardware import describe
 from lowalt.common.network import Network
 from lowalt.common.splits import FOLDS
+from lowalt.common.streams import stream
 from lowalt.motion import read_table
-from lowalt.shards import Batches, ShardSet
+from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.views import facts_of
+from lowalt.shards import ShardSet
 from lowalt.shards.index import build
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
@@ -105,7 +107,8 @@ def rate(data: Dataset, workers: int, batch: int = 16) -> float:
     # What the first sample compiles or opens, the workers inherit.
     data[0]
     for epoch in range(5):
-        loader = DataLoader(data, batch_sampler=Batches(len(data), batch, 1, epoch), num_workers=workers)
+        order = stream(1, "loader", epoch).permutation(len(data))
+        loader = DataLoader(data, batch_sampler=batches(order, batch), num_workers=workers)
         found = iter(loader)
         for _ in range(2 * workers):
             next(found)
@@ -186,12 +189,14 @@ class Keys(Dataset):
 
 def resumes(shards: ShardSet, count: int, rng: np.random.Generator) -> int:
     """How many of `count` stops and resumes read the very samples, in the very order, of the uninterrupted epoch."""
-    data, whole = Keys(shards), Batches(len(shards), 8, 5, epoch=1)
-    order = list(DataLoader(data, batch_sampler=whole))
-    if len({key for batch in order for key in batch}) != len(shards):
+    data, facts = Keys(shards), facts_of(shards, np.arange(len(shards)), placed=False)
+    parts = [batches(epoch_order(facts, 5, ("resumes",), 1, 0), 8) for _ in range(2)]
+    order = list(DataLoader(data, batch_sampler=parts[0]))
+    keys = [key for batch in order for key in batch]
+    if len(set(keys)) != len(keys) or len(keys) < len(shards) - 7:
         return 0
-    stops = rng.integers(0, len(whole) + 1, count)
-    rests = (list(DataLoader(data, batch_sampler=whole.resumed(int(stop)))) for stop in stops)
+    stops = rng.integers(0, len(order) + 1, count)
+    rests = (list(DataLoader(data, batch_sampler=parts[1][int(stop) :])) for stop in stops)
     return sum(order[:stop] + rest == order for stop, rest in zip(stops, rests, strict=True))
 
 
@@ -231,13 +236,10 @@ def main() -> None:
         for kind, shards in sets.items():
             size = sum(entry["bytes"] for entry in shards.shards) / len(shards)
             rows.append(("bytes on disk", kind, "", "", len(shards), size, "bytes/sample"))
-    with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for row in rows:
-            line = [f"{value:.5g}" if isinstance(value, float) else value for value in row]
-            writer.writerow([*line, describe()])
-            print(*line, sep="  ")
+    table = [[f"{value:.5g}" if isinstance(value, float) else value for value in row] for row in rows]
+    for line in table:
+        print(*line, sep="  ")
+    write_csv(given.out, COLUMNS, [[*line, describe()] for line in table])
 
 
 if __name__ == "__main__":

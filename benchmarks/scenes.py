@@ -8,7 +8,6 @@ the chain of effects (`lowalt.effects`) with no effect named, with only idle one
 """
 
 import argparse
-import csv
 import statistics
 import time
 from pathlib import Path
@@ -16,9 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.config import load_yaml
-from lowalt.common.files import replacing
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
 from lowalt.common.network import Network
+from lowalt.common.timing import once
 from lowalt.echo.__main__ import signals as echo_signals
 from lowalt.effects.__main__ import signals as scene_signals
 from lowalt.effects.catalogue import called
@@ -55,18 +55,14 @@ def main() -> None:
     taken: dict[str, list[float]] = {label: [] for label in work}
     for _ in range(given.repeats):
         for label, call in work.items():
-            start = time.process_time()
-            call()
-            taken[label].append(time.process_time() - start)
+            taken[label].append(once(call, time.process_time)[0])
     base = statistics.median(taken["echo stage"])
-    with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(COLUMNS)
-        for label, times in taken.items():
-            spent, same = statistics.median(times), np.array_equal(results[label], results["echo stage"])
-            row = [label, len(rows), f"{1e3 * spent / len(rows):.3f}", f"{spent / base:.3f}", same, describe()]
-            writer.writerow(row)
-            print(*row, sep=", ")
+    table = []
+    for label, times in taken.items():
+        spent, same = statistics.median(times), np.array_equal(results[label], results["echo stage"])
+        table.append([label, len(rows), f"{1e3 * spent / len(rows):.3f}", f"{spent / base:.3f}", same, describe()])
+        print(*table[-1], sep=", ")
+    write_csv(given.out, COLUMNS, table)
 
 
 if __name__ == "__main__":

@@ -10,13 +10,13 @@ the tiles nor their bytes.
 """
 
 import argparse
-import csv
 import json
 from collections import defaultdict
 from pathlib import Path
 
+from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import existing
 from lowalt.common.hardware import describe
 from lowalt.shards.index import load
 from lowalt.shards.size import sample_bytes
@@ -82,13 +82,14 @@ def main() -> None:
                    for key in ("wall_s", "ms_per_sample", "hours_of_1440000")},
             }
         )  # fmt: skip
-    with replacing(given.out) as temporary, temporary.open("w", newline="") as file:
-        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n", restval="")
-        writer.writeheader()
-        for row in rows:
-            line = {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
-            writer.writerow({**line, "hardware": describe()})
-            print(line)
+    table = [
+        {key: f"{value:.4g}" if isinstance(value, float) else value for key, value in row.items()}
+        | {"hardware": describe()}
+        for row in rows
+    ]
+    for row in table:
+        print(row)
+    write_csv(given.out, COLUMNS, table)
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 import contextlib
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -57,19 +56,6 @@ class Machine:
     def parallel(self, model: nn.Module) -> nn.Module:
         """Return the model, wrapped for gradient exchange where there are several ranks."""
         return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
-
-    @property
-    def hardware(self) -> str:
-        """Name of the processor or GPU, and how many threads or ranks were used."""
-        if self.device.type == "cuda":
-            return f"{self.ranks} x {torch.cuda.get_device_name(self.device)}"
-        names = [
-            line.partition(":")[2].strip()
-            for line in Path("/proc/cpuinfo").read_text().splitlines()
-            if line.startswith("model name")
-        ]
-        threads = torch.get_num_threads()
-        return f"{names[0] if names else 'CPU'}, {self.ranks} x {threads} thread{'s' if threads > 1 else ''}"
 
 
 @torch.inference_mode()

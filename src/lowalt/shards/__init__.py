@@ -1,7 +1,6 @@
 """Shards: deterministic WebDataset tars, their tables and index, checks, and map-style reading."""
 
-from lowalt.shards.loader import Batches
 from lowalt.shards.read import ShardSet
 from lowalt.shards.verify import faults
 
-__all__ = ["Batches", "ShardSet", "faults"]
+__all__ = ["ShardSet", "faults"]
