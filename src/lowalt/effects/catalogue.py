@@ -1,16 +1,18 @@
 """The names of all effects in the order the chain applies them, and the loading of those a scene names.
 
-Only names live here: a module is imported when a scene names it, and never otherwise.
+Only names live here: a module is imported when a scene names it, and never otherwise. An effect is a module in the
+folder of its place that defines DEFAULTS. One that the list below does not name comes last in its place.
 """
 
 import importlib
 from collections.abc import Iterable
+from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
 from lowalt.common.errors import InputError
 
-ORDER = (
+LISTED = (
     "motion/rotor_spread",
     "motion/gusts",
     "channel/element_pattern",
@@ -34,6 +36,22 @@ ORDER = (
     "detection/canceller",
     "detection/cell_error",
 )
+"""Place and name of the effects whose order within their place matters, in the order of the chain."""
+
+
+def _every_effect() -> tuple[str, ...]:
+    """LISTED, each place followed by the effects in its folder that are not listed, in alphabetical order."""
+    found = list(LISTED)
+    for place in ("motion", "channel", "receiver", "detection"):
+        paths = sorted((Path(__file__).parent / place).glob("*.py"))
+        last = max(index for index, entry in enumerate(found) if entry.startswith(f"{place}/"))
+        new = [f"{place}/{path.stem}" for path in paths if f"{place}/{path.stem}" not in found]
+        new = [entry for entry in new if "\nDEFAULTS" in (Path(__file__).parent / f"{entry}.py").read_text()]
+        found[last + 1 : last + 1] = new
+    return tuple(found)
+
+
+ORDER = _every_effect()
 """Place and name of every effect, in the order of the chain: motion, channel, receiver, detection."""
 PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
 """Place of every effect by its name."""
