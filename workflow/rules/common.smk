@@ -6,7 +6,7 @@ from snakemake.exceptions import WorkflowError
 from lowalt.common.environment import prepare
 from lowalt.common.errors import InputError
 from lowalt.effects.catalogue import dotted
-from lowalt.workflow import locks, options, space_check
+from lowalt.workflow import locks, options, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
@@ -14,6 +14,7 @@ from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code
 
 locks.install()
+scheduling.install()
 try:
     RUN = Run.of(config, workflow.source_path("../schemas/config.schema.yaml"), prepare(ROOT, config["inputs"]))
 except InputError as error:
