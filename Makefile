@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -57,6 +57,12 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
+
+bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 short jobs: results/benchmarks/workflow.csv
+	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/workflow.csv
+
+status: $(SETUP)  ## what a run in another terminal is doing
+	@$(BIN)/python -m lowalt.workflow.status
 
 cost: $(SETUP)  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
 	$(SNAKEMAKE) -- cost

@@ -3,7 +3,7 @@
     python benchmarks/workflow.py --out results/benchmarks/workflow.csv [--jobs 1000 10000] [--slots 20] [--seconds 1]
 
 Runs `benchmarks/workflow/Snakefile`, whose jobs only sleep, with the rounds mended by `lowalt.workflow.scheduling`, and
-the smallest number of jobs also as Snakemake does it. Sleeping jobs leave the processor to Snakemake, so more of them can
+the smallest number of jobs also as Snakemake does it. Sleeping jobs leave the processor to Snakemake, so more of them
 run at a time than there are cores (`--slots`), and 10 000 jobs do not take hours. Columns:
 
     what                what ran: sleeping jobs with mended rounds or as installed; the parts of a real run

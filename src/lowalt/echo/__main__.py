@@ -8,6 +8,7 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
+from lowalt.common.progress import reported
 from lowalt.echo.api import echo_signal, explain
 from lowalt.echo.scene import Rigid, target
 from lowalt.motion import poses, read_table
@@ -29,7 +30,7 @@ def signals(
     """
     stations, times_s = [network.station(name) for name in names], network.times_s
     result = np.empty((len(stations), len(rows), network.symbols), np.complex64)
-    for index, row in enumerate(rows):
+    for index, row in enumerate(reported(rows, len(rows), "models")):
         sample = f"{row['subtype']}, model {row['model']}"
         cloud = cloud_of(clouds, row)
         seen = target(Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample)

@@ -8,6 +8,7 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
+from lowalt.common.progress import reported
 from lowalt.effects.catalogue import called
 from lowalt.effects.hear import Scene, hear
 from lowalt.motion import read_table
@@ -25,7 +26,7 @@ def signals(
     station, occluders = scene.network.station(name), occluders or {}
     result = np.empty((len(rows), scene.network.symbols), np.complex64)
     power = np.empty(len(rows))
-    for index, row in enumerate(rows):
+    for index, row in enumerate(reported(rows, len(rows), "models")):
         heard = hear(scene, station, cloud_of(clouds, row), row, occluders.get(row["subtype"]))
         result[index], power[index] = heard.signal, heard.power
     return result, power

@@ -18,6 +18,7 @@ from torch.utils.data import DataLoader, Dataset
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
+from lowalt.common.progress import Reporter
 from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint
 from lowalt.recognition.augment import augment
@@ -226,6 +227,7 @@ class Trainer:
         """Train to the last step or until validation stops improving; goes on from where the run stands."""
         start, last, first = time.monotonic(), time.monotonic(), self.at.steps
         steps = self.block["steps"]
+        report = Reporter(steps, "steps")
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
             loader = iter(self._loader(parts[self.at.batch : self.at.batch + steps - self.at.steps]))
@@ -235,6 +237,8 @@ class Trainer:
                 self.waited_s += time.monotonic() - asked
                 self._step(*batch)
                 self.at.batch += 1
+                if not self.machine.rank:
+                    report(self.at.steps)
                 if self.at.steps % self.block["validate_every"] == 0 or self.at.steps == steps:
                     self._validate()
                     self._say(start, first)

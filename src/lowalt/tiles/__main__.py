@@ -9,6 +9,7 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.common.network import Network
+from lowalt.common.progress import reported
 from lowalt.spectra import Spectra
 from lowalt.tiles import files
 from lowalt.tiles.png import encode
@@ -43,7 +44,7 @@ def load_signals(path: str | Path, network: Network) -> np.ndarray:
 def encoded(signals: np.ndarray, tiles: Renderer) -> Iterator[bytes]:
     """Yield the PNG of every sample, model by model, SNR by SNR."""
     palette = tiles.images.palette
-    for model in signals:
+    for model in reported(signals, len(signals), "models"):
         for sample in model:
             yield encode(tiles.tile(sample), palette)
 

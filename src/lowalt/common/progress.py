@@ -1,0 +1,65 @@
+"""How far a long command is, as lines of its log that a person and the workflow's display can read.
+
+A line is `progress 340/2000 steps`; the last one counts. Commands write to their log (standard error) at most every two
+seconds, so short ones write none.
+"""
+
+import re
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple, TextIO, TypeVar
+
+EVERY_S = 2.0
+LINE = re.compile(rb"^progress (\d+)/(\d+) (\w+)$", re.MULTILINE)
+TAIL_BYTES = 4096
+
+Item = TypeVar("Item")
+
+
+class Progress(NamedTuple):
+    """Parts of a command's work done, of all parts, and their unit's name."""
+
+    done: int
+    total: int
+    unit: str
+
+
+class Reporter:
+    """Writes progress lines to the log, at most one every EVERY_S seconds of `clock`."""
+
+    def __init__(
+        self, total: int, unit: str, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._total, self._unit, self._stream, self._clock = total, unit, stream, clock
+        self._last = clock()
+
+    def __call__(self, done: int) -> None:
+        """Say that `done` parts are done, if it is time to."""
+        now = self._clock()
+        if now - self._last >= EVERY_S:
+            self._last = now
+            print(f"progress {done}/{self._total} {self._unit}", file=self._stream or sys.stderr, flush=True)
+
+
+def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
+    """Yield the items and report how many are done."""
+    report = Reporter(total, unit)
+    for done, item in enumerate(items, start=1):
+        yield item
+        report(done)
+
+
+def last(log: str | Path) -> Progress | None:
+    """Return the last progress in a log file, or None where it has none in its last lines or is not there."""
+    try:
+        with Path(log).open("rb") as file:
+            file.seek(max(0, file.seek(0, 2) - TAIL_BYTES))
+            found = LINE.findall(file.read())
+    except OSError:
+        return None
+    if not found:
+        return None
+    done, total, unit = found[-1]
+    return Progress(int(done), int(total), unit.decode())

@@ -1,0 +1,124 @@
+"""What a run is doing, a line a stage: done of all, rate, time left, what runs now. Counts and text only.
+
+Times are seconds since the epoch, so that a board can be kept in a file and read by another process.
+"""
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field
+
+from lowalt.common.progress import Progress
+
+Reader = Callable[[str], Progress | None]
+"""Reads how far a job is from its log."""
+
+
+@dataclass
+class Job:
+    """A job that runs: its stage, what it is about (its wildcards), its log and when it started (s)."""
+
+    stage: str
+    label: str
+    log: str
+    started: float
+
+
+@dataclass
+class Stage:
+    """Jobs of one rule: how many there are and are done, when the first started and the last ended (s)."""
+
+    total: int
+    done: int = 0
+    failed: int = 0
+    started: float | None = None
+    ended: float | None = None
+
+
+@dataclass
+class Board:
+    """The stages of one run in the order they started, and the jobs that run, by their id."""
+
+    totals: dict[str, int]
+    started: float
+    stages: dict[str, Stage] = field(default_factory=dict)
+    jobs: dict[str, Job] = field(default_factory=dict)
+
+    @classmethod
+    def read(cls, kept: dict) -> "Board":
+        """Return the board that `kept` holds."""
+        stages = {name: Stage(**stage) for name, stage in kept["stages"].items()}
+        jobs = {name: Job(**job) for name, job in kept["jobs"].items()}
+        return cls(kept["totals"], kept["started"], stages, jobs)
+
+    def kept(self) -> dict:
+        """Return the board as plain values, for a file."""
+        return asdict(self)
+
+    def start(self, job_id: object, job: Job) -> bool:
+        """Note a job that starts; return whether it is the first of its stage."""
+        new = job.stage not in self.stages
+        stage = self.stages.setdefault(job.stage, Stage(self.totals.get(job.stage, 0)))
+        stage.started = job.started if stage.started is None else stage.started
+        self.jobs[str(job_id)] = job
+        return new
+
+    def finish(self, job_id: object, now: float, good: bool = True) -> str | None:
+        """Note the end of a job; return its stage where no job of it is left, else None. Unknown jobs are left out."""
+        job = self.jobs.pop(str(job_id), None)
+        if job is None:
+            return None
+        stage = self.stages[job.stage]
+        stage.ended = now
+        stage.done, stage.failed = stage.done + good, stage.failed + (not good)
+        return job.stage if stage.done >= stage.total else None
+
+    def running(self) -> list[str]:
+        """Return the stages that have a job running, in the order they started."""
+        active = {job.stage for job in self.jobs.values()}
+        return [name for name in self.stages if name in active]
+
+    def total(self, now: float) -> str:
+        """Return the line of the whole run."""
+        done, planned = sum(stage.done for stage in self.stages.values()), sum(self.totals.values())
+        return f"{'all':<{self._width}} {done}/{planned} jobs, {span(now - self.started)} since the start"
+
+    @property
+    def _width(self) -> int:
+        return max(map(len, [*self.totals, *self.stages, "all"]))
+
+    def line(self, name: str, now: float, read: Reader) -> str:
+        """Return the line of one stage."""
+        stage = self.stages[name]
+        head = f"{name:<{self._width}} {stage.done}/{stage.total}"
+        head += f", {stage.failed} failed" if stage.failed else ""
+        now_running = {key: job for key, job in self.jobs.items() if job.stage == name}
+        if not now_running and stage.done >= stage.total:
+            return f"{head}, done in {span(stage.ended - stage.started)}"
+        found = {key: read(job.log) for key, job in now_running.items()}
+        parts = sum(progress.done / progress.total for progress in found.values() if progress and progress.total)
+        done, spent = stage.done + parts, now - stage.started
+        if done > 0 and spent > 0:
+            head += f", {pace(stage.done / spent)}" if stage.done else ""
+            head += f", {span((stage.total - done) * spent / done)} left"
+        texts = [_running(job, found[key]) for key, job in now_running.items()]
+        return head + "".join(f"; {text}" for text in texts if text)
+
+
+def _running(job: Job, progress: Progress | None) -> str:
+    """The job's wildcards, if any, and how far it is, if it says so."""
+    parts = f"{progress.done}/{progress.total} {progress.unit}" if progress else ""
+    return f"{job.label} {parts}".strip()
+
+
+def span(seconds: float) -> str:
+    """Return a duration as minutes and seconds, or hours, minutes and seconds."""
+    whole = max(0, round(seconds))
+    hours, minutes, rest = whole // 3600, whole // 60 % 60, whole % 60
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def pace(per_second: float) -> str:
+    """Return a rate of jobs a second, minute or hour, whichever reads as a number of at least one."""
+    for factor, unit in ((1, "s"), (60, "min"), (3600, "h")):
+        if per_second * factor >= 1 or unit == "h":
+            return f"{per_second * factor:.1f}/{unit}"
+    raise AssertionError("the last unit always returns")

@@ -1,0 +1,75 @@
+"""The state of a run in a file, for another terminal: `python -m lowalt.workflow.status`, or `make status`.
+
+Each run writes .snakemake/status/{process id}.json in its working directory. Files of runs that have ended stay until
+the next run starts there; the command shows runs that live, else the one that ended last.
+"""
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+from lowalt.common import progress
+from lowalt.common.files import replacing
+from lowalt.workflow.board import Board, span
+from lowalt.workflow.owner import started
+
+FOLDER = Path(".snakemake/status")
+
+
+def write(board: Board, state: str, folder: Path = FOLDER) -> None:
+    """Keep the state of this process's run: "running", "ended" or "failed"."""
+    pid = os.getpid()
+    kept = {"pid": pid, "process": started(pid), "state": state, "written": time.time(), "board": board.kept()}
+    path = folder / f"{pid}.json"
+    if not path.exists():
+        _sweep(folder)
+    with replacing(path) as temporary:
+        temporary.write_text(json.dumps(kept))
+
+
+def alive(kept: dict) -> bool:
+    """Return whether the process of a run lives on this machine."""
+    return kept["process"] is not None and started(kept["pid"]) == kept["process"]
+
+
+def read(folder: Path = FOLDER) -> list[dict]:
+    """Return what all runs of a working directory left, oldest first; damaged files are left out."""
+    found = []
+    for path in folder.glob("*.json"):
+        try:
+            found.append(json.loads(path.read_text()))
+        except (OSError, ValueError):
+            continue
+    return sorted(found, key=lambda kept: kept["written"])
+
+
+def _sweep(folder: Path) -> None:
+    for kept in read(folder):
+        if not alive(kept):
+            (folder / f"{kept['pid']}.json").unlink(missing_ok=True)
+
+
+def describe(kept: dict, now: float) -> str:
+    """Return the lines of one run."""
+    board, living = Board.read(kept["board"]), alive(kept)
+    state = kept["state"] if living or kept["state"] != "running" else "stopped without a word, killed perhaps"
+    head = f"process {kept['pid']}: {state}, {span(now - kept['written'])} ago"
+    moment = now if living else kept["written"]
+    lines = [board.line(name, moment, progress.last) for name in board.stages]
+    return "\n".join([head, *lines, board.total(moment)])
+
+
+def main() -> None:
+    """Print the runs of the working directory."""
+    runs, now = read(), time.time()
+    living = [kept for kept in runs if alive(kept)]
+    if not runs:
+        print(f"no run has started here: {FOLDER} is empty", file=sys.stderr)
+        raise SystemExit(1)
+    print("\n".join(describe(kept, now) for kept in living or runs[-1:]))
+
+
+if __name__ == "__main__":
+    main()

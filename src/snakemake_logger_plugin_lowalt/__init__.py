@@ -1,0 +1,186 @@
+"""Snakemake's log as one line a stage: `snakemake --logger lowalt`, as the profiles of this project ask.
+
+On a terminal the lines of the stages that run are drawn anew in place; in a log each stage has a line when it starts,
+every half minute and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end,
+and the log of each job, whose last lines are shown when it fails. A dry run prints what Snakemake prints.
+"""
+
+import contextlib
+import logging
+import os
+import shutil
+import sys
+import threading
+import time
+from pathlib import Path
+
+from snakemake.logging import ColorizingTextHandler, DefaultFilter, DefaultFormatter
+from snakemake_interface_logger_plugins.base import LogHandlerBase
+from snakemake_interface_logger_plugins.common import LogEvent
+
+from lowalt.common import progress
+from lowalt.common.errors import InputError
+from lowalt.workflow import status
+from lowalt.workflow.board import Board, Job
+
+EVERY_S = {True: 1.0, False: 30.0}
+"""Seconds between two states shown, on a terminal and in a log."""
+LAST_LINES = 15
+"""Lines of a failed job's log that are shown."""
+QUIET = {
+    LogEvent.RUN_INFO, LogEvent.WORKFLOW_STARTED, LogEvent.SHELLCMD, LogEvent.JOB_STARTED, LogEvent.PROGRESS,
+    LogEvent.RESOURCES_INFO, LogEvent.GROUP_INFO, LogEvent.DEBUG_DAG, LogEvent.RULEGRAPH,
+}  # fmt: skip
+NOISE = (
+    "Assuming unrestricted shared filesystem", "Building DAG of jobs", "Conda environments: ignored", "Config file",
+    "Job rate limit", "Removing temporary output", "Select jobs to execute", "Singularity containers: ignored",
+    "Using profile", "Using shell", "Using workflow specific profile", "host:",
+)  # fmt: skip
+"""Beginnings of messages that say nothing about this run."""
+
+
+class LogHandler(LogHandlerBase):
+    """Shows a run on the stream that Snakemake would write to."""
+
+    writes_to_stream = True
+    writes_to_file = False
+    has_filter = True
+    has_formatter = True
+    needs_rulegraph = False
+
+    def __post_init__(self) -> None:
+        given = self.common_settings
+        self._stream = sys.stdout if given.stdout else sys.stderr
+        self._terminal = self._stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
+        self._plain = ColorizingTextHandler(
+            given.nocolor, self._stream, DefaultFormatter(given.quiet, given.show_failed_logs),
+            DefaultFilter(given.quiet, given.debug_dag, given.verbose, given.dryrun, given.printshellcmds),
+        )  # fmt: skip
+        # Who asks for all of Snakemake's own words gets them.
+        self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
+        self._board: Board | None = None
+        self._drawn, self._shown = 0, 0.0
+        self._guard, self._stop = threading.RLock(), threading.Event()
+        self._ticker = threading.Thread(target=self._tick, daemon=True)
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one record of Snakemake's, or note what it says about the run."""
+        try:
+            with self._guard:
+                if self._all:
+                    if self._plain.filter(record):
+                        self._plain.handle(record)
+                else:
+                    self._take(record)
+        except Exception:
+            self.handleError(record)
+
+    def close(self) -> None:
+        """Show the last state and leave the status file behind."""
+        self._stop.set()
+        with self._guard:
+            if self._board:
+                self._erase()
+                self._keep("failed" if any(stage.failed for stage in self._board.stages.values()) else "ended")
+                print(self._board.total(time.time()), file=self._stream, flush=True)
+                self._board = None
+        super().close()
+
+    def _take(self, record: logging.LogRecord) -> None:
+        event = getattr(record, "event", None)
+        if event == LogEvent.RUN_INFO and getattr(record, "stats", None):
+            totals = {name: count for name, count in record.stats.items() if name != "total"}
+            self._board, self._shown = Board(totals, record.created), record.created
+            if not self._ticker.is_alive():
+                self._ticker.start()
+        elif event == LogEvent.JOB_INFO and self._board:
+            self._start(record)
+        elif event == LogEvent.JOB_FINISHED and self._board:
+            self._finish(record.job_id, record.created)
+        elif event == LogEvent.JOB_ERROR:
+            self._fail(record)
+        elif event not in QUIET and not self._noise(record):
+            self._say(self._plain.format(record))
+
+    @staticmethod
+    def _noise(record: logging.LogRecord) -> bool:
+        # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
+        failed = getattr(record, "exception", None) == "CalledProcessError"
+        text = record.getMessage() if record.msg is not None else ""
+        return failed or (record.levelno <= logging.INFO and (not text or text == "None" or text.startswith(NOISE)))
+
+    def _start(self, record: logging.LogRecord) -> None:
+        if not record.output:
+            # A target: it makes nothing itself.
+            self._board.totals.pop(record.rule_name, None)
+            return
+        label = "/".join(str(value) for name, value in record.wildcards.items() if name != "run")
+        job = Job(record.rule_name, label, record.log[0] if record.log else "", record.created)
+        first = self._board.start(record.jobid, job)
+        if self._terminal:
+            self._draw()
+        elif first:
+            self._say(self._board.line(record.rule_name, record.created, progress.last))
+
+    def _finish(self, job_id: object, now: float) -> None:
+        complete = self._board.finish(job_id, now)
+        if complete:
+            self._say(self._board.line(complete, now, progress.last))
+
+    def _fail(self, record: logging.LogRecord) -> None:
+        if self._board:
+            self._board.finish(record.jobid, record.created, good=False)
+        lines = [f"failed: {record.rule_name}, job {record.jobid}"]
+        for log in record.log:
+            try:
+                text = Path(log).read_text(errors="replace").splitlines()
+            except OSError:
+                text = []
+            lines += [f"  its log: {log}" + ("; the last lines:" if text else ", which is empty or not there")]
+            lines += [f"    {line}" for line in text[-LAST_LINES:]]
+        self._say("\n".join(lines))
+
+    def _say(self, text: str) -> None:
+        """Print lines that stay, above those drawn in place."""
+        if text:
+            self._erase()
+            print(text, file=self._stream, flush=True)
+            self._draw()
+
+    def _erase(self) -> None:
+        if self._drawn:
+            print(f"\x1b[{self._drawn}F\x1b[J", end="", file=self._stream)
+            self._drawn = 0
+
+    def _draw(self) -> None:
+        """Draw the stages that run, in place; in a log nothing."""
+        if not (self._terminal and self._board):
+            return
+        now, size = time.time(), shutil.get_terminal_size()
+        lines = [self._board.line(name, now, progress.last) for name in self._board.running()]
+        lines = [line[: size.columns - 1] for line in [*lines, self._board.total(now)][-size.lines + 2 :]]
+        self._erase()
+        print("\n".join(lines), file=self._stream, flush=True)
+        self._drawn, self._shown = len(lines), now
+
+    def _tick(self) -> None:
+        """Show the state from time to time, also while no job starts or ends."""
+        while not self._stop.wait(1.0):
+            with self._guard:
+                if not self._board or self._stop.is_set():
+                    continue
+                self._keep("running")
+                if time.time() - self._shown < EVERY_S[self._terminal]:
+                    continue
+                self._shown = time.time()
+                if self._terminal:
+                    self._draw()
+                else:
+                    running = self._board.running()
+                    text = [self._board.line(name, self._shown, progress.last) for name in running]
+                    print("\n".join([*text, self._board.total(self._shown)]), file=self._stream, flush=True)
+
+    def _keep(self, state: str) -> None:
+        # A full disk stops the jobs, and they say so; the display goes on.
+        with contextlib.suppress(OSError, InputError):
+            status.write(self._board, state)

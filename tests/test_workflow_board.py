@@ -1,0 +1,201 @@
+"""What a person sees of a run: lines of stages, progress of long jobs, the state in a file, a failure's last lines."""
+
+import contextlib
+import io
+import json
+import logging
+import os
+import pty
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from lowalt.common import progress
+from lowalt.workflow import status
+from lowalt.workflow.board import Board, Job, pace, span
+
+SOURCE = Path(__file__).parent.parent / "src"
+
+
+def board_of(done: int = 2, running: int = 1) -> Board:
+    """Ten jobs of a stage, each 6 s long since second 100, and two jobs of another that have not started."""
+    board = Board({"echo": 10, "tiles": 2}, 100.0)
+    for number in range(done + running):
+        board.start(number, Job("echo", f"seen/{number}", f"{number}.log", 100.0 + 6 * number))
+        if number < done:
+            board.finish(number, 106.0 + 6 * number)
+    return board
+
+
+def test_a_line_has_done_of_all_rate_time_left_and_what_runs_now():
+    assert board_of().line("echo", 112.0, lambda log: None) == "echo  2/10, 10.0/min, 0:48 left; seen/2"
+    assert board_of().total(112.0) == "all   2/12 jobs, 0:12 since the start"
+
+
+def test_progress_of_a_running_job_counts_as_its_part():
+    halfway = {"2.log": progress.Progress(30, 60, "models")}.get
+    # 2.5 jobs in 15 s, so 7.5 jobs take 45 s.
+    assert board_of().line("echo", 115.0, halfway) == "echo  2/10, 8.0/min, 0:45 left; seen/2 30/60 models"
+    assert "left" not in board_of(done=0).line("echo", 115.0, lambda log: None)
+
+
+def test_the_last_job_of_a_stage_says_so_and_an_unknown_job_nothing():
+    board = Board({"echo": 2}, 0.0)
+    assert [board.start(number, Job("echo", "", "", 1.0)) for number in (1, 2)] == [True, False]
+    assert board.finish(1, 5.0) is None and board.finish(7, 5.0) is None
+    assert board.running() == ["echo"]
+    assert board.finish(2, 66.0) == "echo" and board.running() == []
+    assert board.line("echo", 99.0, lambda log: None) == "echo 2/2, done in 1:05"
+
+
+def test_failed_jobs_are_counted_and_not_done():
+    board = board_of(done=0, running=2)
+    board.finish(0, 105.0, good=False)
+    assert board.line("echo", 106.0, lambda log: None).startswith("echo  0/10, 1 failed")
+
+
+@pytest.mark.parametrize(("seconds", "text"), [(-1, "0:00"), (59.6, "1:00"), (3599, "59:59"), (7384, "2:03:04")])
+def test_durations_read_as_a_clock(seconds, text):
+    assert span(seconds) == text
+
+
+@pytest.mark.parametrize(("rate", "text"), [(12.34, "12.3/s"), (0.5, "30.0/min"), (1 / 1800, "2.0/h"), (1e-5, "0.0/h")])
+def test_rates_are_in_the_unit_that_reads_best(rate, text):
+    assert pace(rate) == text
+
+
+def test_a_board_survives_its_file():
+    board = board_of()
+    again = Board.read(json.loads(json.dumps(board.kept())))
+    assert again == board and again.line("echo", 112.0, lambda log: None) == board.line("echo", 112.0, lambda log: None)
+
+
+def test_progress_is_written_now_and_then_and_its_last_line_read(tmp_path):
+    now, text = [0.0], io.StringIO()
+    report = progress.Reporter(40, "steps", text, lambda: now[0])
+    for step in range(40):
+        now[0] += 0.5
+        report(step + 1)
+    assert text.getvalue().splitlines() == [f"progress {step}/40 steps" for step in range(4, 41, 4)]
+    log = tmp_path / "train.log"
+    log.write_text("x" * 9000 + "\nprogress 8/40 steps\nloss 0.4\n" + text.getvalue()[:40] + "progress 9/4")
+    assert progress.last(log) == (8, 40, "steps")
+    log.write_text("no such line")
+    assert progress.last(log) is None and progress.last(tmp_path / "none") is None
+
+
+def test_items_pass_through_unchanged():
+    assert list(progress.reported("abc", 3, "letters")) == ["a", "b", "c"]
+
+
+def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so(tmp_path):
+    folder = tmp_path / "status"
+    folder.mkdir()
+    (folder / "1.json").write_text("{damaged")
+    status.write(board_of(), "running", folder)
+    (kept,) = status.read(folder)
+    assert status.alive(kept)
+    text = status.describe(kept, kept["written"])
+    assert text.startswith(f"process {os.getpid()}: running, 0:00 ago\necho  2/10") and "all   2/12 jobs" in text
+    dead = kept | {"pid": 2**22 + 1}
+    assert "killed" in status.describe(dead, kept["written"])
+    # The next run sweeps what dead ones left.
+    (folder / f"{dead['pid']}.json").write_text(json.dumps(dead))
+    (folder / f"{os.getpid()}.json").unlink()
+    status.write(board_of(), "running", folder)
+    assert [found["pid"] for found in status.read(folder)] == [os.getpid()]
+
+
+def handler_of(**given):
+    """The plugin's handler on a stream that is no terminal."""
+    pytest.importorskip("snakemake")
+    plugin = pytest.importorskip("snakemake_logger_plugin_lowalt")
+    usual = {
+        "printshellcmds": False, "nocolor": True, "quiet": set(), "debug_dag": False, "verbose": False,
+        "show_failed_logs": True, "stdout": False, "dryrun": False,
+    }  # fmt: skip
+    handler = plugin.LogHandler(SimpleNamespace(**usual | given), None)
+    handler._stream = io.StringIO()
+    return handler
+
+
+def record(message: str | None = None, level: int = logging.INFO, **extra) -> logging.LogRecord:
+    made = logging.LogRecord("snakemake", level, "", 0, message, None, None)
+    made.__dict__.update(extra)
+    return made
+
+
+def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    handler = handler_of()
+    Path("job.log").write_text("".join(f"line {number}\n" for number in range(40)))
+    handler.emit(record("Building DAG of jobs..."))
+    handler.emit(record("table", event="run_info", stats={"echo": 2, "all": 1, "total": 3}))
+    for number in (1, 2):
+        handler.emit(
+            record("rule", event="job_info", jobid=number, rule_name="echo", log=["job.log"], output=["x"],
+                   wildcards={"run": "default", "group": "seen", "part": str(number)})
+        )  # fmt: skip
+    handler.emit(record("Finished", event="job_finished", job_id=1))
+    handler.emit(record("error", logging.ERROR, event="job_error", jobid=2, rule_name="echo", log=["job.log"]))
+    handler.emit(record("CalledProcessError ...", logging.ERROR, event="error", exception="CalledProcessError"))
+    handler.emit(record("took over a lock", logging.WARNING))
+    handler.close()
+    lines = handler._stream.getvalue().splitlines()
+    assert lines[0] == "echo 0/2; seen/1"
+    assert lines[1:3] == ["failed: echo, job 2", "  its log: job.log; the last lines:"]
+    assert lines[3:18] == [f"    line {number}" for number in range(25, 40)]
+    assert lines[18] == "took over a lock" and lines[19].startswith("all  1/3 jobs") and len(lines) == 20
+    (kept,) = status.read()
+    assert kept["state"] == "failed"
+
+
+def test_a_dry_run_shows_what_snakemake_shows():
+    handler = handler_of(dryrun=True)
+    handler._plain.stream = handler._stream
+    handler.emit(record("Building DAG of jobs..."))
+    assert handler._stream.getvalue() == "Building DAG of jobs...\n"
+
+
+SNAKEFILE = """
+rule all:
+    input: expand("{number}", number=range(3))
+rule short:
+    output: "{number}"
+    log: "{number}.log"
+    shell: "sleep 0.2; echo progress 3/4 parts > {log}; sleep 1.5; touch {output}"
+"""
+
+
+@pytest.mark.workflow
+def test_on_a_terminal_lines_are_drawn_in_place(tmp_path):
+    pytest.importorskip("snakemake")
+    (tmp_path / "Snakefile").write_text(SNAKEFILE)
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--logger", "lowalt", "--scheduler", "greedy"]
+    environment = {**os.environ, "PYTHONPATH": str(SOURCE), "TERM": "xterm", "COLUMNS": "60"}
+    ours, theirs = pty.openpty()
+    run = subprocess.Popen(command, cwd=tmp_path, env=environment, stdout=theirs, stderr=theirs)
+    os.close(theirs)
+    text = b""
+    # Reading fails once the other end is closed.
+    with contextlib.suppress(OSError):
+        while part := os.read(ours, 65536):
+            text += part
+    os.close(ours)
+    assert run.wait() == 0, text
+    shown = text.decode().replace("\r", "")
+    assert len(re.findall(r"\x1b\[\d+F\x1b\[J", shown)) >= 4
+    assert "3/4 parts" in shown
+    # What stays when all that was drawn in place is gone.
+    screen: list[str] = []
+    for line in shown.split("\n"):
+        for up, words in re.findall(r"(?:\x1b\[(\d+)F\x1b\[J)?([^\x1b]*)", line):
+            screen = screen[: len(screen) - int(up)] if up else screen
+            if words:
+                screen.append(words)
+    stays = [line for line in screen if line.startswith("short")]
+    assert len(stays) == 1 and stays[0].startswith("short 3/3, done in")
