@@ -21,7 +21,7 @@ QUIET = {
     "snr_db": 60.0, "flicker_db": -60.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,
     "hum_hz": 50.0,
 }  # fmt: skip
-TWIN = Twin(3.3e9, "complex", 5000.0, 2e-4, 400, "bare", 0.0)
+TWIN = Twin(3.3e9, "complex", 5000.0, 2e-4, 400, "bare", 0.0, 0.0)
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +66,7 @@ def test_the_doppler_edge_is_the_blade_tip_speed(records, quadrotor):
 
 
 def test_a_car_that_drives_past_shows_the_cosine_of_its_aspect(records):
-    twin = Twin(24.0e9, "real", 12000.0, 2.5e-4, 400, "anti_aliased", 0.3)
+    twin = Twin(24.0e9, "real", 12000.0, 2.5e-4, 400, "anti_aliased", 0.3, 15.0)
     scene = {
         "subtypes": ["Audi A6L 2019"], "course": "pass", "lateral_m": 4.0, "ahead_m": 10.0, "height_m": 0.0,
         "speed_mps": 8.0, "receiver": QUIET, "strength_db": {"wheel": -40.0},
@@ -190,10 +190,12 @@ def test_intervals_without_a_target_are_left_out():
     rng = np.random.default_rng(0)
     intervals = 0.01 * (rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400)))
     assert present(intervals, TWIN).all()
-    intervals[10:20] += np.exp(2j * np.pi * 0.1 * np.arange(400))
-    assert present(intervals, TWIN).nonzero()[0].tolist() == list(range(10, 20))
+    looking = replace(TWIN, detect_db=15.0)
+    assert not present(intervals, looking).any()
+    intervals[10:20] += 0.01 * np.exp(2j * np.pi * 0.1 * np.arange(400))
+    assert present(intervals, looking).nonzero()[0].tolist() == list(range(10, 20))
     # A drift slower than any target does not count as one.
-    slow = replace(TWIN, slowest_mps=10.0)
+    slow = replace(looking, slowest_mps=10.0)
     intervals[25:35] += np.exp(2j * np.pi * 0.001 * np.arange(400))
     assert present(intervals, slow).nonzero()[0].tolist() == list(range(10, 20))
 

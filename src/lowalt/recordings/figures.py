@@ -45,9 +45,13 @@ def spectrum(interval: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndar
     return meant, power[shown]
 
 
+FLOOR_MEDIANS = 8.0
+"""Noise floor in medians of the power: of 256 bins of white noise one lies above."""
+
+
 def above_floor(power: np.ndarray) -> np.ndarray:
-    """Return power (n,) less the noise floor, its median; nothing below zero."""
-    return np.maximum(power - np.median(power), 0.0)
+    """Return power (n,) less the noise floor; nothing below zero."""
+    return np.maximum(power - FLOOR_MEDIANS * np.median(power), 0.0)
 
 
 def _quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np.ndarray:

@@ -13,13 +13,12 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
+from lowalt.recordings.figures import speeds_shown
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.record import Record, record
 from lowalt.recordings.twin import Twin
 
 HALVES = ("tuning", "test")
-PRESENT_DB = 6.0
-"""An interval holds a target where its moving power is so far above the tenth percentile of the recording's."""
 
 
 class Measured(NamedTuple):
@@ -80,24 +79,20 @@ def at_carrier(twin: Twin, carrier_hz: float) -> Twin:
     return replace(twin, carrier_hz=carrier_hz)
 
 
-def moving_power(intervals: np.ndarray, twin: Twin) -> np.ndarray:
-    """Return the power (n,) of intervals (n, symbols) at speeds of at least the twin's `slowest_mps`; Hann window."""
-    spectra = np.abs(np.fft.fft(intervals * np.hanning(intervals.shape[1]), axis=1)) ** 2
-    speeds = np.fft.fftfreq(intervals.shape[1]) * 2 * twin.edge_mps
-    return spectra[:, np.abs(speeds) >= twin.slowest_mps].sum(axis=1)
-
-
 def present(intervals: np.ndarray, twin: Twin) -> np.ndarray:
     """Return which intervals (n, symbols) hold a moving target, (n,) bool.
 
-    A recording that a target never leaves has much the same power in all intervals, and keeps all of them: the rule
-    only sorts where the ninth decile is `PRESENT_DB` above the first.
+    The strongest line at |speed| >= slowest_mps stands `detect_db` above the median of those speeds, Hann window: a
+    constant false alarm rate. With detect_db 0 all do: the target never left the radar.
     """
-    power = 10 * np.log10(moving_power(intervals, twin) + 1e-300)
-    floor = np.quantile(power, 0.1)
-    if np.quantile(power, 0.9) < floor + PRESENT_DB:
+    if not twin.detect_db:
         return np.ones(len(intervals), bool)
-    return power >= floor + PRESENT_DB
+    count = intervals.shape[1]
+    power = np.abs(np.fft.fft(intervals * np.hanning(count), axis=1)) ** 2
+    speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
+    order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
+    moving = np.fft.fftshift(power, axes=1)[:, order][:, np.abs(meant) >= twin.slowest_mps]
+    return moving.max(axis=1) >= 10 ** (twin.detect_db / 10) * np.median(moving, axis=1)
 
 
 def measured_intervals(one: Measured, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:

@@ -28,7 +28,8 @@ from lowalt.targets.skeleton import NODES
 class Twin:
     """A measured radar: `rate_hz` is its receiver's, `symbol_interval_s` that of the images.
 
-    Below `slowest_mps` nothing counts as a moving target; the other names are those of a record.
+    A window holds a target where a line at or above `slowest_mps` stands `detect_db` over the rest (0: always); the
+    other names are those of a record.
     """
 
     carrier_hz: float
@@ -38,6 +39,7 @@ class Twin:
     symbols: int
     sampling: str
     slowest_mps: float
+    detect_db: float
 
     @classmethod
     def from_settings(cls, block: dict) -> "Twin":
