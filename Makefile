@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -28,6 +28,13 @@ data: $(SETUP)  ## the default's data set only, no training
 
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 	LOWALT_INPUTS=$(INPUTS) $(SNAKEMAKE) --configfile config/real.yaml
+
+# Twice gives equal bytes: figures, distances and pictures stand in results/reference, networks in results/measured.
+measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
+	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs $(INPUTS) --out results/measured || exit 1; done
+	$(BIN)/python -m lowalt.recordings recognise --inputs $(INPUTS) --out results/measured --models results/measured/models
+	cp results/measured/measured-*.csv results/reference/
+	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/reference --page results/measured/report.html
 
 test: $(SETUP)  ## the test suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

@@ -59,7 +59,7 @@ def rendered(intervals: np.ndarray, twin: Twin, images: Images, size: int) -> np
 def facts(labels: np.ndarray, names: list[str], models: np.ndarray, snr: np.ndarray, fold: str) -> Facts:
     """Return what is known of samples: labels (n,), subtypes or file names, model numbers, receivers' numbers."""
     count = len(labels)
-    unknown = np.full((count, 3), np.nan)
+    unknown = np.full((count, 1), np.nan)
     keys = [f"{name}-{model:06d}-{int(number)}" for name, model, number in zip(names, models, snr, strict=True)]
     return Facts(
         key=np.array(keys),
@@ -88,7 +88,7 @@ def recogniser(block: dict):
     """Return a network of the settings' scheme with fresh weights, and the scheme."""
     from lowalt.recognition.network import Recogniser
 
-    scheme = named(block["table"], block["scheme"])
+    scheme = named(block["table"], block["scheme"], ["A"])
     palette = Images.from_settings(block["images"]).palette
     return Recogniser(scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS))), scheme
 

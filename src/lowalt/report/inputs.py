@@ -23,7 +23,7 @@ LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""
 OPTIONAL = (
     "published", "transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects",
-    "effects_figure",
+    "effects_figure", "measured",
 )  # fmt: skip
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""
 

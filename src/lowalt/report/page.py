@@ -15,6 +15,7 @@ from lowalt.report.sections import (
     echo_cost,
     effects,
     made_with,
+    measured,
     orderings,
     overview,
     samples,
@@ -27,7 +28,7 @@ from lowalt.report.sections import (
 
 SECTIONS = (
     overview, accuracy, orderings, confusion, bands, alarms, calibration, transfer, trainings, accuracy_cost, subtypes,
-    samples, targets, echo_cost, effects, stages, made_with,
+    samples, targets, measured, echo_cost, effects, stages, made_with,
 )  # fmt: skip
 """The sections in the order of the page.
 
@@ -45,6 +46,11 @@ def _templates() -> jinja2.Environment:
 def rendered(name: str, values: dict | None) -> str:
     """Return the HTML of the section `name` with these values; None gives an empty text."""
     return "" if values is None else _templates().get_template(f"sections/{name}.html").render(values)
+
+
+def section_page(title: str, name: str, values: dict) -> str:
+    """Return a page of the one section `name` with these values."""
+    return _templates().get_template("page.html").render(title=title, sections=[rendered(name, values)])
 
 
 def page(run: Run) -> str:

@@ -129,6 +129,8 @@ class Products:
             files["transfer"] = f"{base}/transfer.csv"
         if block["accuracy"]:
             files["accuracy_cost"] = block["accuracy"]
+        if block["measured"]:
+            files["measured"] = block["measured"]
         if block["cost"]:
             files["echo_cost"], files["echo_pixels"] = f"{base}/cost.csv", f"{base}/cost_pixels.csv"
             files["echo_cost_figure"] = f"{base}/cost.png"

@@ -1,0 +1,88 @@
+"""The measured recordings from their public addresses, each with its pinned SHA-256.
+
+Only the vehicle recordings carry a licence (MIT, University of Cape Town 2025); the others are their makers', who state
+none: fetch them for your own comparison and do not pass them on.
+Run `python -m lowalt.recordings.download --out FOLDER`; FOLDER is then what `make measured INPUTS=FOLDER` takes.
+"""
+
+import argparse
+import shutil
+import sys
+import urllib.error
+import urllib.parse
+import urllib.request
+from pathlib import Path
+
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing, sha256
+from lowalt.common.yaml_files import load_yaml
+
+SOURCES = "config/measured/sources.yaml"
+TIMEOUT_S = 60
+
+
+def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
+    """Put the file `name` (SET/FILE) from the first of its `places` (addresses) that has it into `folder`.
+
+    Return False where it already was there. Nothing is kept unless its SHA-256 is the pinned one.
+    Raises: InputError naming every address and what failed there, a download or the checksum.
+    """
+    target = folder / name
+    if target.is_file() and sha256(target) == pinned:
+        return False
+    failures = []
+    for address in places:
+        try:
+            _from(address, target, pinned)
+            return True
+        except InputError as error:
+            failures.append(str(error))
+    raise InputError("; ".join(failures))
+
+
+def _from(address: str, target: Path, pinned: str) -> None:
+    with replacing(target) as temporary:
+        try:
+            with urllib.request.urlopen(address, timeout=TIMEOUT_S) as source, temporary.open("wb") as file:
+                shutil.copyfileobj(source, file)
+        except (urllib.error.URLError, OSError, ValueError) as error:
+            raise InputError(f"{address}: download failed ({error})") from None
+        found = sha256(temporary)
+        if found != pinned:
+            raise InputError(f"{address}: SHA-256 is {found}, expected {pinned}; nothing was kept")
+
+
+def addresses(sources: dict) -> dict[str, tuple[list[str], str]]:
+    """Return SET/FILE -> (its addresses, SHA-256) of a sources file: sets, each a list of `addresses` and `files`."""
+    found = {}
+    for name, folders in sources.items():
+        for entry in folders:
+            for file, pinned in entry["files"].items():
+                places = [f"{base}/{urllib.parse.quote(file)}" for base in entry["addresses"]]
+                found[f"{name}/{file}"] = places, pinned
+    return found
+
+
+def main(arguments: list[str]) -> None:
+    """Fetch all recordings; one that cannot be had does not stop the others.
+
+    Raises: InputError with the count of files that failed, after each was named on standard error.
+    """
+    line = argparse.ArgumentParser(prog="python -m lowalt.recordings.download", description=__doc__)
+    line.add_argument("--out", required=True, type=Path, help="folder of the measured sets")
+    line.add_argument("--sources", default=SOURCES, help="addresses and checksums (.yaml)")
+    given = line.parse_args(arguments)
+    wanted, failed = addresses(load_yaml(given.sources, "sources of recordings")), 0
+    for name, (places, pinned) in wanted.items():
+        try:
+            print(name, "fetched" if fetch(name, places, pinned, given.out) else "already there")
+        except InputError as error:
+            failed += 1
+            print(f"{name}: {error}", file=sys.stderr)
+    if failed:
+        raise InputError(f"{failed} of {len(wanted)} recordings failed, the others are in {given.out}")
+
+
+if __name__ == "__main__":
+    run(main)

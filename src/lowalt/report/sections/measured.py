@@ -1,0 +1,58 @@
+"""Section: held against measurement, class by class: pictures, figures, distances, and recognition of the recordings.
+
+All of it stands in one folder: measured-figures.csv, -distances.csv, -recognition.csv, -accuracy.csv, and one
+measured-NAME.png a pair of pictures. `make measured` writes them.
+"""
+
+from pathlib import Path
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.report.figures.style import embedded
+from lowalt.report.run import Run
+from lowalt.targets.cloud import CATEGORIES
+
+FIGURES = (
+    "pair", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "before", "before_low",
+    "before_high", "simulated", "simulated_low", "simulated_high",
+)  # fmt: skip
+DISTANCES = ("radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high",
+             "ceiling", "ceiling_class")  # fmt: skip
+RECOGNITION = ("radar", "seed", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
+ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
+
+
+def held(folder: str | Path) -> dict:
+    """Return the section's values from a folder of reference tables and pictures.
+
+    classes: one entry a category that was measured, with its pictures (name, address), and its rows of the tables;
+    accuracy: the rows over whole radars. Raises: InputError for a table that is missing or lacks a column.
+    """
+    folder = Path(folder)
+    figures = read_csv(folder / "measured-figures.csv", *FIGURES)
+    distances = read_csv(folder / "measured-distances.csv", *DISTANCES)
+    recognition = read_csv(folder / "measured-recognition.csv", *RECOGNITION)
+    accuracy = read_csv(folder / "measured-accuracy.csv", *ACCURACY)
+    classes = []
+    for label in CATEGORIES:
+        mine = [row for row in figures if row["label"] == label]
+        if not mine:
+            continue
+        pairs = list(dict.fromkeys(row["pair"] for row in mine))
+        pictures = [(pair, folder / f"measured-{pair}.png") for pair in pairs]
+        classes.append(
+            {
+                "label": label,
+                "pictures": [(pair, embedded(path.read_bytes())) for pair, path in pictures if path.is_file()],
+                "figures": mine,
+                "distances": [row for row in distances if row["label"] == label],
+                "recognition": [row for row in recognition if row["label"] == label],
+                "accuracy": [row for row in accuracy if row["class"] == label],
+            }
+        )
+    return {"classes": classes, "accuracy": [row for row in accuracy if row["class"] == "balanced"],
+            "categories": CATEGORIES}  # fmt: skip
+
+
+def values(run: Run) -> dict | None:
+    """Return the section's values; None where the run names no measured tables."""
+    return held(run.inputs.path("measured").parent) if "measured" in run.inputs else None
