@@ -1,6 +1,7 @@
 """The echo against the direct sum of the paper, the physics read back, and its laws."""
 
 import dataclasses
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -137,10 +138,32 @@ def test_chebyshev_limits(count):
         assert dirichlet(whole + 1e-9, count) == pytest.approx(sign * count, rel=1e-12)
 
 
-def test_memory_of_the_command_is_its_output(tmp_path):
+def test_the_command_s_memory_grows_by_its_output_alone():
+    from craft import craft, row
+    from lowalt.echo.__main__ import signals
+
+    net, cloud = network(), craft()
+
+    def peak(models: int) -> int:
+        rows = [row(model) for model in range(models)]
+        tracemalloc.start()
+        try:
+            signals(net, [net.stations[0].name], {"DJI Mini 2": cloud}, rows, None)
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(1)
+    # 200 more models: 400 complex64 values of each. Their positions alone would take sixty times as much.
+    more, output = peak(220) - peak(20), 200 * 400 * 8
+    assert output <= more < 1.5 * output
+
+
+def test_settings_that_are_missing_are_named(tmp_path):
+    from lowalt.common.errors import InputError
     from lowalt.echo.__main__ import main
 
-    with pytest.raises(Exception, match="missing"):
+    with pytest.raises(InputError, match=r"missing \['network', 'tolerance'\]"):
         main(["--settings", "{}", "--motion", "x", "--clouds", "y", "--station", "A", "--out", str(tmp_path / "o.npy")])
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from craft import NETWORK, craft, row
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.echo.device import device_signal
 from lowalt.motion import poses, positions
-from test_echo_command import NETWORK, craft, row
 
 torch = pytest.importorskip("torch")
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]

@@ -72,6 +72,7 @@ def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
         def magic_tuple(self):
             return ("processor",)
 
+    # numba offers no public name for the key of a cache entry; only the key shows that this cache is asked.
     for compiled in (run, one_way):
         key = compiled._cache._index_key(("signature",), Codegen())
         assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key

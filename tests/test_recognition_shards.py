@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from dataset import RENDER, build
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.recognition import checkpoint, network, predictions, runs, samples, schemes, score, views
@@ -16,7 +17,6 @@ from lowalt.recognition.protocols import folds
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of
 from lowalt.tiles import resize
-from test_shards import RENDER, build
 
 SIZE = 32
 SCHEME = schemes.Scheme("BC:VRP+VT", (1, 2), (0, 2))

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from craft import craft
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.echo_cost import COLUMNS as MEASURED
@@ -15,7 +16,6 @@ from lowalt.report.figures.echo_cost import main as draw
 from lowalt.report.page import rendered
 from lowalt.report.sections.echo_cost import summary
 from lowalt.tiles.__main__ import renderer
-from test_echo_command import craft
 
 TARGETS = Path(__file__).parents[1] / "config/targets.csv"
 NETWORK = {

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from craft import NETWORK as WIDE
+from craft import craft, row
 from lowalt.common.config import load, merge
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
@@ -35,8 +37,6 @@ from lowalt.report.sections.effects import COLUMNS as SHOWN
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.tiles import resize, split
 from lowalt.tiles.__main__ import renderer
-from test_echo_command import NETWORK as WIDE
-from test_echo_command import craft, row
 
 BASE, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
 INFINITY = float("inf")

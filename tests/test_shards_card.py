@@ -8,10 +8,10 @@ import shutil
 import pytest
 import yaml
 
+from dataset import RENDER, SEED, SNRS, SPLIT, build
 from lowalt.common.errors import InputError
 from lowalt.shards import ShardSet
 from lowalt.shards.card import main
-from test_shards import RENDER, SEED, SNRS, SPLIT, build
 
 CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
 

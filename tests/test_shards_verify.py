@@ -6,10 +6,10 @@ import subprocess
 import numpy as np
 import pytest
 
+from dataset import build, publish
 from lowalt.common.errors import InputError
 from lowalt.shards import faults
 from lowalt.shards.__main__ import main
-from test_shards import build, publish
 
 
 @pytest.fixture(scope="module")

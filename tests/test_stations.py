@@ -8,6 +8,7 @@ import pytest
 import yaml
 from PIL import Image
 
+from craft import NETWORK, craft, row
 from lowalt.common.config import load, merge
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
@@ -16,7 +17,6 @@ from lowalt.motion import write_table
 from lowalt.recognition import schemes
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import load_table
-from test_echo_command import NETWORK, craft, row
 
 NAMES = ("west", "A", "east", "B2", "north")
 """Not in alphabetical order, of one letter and of more."""

@@ -7,7 +7,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.spectra import Fourier, Spectra, Transfer
 from lowalt.tiles import Images, Renderer, Scale, split
-from test_tiles import SCALES, echoes, renderer
+from pictures import SCALES, echoes, renderer
 
 torch = pytest.importorskip("torch")
 from lowalt.tiles.device import DeviceRenderer  # noqa: E402

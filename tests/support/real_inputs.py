@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-FOLDER = Path(os.environ.get("LOWALT_INPUTS") or Path(__file__).parents[2] / "shared" / "data")
+FOLDER = Path(os.environ.get("LOWALT_INPUTS") or Path(__file__).parents[3] / "shared" / "data")
 
 needs_inputs = pytest.mark.skipif(
     not (FOLDER / "cmu").is_dir() or not (FOLDER / "meshes").is_dir(),

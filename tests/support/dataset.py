@@ -1,0 +1,66 @@
+"""A small data set of both groups and all folds, as the commands of the shards make it."""
+
+import json
+import math
+import shutil
+
+import numpy as np
+import yaml
+
+from lowalt.motion import COLUMNS, write_table
+from lowalt.shards import card
+from lowalt.shards.__main__ import main
+from lowalt.tiles import encode, files
+from pictures import IMAGES, NETWORK, SPECTRA, echoes, renderer
+
+RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
+SPLIT = {"by": "motion", "train": 2, "val": 1, "test": 1}
+SNRS = [3, "inf"]
+SEED = 11
+TARGETS = {"seen": [("DJI Mavic 3", "UAV"), ("Crow", "Bird")], "unseen": [("Model Y", "Vehicle")]}
+
+
+def motion_rows(group, models=4):
+    rng = np.random.default_rng(len(group))
+    rows = []
+    for model in range(models):
+        for subtype, category in TARGETS[group]:
+            row = dict.fromkeys(COLUMNS, math.nan)
+            row.update(subtype=subtype, category=category, group=group, model=model, rate_hz=rng.uniform(1, 99))
+            for name in ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps"):
+                row[name] = rng.uniform(1, 90)
+            rows.append(row)
+    return rows
+
+
+def write_settings(kind):
+    block = {"seed": SEED, "network": NETWORK, "snr_db": SNRS, "split": SPLIT, "shards": {"kind": kind}}
+    return json.dumps(block)
+
+
+def build(folder, kind):
+    """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group."""
+    shards = []
+    for group in TARGETS:
+        rows = motion_rows(group)
+        write_table(folder / f"{group}.csv", rows)
+        signals = np.stack([echoes(seed) for seed in range(2 * len(rows))]).reshape(len(rows), 2, 3, 400)
+        np.save(folder / f"{group}.npy", signals)
+        tiles = renderer()
+        pngs = [encode(tiles.tile(sample), tiles.images.palette) for model in signals for sample in model]
+        files.write(folder / f"{group}.tiles.npz", pngs)
+        for name in ("train", "val", "test"):
+            shards.append(str(folder / f"{group}-{name}-00000.tar"))
+            inputs = ["--motion", f"{folder}/{group}.csv", "--signals", f"{folder}/{group}.npy"]
+            inputs += ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
+            main(["write", "--settings", write_settings(kind), *inputs, "--fold", name, "--out", shards[-1]])
+    main(["index", "--settings", json.dumps(RENDER), "--shards", *shards, "--out", str(folder / "index.json")])
+    return folder
+
+
+def publish(folder, target):
+    """A copy of a data set without its inputs, with its data card."""
+    copied = shutil.copytree(folder, target, ignore=shutil.ignore_patterns("seen.*", "unseen.*"))
+    (target.parent / "config.yaml").write_text(yaml.safe_dump({"run": "trial"}))
+    card.write(copied / "index.json", target.parent / "config.yaml")
+    return copied
