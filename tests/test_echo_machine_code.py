@@ -76,3 +76,18 @@ def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
     for compiled in (run, one_way):
         key = compiled._cache._index_key(("signature",), Codegen())
         assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key
+
+
+def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):
+    pair = "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
+    (tmp_path / "one.py").write_text(pair)
+    (tmp_path / "use.py").write_text(
+        "from lowalt.common.jit import LEAN\n@LEAN\ndef total(pair):\n    return pair.a + pair.b\n"
+    )
+    program = "import sys, use; print(use.total(getattr(__import__(sys.argv[1]), 'Pair')(1.0, 2.0)))"
+    paths = f"{tmp_path}:{Path(lowalt.__file__).parents[1]}"
+    for module in ("one", "two"):
+        call = [sys.executable, "-c", program, module]
+        done = subprocess.run(call, env={"PYTHONPATH": paths}, capture_output=True, text=True, check=True)
+        assert done.stdout == "3.0\n"
+        (tmp_path / f"{module}.py").rename(tmp_path / "two.py")

@@ -13,6 +13,7 @@ from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.echo.refine import Method
+from lowalt.echo.rounding import nearest
 from lowalt.echo.scene import EchoScene, Rigid, Target, check, target
 
 
@@ -68,7 +69,7 @@ def echo_signal(
     """
     _check_tolerance(tolerance, sample)
     scene, radio, refs, aims, routes = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
-    found, left, method = refine.compute(scene, radio, refs, aims, tolerance)
+    found, left, method, lay = refine.compute(scene, radio, refs, aims, tolerance)
     if paths is not None:
         left = np.arange(len(refs))
         method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
@@ -78,6 +79,9 @@ def echo_signal(
         share, direction = method.pointwise_bound
         found.bounds[left] = found.totals[left] * share + risks[left] * direction
         found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
+    if tolerance is None and paths is None:
+        again = nearest.correct(scene, lay, radio, refs, aims, found, method.pointwise_bound)
+        method = method._replace(again=again)
     largest = float(abs(found.values).max())
     bound = float(found.bounds.max()) / largest if largest > 0 else np.inf
     if tolerance is not None and not bound <= tolerance:
@@ -119,6 +123,7 @@ def explain(result: EchoResult) -> str:
         f"symbols: {method.cheap} by that plan, {method.exact} by the exact one, "
         f"{method.general} by the pointwise kernel",
         f"points interpolated in slow time: {method.slow[0]}, from {method.slow[1]} nodes",
+        f"symbols computed again so that complex64 is rounded correctly: {method.again[0]}",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip
 

@@ -4,15 +4,53 @@ A double-double is the unevaluated sum of two doubles (about 32 digits). Turns p
 100 km and 4.9 GHz the phase is 2e7 rad, and one double would leave only eight digits of the turn.
 """
 
+from decimal import localcontext
 from fractions import Fraction
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.exact.constants import DIGITS, PI, Pair, decimal_of, pair, sine_cosine
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 
 LIGHT = Fraction(int(SPEED_OF_LIGHT))
+
+
+class Exact(NamedTuple):
+    """One station's constants as double-doubles."""
+
+    sine: Pair
+    cosine: Pair
+    """Of Theta_k."""
+    turns: Pair
+    cells: Pair
+    """Turns of phase and range cells per metre of range."""
+    half_kappa: Pair
+    """kappa / 2: half turns of array phase per element and unit of direction cosine."""
+    phase_h: Pair
+    phase_v: Pair
+    """Turns of phase of both arrays' middles per unit of the horizontal and vertical direction cosine."""
+    scale: Pair
+    """a0 lambda / (4 pi)^(3/2)."""
+
+
+def _exact(network: Network, station: Station) -> Exact:
+    low, spacing = Fraction(station.frequency_hz), Fraction(network.subcarrier_spacing_hz)
+    carrier = Fraction(network.carrier_hz)
+    kappa = low / carrier
+    centre = low + (network.subcarriers - 1) * spacing / 2
+    sine, cosine = sine_cosine(station.normal_rad)
+    elements = int(np.prod(network.transmit)) * int(np.prod(network.receive))
+    with localcontext() as context:
+        context.prec = DIGITS
+        four_pi = 4 * PI
+        scale = (decimal_of(network.power) / elements).sqrt() * decimal_of(LIGHT / carrier) / (four_pi * four_pi.sqrt())
+    return Exact(
+        pair(sine), pair(cosine), pair(2 * centre / LIGHT), pair(2 * network.subcarriers * spacing / LIGHT),
+        pair(kappa / 2), pair(kappa / 4 * (network.transmit[0] + network.receive[0] - 2)),
+        pair(kappa / 4 * (network.transmit[1] + network.receive[1] - 2)), pair(scale),
+    )  # fmt: skip
 
 
 class Radar(NamedTuple):
@@ -42,11 +80,8 @@ class Radar(NamedTuple):
     """The effective carrier (Hz), for delays of extra paths."""
     bandwidth_hz: float
     """M df (Hz): range cells per second of delay."""
-
-
-def _double_double(value: Fraction) -> tuple[float, float]:
-    high = float(value)
-    return high, float(value - Fraction(high))
+    exact: Exact
+    """The same constants as double-doubles."""
 
 
 @lru_cache(maxsize=64)
@@ -54,21 +89,21 @@ def radar(network: Network, station: Station) -> Radar:
     """Return the constants of `station` (spec: alpha, a0, kappa and the effective carrier f_k + (M-1) df / 2)."""
     low, spacing = Fraction(station.frequency_hz), Fraction(network.subcarrier_spacing_hz)
     centre = low + (network.subcarriers - 1) * spacing / 2
-    elements = float(np.prod(network.transmit) * np.prod(network.receive))
-    wavelength = SPEED_OF_LIGHT / network.carrier_hz
+    exact = _exact(network, station)
     return Radar(
         np.array(station.position_m, dtype=np.float64),
-        float(np.sin(station.normal_rad)),
-        float(np.cos(station.normal_rad)),
-        *_double_double(2 * centre / LIGHT),
-        *_double_double(2 * network.subcarriers * spacing / LIGHT),
+        exact.sine[0],
+        exact.cosine[0],
+        *exact.turns,
+        *exact.cells,
         station.frequency_hz / network.carrier_hz,
         int(network.transmit[0]),
         int(network.transmit[1]),
         int(network.receive[0]),
         int(network.receive[1]),
         int(network.subcarriers),
-        float(np.sqrt(network.power / elements) * wavelength / (4 * np.pi) ** 1.5),
+        exact.scale[0],
         float(centre),
         float(network.subcarriers * spacing),
+        exact,
     )

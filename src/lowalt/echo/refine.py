@@ -15,7 +15,7 @@ from lowalt.echo.fast.error_model import (
     pointwise_bound,
     round_up,
 )  # fmt: skip
-from lowalt.echo.fast.layout import layout
+from lowalt.echo.fast.layout import Layout, layout
 from lowalt.echo.fast.polynomials import folding
 from lowalt.echo.fast.range_bounds import SIZE, SPREAD, cut_segments, fill_extents
 from lowalt.echo.fast.strongest_cell import CERTAIN
@@ -43,7 +43,9 @@ class Method(NamedTuple):
     float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials,
     not roots; cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; slow:
     points interpolated in time, from how many nodes in all; spread: largest target radius over range; size_m: largest
-    radius (m); pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of risks.
+    radius (m); pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of risks;
+    again: symbols computed again in double-double, so that complex64 is rounded correctly, and how many of them that
+    leaves open.
     """
 
     error: float | None
@@ -57,12 +59,13 @@ class Method(NamedTuple):
     spread: float
     size_m: float
     pointwise_bound: tuple[float, float]
+    again: tuple[int, int] = (0, 0)
 
 
 def compute(
     scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
-) -> tuple[Found, np.ndarray, Method]:
-    """Return (found, symbols left for the pointwise kernel, method): a cheap plan first, exact where bounds ask.
+) -> tuple[Found, np.ndarray, Method, Layout]:
+    """Return (found, symbols left for the pointwise kernel, method, layout): cheap first, exact where bounds ask.
 
     A symbol is computed again where its bound exceeds the tolerance times the largest value, where its strongest cell
     is not certain to that bound, and where far cells could not be excluded.
@@ -72,7 +75,7 @@ def compute(
     symbols = np.arange(len(refs))
     exact = sample.plan(0.0)
     if not sample.spread < SPREAD_LIMIT or sample.cells(exact) is None:
-        return found, symbols, sample.method(None, exact, 0, 0, len(refs))
+        return found, symbols, sample.method(None, exact, 0, 0, len(refs)), sample.lay
     chosen, error, cheap = exact, None, 0
     if tolerance is not None and len(refs) > PROBES and sample.saving(tolerance) > PROBE_COST:
         probes = symbols[:: -(-len(refs) // PROBES)]
@@ -91,7 +94,7 @@ def compute(
     if len(symbols):
         sample.compute(symbols, exact, True, found)
     left = np.flatnonzero(found.state)
-    return found, left, sample.method(error, chosen, cheap, len(symbols) - len(left), len(left))
+    return found, left, sample.method(error, chosen, cheap, len(symbols) - len(left), len(left)), sample.lay
 
 
 def _least_largest(found: Found) -> float:

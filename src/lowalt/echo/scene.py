@@ -25,7 +25,7 @@ class Rigid(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A checked motion and the square roots of its points' cross sections, which all stations share.
+    """A checked motion and its points' cross sections with their square roots, which all stations share.
 
     Where `rotation` has shape (0, 0, 3, 3), `translation` (N, L, 3) holds positions.
     """
@@ -35,6 +35,7 @@ class Target(NamedTuple):
     points: np.ndarray
     part: np.ndarray
     root_rcs: np.ndarray
+    rcs_m2: np.ndarray
 
 
 class EchoScene(NamedTuple):
@@ -45,6 +46,7 @@ class EchoScene(NamedTuple):
     points: np.ndarray
     part: np.ndarray
     root_rcs: np.ndarray
+    rcs_m2: np.ndarray
     aim: np.ndarray
 
 
@@ -110,7 +112,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
                  (count,), where)  # fmt: skip
     if rcs.min() < 0:
         raise InputError(f"{where}rcs_m2[{int(rcs.argmin())}] is {rcs.min()}, expected square metres >= 0")
-    return Target(rotation, translation, points, part, np.sqrt(rcs))
+    return Target(rotation, translation, points, part, np.sqrt(rcs), rcs)
 
 
 def check(network: Network, station: Station, motion, rcs_m2, aim_m, sample: str = "") -> EchoScene:

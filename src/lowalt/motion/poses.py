@@ -1,6 +1,7 @@
 """Poses: where each rigid part of a target stands at each symbol, in closed form from the initial pose.
 
-Angles are beta_0 + 2 pi F t, never a product of many small rotations, so nothing drifts however long the look.
+Angles are beta_0 + 2 pi F t, never a product of many small rotations, so nothing drifts however long the look. All
+poses have the same bits on every processor: sines and products are those of `kernels` and `portable`.
 """
 
 from typing import NamedTuple
@@ -9,7 +10,15 @@ import numpy as np
 
 from lowalt.common.double_double import two_product
 from lowalt.common.errors import InputError
+from lowalt.common.portable import applied, product
 from lowalt.targets.cloud import Cloud
+
+
+def _kernels():
+    """Return the compiled functions; imported at the first pose, since stages that need none start without numba."""
+    from lowalt.motion import kernels
+
+    return kernels
 
 
 class Poses(NamedTuple):
@@ -50,17 +59,17 @@ def rodrigues(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    cosine, sine = np.cos(angle)[:, None, None], np.sin(angle)[:, None, None]
+    sine, cosine = (values[:, None, None] for values in _kernels().sines_cosines(np.ascontiguousarray(angle, float)))
     return cosine * np.eye(3) + sine * cross + (1.0 - cosine) * np.outer(axis, axis)
 
 
 def attitude(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
     """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq. 18."""
-    (a, b, c), (d, e, f) = np.cos([yaw_rad, pitch_rad, roll_rad]), np.sin([yaw_rad, pitch_rad, roll_rad])
+    (d, e, f), (a, b, c) = _kernels().sines_cosines(np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64))
     yaw = np.array([[a, -d, 0.0], [d, a, 0.0], [0.0, 0.0, 1.0]])
     pitch = np.array([[1.0, 0.0, 0.0], [0.0, b, -e], [0.0, e, b]])
     roll = np.array([[c, 0.0, f], [0.0, 1.0, 0.0], [-f, 0.0, c]])
-    return yaw @ pitch @ roll
+    return product(product(yaw, pitch), roll)
 
 
 def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
@@ -72,7 +81,7 @@ def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
     x, y, z = axes.T
     turn[2, :, 2, 1], turn[2, :, 0, 2], turn[2, :, 1, 0] = x, y, z
     turn[2] -= turn[2].swapaxes(1, 2)
-    result[..., :3, 3] = -(turn @ hinges[..., None])[..., 0]
+    result[..., :3, 3] = -applied(turn, hinges)
     result[0, :, :3, 3] += hinges
     result[0, :, 3, 3] = 1.0
     return result
@@ -92,8 +101,10 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
     if wings:
         flap = cloud.record["flap"]
         beat = row["phase_0_rad"] + angles.pop("cycle")
-        angles["shoulder"] = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * np.cos(beat)
-        angles["fold"] = np.radians(flap["fold_amplitude_deg"]) * np.cos(beat - np.radians(flap["fold_lag_deg"]))
+        _, now = _kernels().sines_cosines(beat)
+        _, later = _kernels().sines_cosines(beat - np.radians(flap["fold_lag_deg"]))
+        angles["shoulder"] = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * now
+        angles["fold"] = np.radians(flap["fold_amplitude_deg"]) * later
         for part in wings:
             phases[part] = ("shoulder" if cloud.parents[part] < 0 else "fold", 0.0)
     known = {name: np.isfinite(angle).all() for name, angle in angles.items()}
@@ -130,11 +141,11 @@ def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.nda
     one: tuple[str, ...] = ()
     columns = {one: np.ones(len(times_s))}
     for name in dict.fromkeys(name for name, _ in phases.values()):
-        columns["cos " + name,], columns["sin " + name,] = np.cos(angles[name]), np.sin(angles[name])
+        columns["sin " + name,], columns["cos " + name,] = _kernels().sines_cosines(angles[name])
     moving = list(phases)
-    shift = np.array([phase for _, phase in phases.values()])[:, None, None]
     still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
-    c, s = np.cos(shift), np.sin(shift)
+    s, c = _kernels().sines_cosines(np.array([phase for _, phase in phases.values()], dtype=np.float64))
+    s, c = s[:, None, None], c[:, None, None]
     own = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
     terms: list[tuple[list[tuple[str, ...]], np.ndarray]] = []
     for part, parent in enumerate(cloud.parents):
@@ -149,7 +160,7 @@ def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.nda
                     if outer + inner not in columns:
                         columns[outer + inner] = columns[outer] * columns[inner]
             names = [outer + inner for outer in before for inner in names]
-            matrices = (carrier[:, None] @ matrices).reshape(-1, 4, 4)
+            matrices = product(carrier[:, None], matrices).reshape(-1, 4, 4)
         terms.append((names, matrices))
     places = {name: index for index, name in enumerate(columns)}
     result = np.zeros((len(columns), len(terms), 4, 4))
@@ -164,7 +175,7 @@ def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
         row[name] + more for name, more in zip(("yaw_rad", "pitch_rad", "roll_rad"), tilt_rad.T, strict=True)
     )
     right, front, up = np.eye(3)
-    return rodrigues(up, yaw) @ rodrigues(right, pitch) @ rodrigues(front, roll)
+    return product(product(rodrigues(up, yaw), rodrigues(right, pitch)), rodrigues(front, roll))
 
 
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
@@ -172,7 +183,7 @@ def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np
     frames = len(cloud.track)
     place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
     first = np.minimum(place.astype(np.int64), frames - 1)
-    turned = (cloud.track.reshape(-1, 3) @ body.T).reshape(frames, -1)
+    turned = _kernels().product(cloud.track.reshape(-1, 3), body.T).reshape(frames, -1)
     before, result = turned.take(first, axis=0), turned.take((first + 1) % frames, axis=0)
     result -= before
     result *= (place - first)[:, None]
@@ -205,17 +216,17 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
         _perturbed(cloud, {}, {}, more or {})
         translation = _track(cloud, row, times_s, body)
         if tilt is not None:
-            translation = np.einsum("nij,nlj->nli", turned, translation)
+            translation = applied(turned[:, None], translation)
         translation += path[:, None]
         return Poses(np.broadcast_to(np.zeros(()), (count, parts, 3, 3)), translation)
     functions, matrices = _series(cloud, row, times_s, more or {})
-    matrices = body @ matrices[..., :3, :]
+    matrices = product(body, matrices[..., :3, :])
     terms = functions.shape[1]
-    rotation = (functions @ matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
-    translation = (functions @ matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    rotation = _kernels().product(functions, matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
+    translation = _kernels().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
     if tilt is not None:
-        rotation = turned[:, None] @ rotation
-        translation = np.einsum("nij,npj->npi", turned, translation)
+        rotation = product(turned[:, None], rotation)
+        translation = applied(turned[:, None], translation)
     translation += path[:, None]
     return Poses(rotation, translation)
 

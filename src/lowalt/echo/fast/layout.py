@@ -29,6 +29,9 @@ class Layout(NamedTuple):
     """(groups,) largest distance of the group's points from its centre (m)."""
     total: float
     """Sum of all amplitudes."""
+    root: np.ndarray
+    rcs: np.ndarray
+    """(padded L,) square roots of the points' cross sections, and these (m2); zero in the padding."""
 
 
 @LEAN
@@ -65,16 +68,18 @@ def layout(scene: EchoScene, peak: float) -> Layout:
     count = len(scene.points) if rigid else scene.translation.shape[1]
     if rigid and (scene.part[1:] < scene.part[:-1]).any():
         order = np.argsort(scene.part, kind="stable")
-        points, part, root = scene.points[order], scene.part[order], scene.root_rcs[order]
+        points, part = scene.points[order], scene.part[order]
+        root, rcs = scene.root_rcs[order], scene.rcs_m2[order]
     else:
-        points, part, root = scene.points, scene.part, scene.root_rcs
-    amplitude = np.zeros(max(-(-count // MULTIPLE), 1) * MULTIPLE)
-    amplitude[:count] = root * peak
+        points, part, root, rcs = scene.points, scene.part, scene.root_rcs, scene.rcs_m2
+    amplitude, padded_root, padded_rcs = np.zeros((3, max(-(-count // MULTIPLE), 1) * MULTIPLE))
+    amplitude[:count], padded_root[:count], padded_rcs[:count] = root * peak, root, rcs
     empty = np.zeros(0)
     if not rigid:
         nothing = np.zeros(0, np.int64)
         return Layout(
-            empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, float(amplitude.sum())
+            empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty,
+            float(amplitude.sum()), padded_root, padded_rcs,
         )  # fmt: skip
     # Groups are moved in whole multiples of MULTIPLE points, so the arrays go on beyond the last point.
     x, y, z = np.zeros((3, count + MULTIPLE))
@@ -82,4 +87,16 @@ def layout(scene: EchoScene, peak: float) -> Layout:
     centres, radii = np.empty((count, 3)), np.empty(count)
     groups = _group(points, part, tile_size(len(amplitude)), x, y, z, starts, parts, centres, radii)
     total = float(amplitude.sum())
-    return Layout(x, y, z, amplitude, parts[:groups], starts[: groups + 1], centres[:groups], radii[:groups], total)
+    return Layout(
+        x,
+        y,
+        z,
+        amplitude,
+        parts[:groups],
+        starts[: groups + 1],
+        centres[:groups],
+        radii[:groups],
+        total,
+        padded_root,
+        padded_rcs,
+    )

@@ -47,7 +47,9 @@ def slow_parts(scene: EchoScene, radar: Radar, lay: Layout) -> SlowParts | None:
 
 def subset(scene: EchoScene, mask: np.ndarray) -> EchoScene:
     """Return the scene with only the points of `mask` (L,) bool."""
-    return scene._replace(points=scene.points[mask], part=scene.part[mask], root_rcs=scene.root_rcs[mask])
+    return scene._replace(
+        points=scene.points[mask], part=scene.part[mask], root_rcs=scene.root_rcs[mask], rcs_m2=scene.rcs_m2[mask]
+    )
 
 
 def interpolated(

@@ -1,0 +1,118 @@
+"""Values whose nearest complex64 their bound leaves open are computed again in double-double (Ziv's strategy).
+
+After that the conversion of a signal to complex64 rounds the true values correctly, and so does not depend on the
+processor, nor on the kernel that computed them. Source: Ziv 1991, "Fast evaluation of elementary mathematical functions
+with correctly rounded last bit", ACM TOMS 17.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from lowalt.common.jit import INLINED, LEAN
+from lowalt.echo.fast.layout import Layout
+from lowalt.echo.fast.workspace import Found
+from lowalt.echo.pointwise import sums as pointwise
+from lowalt.echo.radar import Radar
+from lowalt.echo.rounding.sums import ROWS, cell_value
+from lowalt.echo.scene import EchoScene
+
+ERROR = 2.0**-70
+"""Bound of a double-double cell's error relative to the sum of amplitudes."""
+
+
+@INLINED
+def same_single(x, error):
+    """Return whether all numbers within `error` of x have the same nearest float32."""
+    margin = error + 1e-15 * abs(x)
+    return np.float32(x - margin) == np.float32(x + margin)
+
+
+@LEAN
+def doubtful(values, bounds, totals, gaps, out):
+    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds leave open; returns how many.
+
+    A symbol all of whose amplitudes are zero is zero exactly.
+    """
+    count = 0
+    for n in range(len(values)):
+        decided = same_single(values[n].real, bounds[n]) and same_single(values[n].imag, bounds[n])
+        if totals[n] > 0.0 and not (decided and gaps[n] > 0.0):
+            out[count] = n
+            count += 1
+    return count
+
+
+@INLINED
+def to_odd(high, low, bits):
+    """Return the double that rounds to float32 as the double-double does: high, unless it hides on which side low is.
+
+    A sum that is not a double is replaced by the neighbour whose last bit is one (rounding to odd); more than one bit
+    lies between the two formats, so the second rounding cannot go wrong. bits (1,) int64: work array.
+    """
+    if low == 0.0 or high == 0.0:
+        return high
+    bits.view(np.float64)[0] = high
+    if bits[0] & 1 == 0:
+        bits[0] += 1 if (low > 0.0) == (high > 0.0) else -1
+    return bits.view(np.float64)[0]
+
+
+@LEAN
+def compute_again(scene, lay, radar, symbols, found, work, bits):
+    """Replace the values of `symbols` (K,) in their strongest cells by those of double-double sums.
+
+    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns in how many the error of these
+    sums still leaves the nearest complex64 open.
+    """
+    still = 0
+    for n in symbols:
+        real, imag = cell_value(scene, lay, radar, n, found.cells[n], work)
+        error = ERROR * found.totals[n]
+        still += not (same_double(real, error) and same_double(imag, error))
+        found.values[n] = complex(to_odd(real[0], real[1], bits), to_odd(imag[0], imag[1], bits))
+    return still
+
+
+@INLINED
+def same_double(x, error):
+    """Return whether all numbers within `error` of a double-double have the same nearest float32."""
+    return np.float32(x[0] + (x[1] - error)) == np.float32(x[0] + (x[1] + error))
+
+
+def correct(
+    scene: EchoScene, lay: Layout, radar: Radar, refs: np.ndarray,
+    aims: tuple[float, float], found: Found, pointwise_bound: tuple[float, float],
+) -> tuple[int, int]:  # fmt: skip
+    """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
+
+    Returns how many symbols were computed again, and how many of them double-double leaves open. Cells whose strengths
+    differ by less than its error count as equal: the lowest index wins.
+    """
+    open_ones = np.empty(len(refs), np.int64)
+    open_ones = open_ones[: doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)]
+    if not len(open_ones):
+        return 0, 0
+    work, bits = np.empty((ROWS, len(lay.root) + 4)), np.empty(1, np.int64)
+    for n in open_ones[found.gaps[open_ones] <= 0.0]:
+        cells = _contenders(scene, radar, refs, aims, found, int(n), pointwise_bound)
+        if len(cells) > 1:
+            pairs = [cell_value(scene, lay, radar, n, cell, work) for cell in cells]
+            strengths = [sum((Fraction(high) + Fraction(low)) ** 2 for high, low in pair) for pair in pairs]
+            least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(abs(found.values[n]))
+            cells = [cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least]
+        found.cells[n] = min(cells)
+    return len(open_ones), compute_again(scene, lay, radar, open_ones, found, work, bits)
+
+
+def _contenders(scene, radar, refs, aims, found: Found, n: int, pointwise_bound) -> list[int]:
+    """Return the cells of symbol n that may be the strongest for all that float64 can tell."""
+    part = slice(n, n + 1)
+    here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
+    direct = pointwise.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))
+    one, risks, cells = Found.empty(1), np.zeros(1), np.empty((1, radar.subcarriers), np.complex128)
+    pointwise.signal(here, radar, refs[part], np.arange(1), aims, direct, one, risks)
+    pointwise.matrix(here, radar, refs[part], aims, direct, True, cells)
+    strengths = abs(cells[0])
+    bound = one.totals[0] * pointwise_bound[0] + risks[0] * pointwise_bound[1]
+    return np.flatnonzero(strengths >= strengths.max() - 2 * bound).tolist()

@@ -1,0 +1,124 @@
+"""One range cell of one symbol in double-double: the sum of the paper over all points, to about 2^-70 of its terms.
+
+Points are worked on in short loops without fast-math flags: vector instructions may do them, in any width, since no
+loop adds over points but the last, which keeps the points' order.
+"""
+
+import numpy as np
+
+from lowalt.common.exact.arithmetic import add, divide, multiply, product, root, subtract, two_sum
+from lowalt.common.exact.sines import dirichlet, sine_cosine
+from lowalt.common.jit import INLINED, LEAN
+
+X, Y, Z, SIDE, UP, TURN, CELL, AMPLITUDE = range(0, 16, 2)
+"""Rows of the work array (16, points), the low half in the row that follows: vector from the station (m), half turns of
+array phase per element, horizontally and vertically, turns of phase, distance from the cell over M, and amplitude."""
+ROWS = 16
+
+
+@LEAN
+def place(scene, lay, station, n, work):
+    """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands at one metre."""
+    for i in range(work.shape[1]):
+        for row in range(6):
+            work[row, i] = 0.0 if row else 1.0
+    if scene.rotation.shape[0] == 0:
+        for i in range(scene.translation.shape[1]):
+            for axis in range(3):
+                at = two_sum(scene.translation[n, i, axis], -station[axis])
+                work[2 * axis, i], work[2 * axis + 1, i] = at
+        return
+    for group in range(len(lay.parts)):
+        p = lay.parts[group]
+        low, high = np.uint64(lay.starts[group]), np.uint64(lay.starts[group + 1])
+        for axis in range(3):
+            a, b, c = scene.rotation[n, p, axis, 0], scene.rotation[n, p, axis, 1], scene.rotation[n, p, axis, 2]
+            origin = two_sum(scene.translation[n, p, axis], -station[axis])
+            row, below = np.uint64(2 * axis), np.uint64(2 * axis + 1)
+            # Whole vectors of four: the next group overwrites what is too much, and the padding has no weight.
+            for i in range(low, low + (high - low + np.uint64(3)) // np.uint64(4) * np.uint64(4)):
+                at = add(add(product(a, lay.x[i]), product(b, lay.y[i])), product(c, lay.z[i]))
+                work[row, i], work[below, i] = add(at, origin)
+
+
+@INLINED
+def cosines(x, y, z, constants):
+    """Return (range, its inverse, horizontal and vertical direction cosine) of a vector from the station (m)."""
+    r = root(add(add(multiply(x, x), multiply(y, y)), multiply(z, z)))
+    inverse = divide((1.0, 0.0), r)
+    across = subtract(multiply(constants.cosine, y), multiply(constants.sine, x))
+    return r, inverse, multiply(across, inverse), multiply(z, inverse)
+
+
+@LEAN
+def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
+    """Fill rows SIDE to AMPLITUDE from X, Y, Z; aims: the beams' direction cosines; cell, count: whole doubles."""
+    for i in range(np.uint64(len(root_rcs))):
+        x, y, z = (work[0, i], work[1, i]), (work[2, i], work[3, i]), (work[4, i], work[5, i])
+        r, inverse, psi, omega = cosines(x, y, z, constants)
+        psi, omega = subtract(psi, aims[0]), subtract(omega, aims[1])
+        work[6, i], work[7, i] = multiply(constants.half_kappa, psi)
+        work[8, i], work[9, i] = multiply(constants.half_kappa, omega)
+        turn = add(multiply(constants.phase_h, psi), multiply(constants.phase_v, omega))
+        work[10, i], work[11, i] = subtract(turn, multiply(constants.turns, r))
+        away = subtract((cell, 0.0), multiply(constants.cells, r))
+        work[12, i], work[13, i] = divide(away, (count, 0.0))
+        high = root_rcs[i]
+        p, e = product(high, high)
+        low = ((rcs_m2[i] - p) - e) / (2.0 * high if high > 0.0 else 1.0)
+        work[14, i], work[15, i] = multiply((high, low), multiply(inverse, inverse))
+
+
+@LEAN
+def times_dirichlet(work, row, count, twice, points):
+    """Multiply the amplitudes by U_{count-1} of a row's half turns, or by its square."""
+    row, below = np.uint64(row), np.uint64(row + 1)
+    for i in range(np.uint64(points)):
+        u = dirichlet((work[row, i], work[below, i]), count)
+        if twice:
+            u = multiply(u, u)
+        work[14, i], work[15, i] = multiply((work[14, i], work[15, i]), u)
+
+
+@LEAN
+def wave(work, points):
+    """Replace rows TURN and CELL by the real and imaginary parts of all points."""
+    for i in range(np.uint64(points)):
+        s, c = sine_cosine((work[10, i], work[11, i]))
+        a = (work[14, i], work[15, i])
+        work[10, i], work[11, i] = multiply(a, c)
+        work[12, i], work[13, i] = multiply(a, s)
+
+
+@LEAN
+def cell_value(scene, lay, radar, n, cell, work):
+    """Return the real and imaginary part, double-doubles, of range cell `cell` at symbol n.
+
+    radar: `radar.Radar`, of which whole numbers, the station's position and the double-doubles are used; work (ROWS,
+    padded L + 4): work array. No point may stand in the station.
+    """
+    constants = radar.exact
+    points, count = len(lay.root), float(radar.subcarriers)
+    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
+    z = two_sum(scene.aim[2], -radar.station[2])
+    _, _, psi0, omega0 = cosines(x, y, z, constants)
+    place(scene, lay, radar.station, n, work)
+    geometry(work, lay.root, lay.rcs, constants, (psi0, omega0), float(cell), count)
+    for row, transmit, receive in (
+        (6, radar.transmit_h, radar.receive_h),
+        (8, radar.transmit_v, radar.receive_v),
+    ):
+        times_dirichlet(work, row, float(transmit), transmit == receive, points)
+        if transmit != receive:
+            times_dirichlet(work, row, float(receive), False, points)
+    times_dirichlet(work, 12, count, False, points)
+    wave(work, points)
+    real, imag = (0.0, 0.0), (0.0, 0.0)
+    for i in range(points):
+        real, imag = add(real, (work[10, i], work[11, i])), add(imag, (work[12, i], work[13, i]))
+    factor = divide(constants.scale, (count, 0.0))
+    real, imag = multiply(real, factor), multiply(imag, factor)
+    # The cell's own phase, exp(j pi (M - 1) m / M), reduced in whole numbers.
+    whole = (radar.subcarriers - 1) * cell % (2 * radar.subcarriers)
+    s, c = sine_cosine(divide((float(whole), 0.0), (2.0 * count, 0.0)))
+    return subtract(multiply(real, c), multiply(imag, s)), add(multiply(real, s), multiply(imag, c))
