@@ -5,7 +5,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.common.errors import InputError
@@ -51,6 +51,7 @@ def row(**values: float) -> dict:
     return {"subtype": "test", "category": "UAV", "group": "seen", "model": 0, **rest, **values}
 
 
+@settings(deadline=None)
 @given(st.lists(st.floats(-10, 10), min_size=3, max_size=3))
 def test_attitude_is_a_rotation(angles):
     matrix = attitude(*angles)

@@ -110,7 +110,7 @@ class _Sample:
         self.scene, self.radar, self.refs, self.aims = scene, radar, refs, aims
         self.peak = radar.scale * radar.transmit_h * radar.transmit_v * radar.receive_h * radar.receive_v
         self.lay = layout(scene, self.peak)
-        self.extents = np.empty((len(refs), 4))
+        self.extents = np.empty((len(refs), 5))
         self.first = int(scene.part[0]) if len(scene.part) else 0
         self.slow_parts: SlowParts | None = None
         self.slow, self.nodes = 0, 0

@@ -12,7 +12,7 @@ from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE
 from lowalt.echo.fast.error_model import SINGLE_BLOCK
-from lowalt.echo.fast.range_bounds import END, SIZE, SPREAD, START
+from lowalt.echo.fast.range_bounds import END, MEAN, SIZE, SPREAD, START
 from lowalt.echo.fast.segment import constants, fill_offsets, fit_gains
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN, certify
 from lowalt.echo.fast.vector_loops import TILE
@@ -139,6 +139,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             peaks = scale / (1.0 - extents[i, SPREAD]) ** 2
             summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
+            bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
             if len(slow.moments):
                 away = (refs[i, REST] - centre) / half
                 add_slow(slow.moments[i], refs[i, TURN], away, 1.0 / (r * r), moments)
@@ -215,5 +216,6 @@ def moments_at(scene, lay, radar, q, symbols, aims, approximation, work, out):
             out.sums[i, 0], out.sums[i, 1] = total, second
             peaks = lay.total / (1.0 - symbols.extents[i, SPREAD]) ** 2
             out.errors[i] = total * plan.share + peaks * (plan.peak + gains)
+            out.errors[i] += plan.phase * min(total * symbols.extents[i, SIZE], peaks * symbols.extents[i, MEAN])
             out.errors[i] += rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
     return True

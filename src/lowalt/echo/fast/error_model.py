@@ -27,12 +27,14 @@ class Functions(NamedTuple):
 
 class EchoPlan(NamedTuple):
     """How a sample is computed. `fit`: error of gains and cell kernels; `share`, `peak`: the other errors' bound
-    relative to the sum of amplitudes and to the sum of peak amplitudes; `single`: float32 after the phase; `near`:
+    relative to the sum of amplitudes and to the sum of peak amplitudes; `phase`: rounding of the phase relative to the
+    sum of amplitudes times distances from the reference, per metre; `single`: float32 after the phase; `near`:
     ranges by polynomials rather than roots."""
 
     fit: float
     share: float
     peak: float
+    phase: float
     single: bool
     near: bool
     functions: Functions
@@ -101,12 +103,12 @@ def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Ech
             break
     # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
     # and the products that make the amplitude another 16.
-    rounding = (16 * wave + 8 * array_phase + 30) * unit + (85 + 16) * coarse + tiles * unit
+    rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + tiles * unit
     share = wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
     kind = np.float32 if single else np.float64
     functions = Functions(excess, inverse, cosine.astype(kind), sine.astype(kind))
     peak = array_phase * inverse_error + 8 * array_phase * unit
-    return EchoPlan(max(part, FINEST), share, peak, single, bool(near), functions)
+    return EchoPlan(max(part, FINEST), share, peak, 64 * np.pi * turns * unit, single, bool(near), functions)
 
 
 def pointwise_bound(radar: Radar, size_m: float, points: int) -> tuple[float, float]:

@@ -27,6 +27,10 @@ class Layout(NamedTuple):
     """(groups, 3) m, the middle of each group's bounding box, in its part's frame."""
     radii: np.ndarray
     """(groups,) largest distance of the group's points from its centre (m)."""
+    weights: np.ndarray
+    strays: np.ndarray
+    """(groups,) the points' share of the sum of amplitudes, and that share times their mean distance from the centre
+    (m); without rotations the weights (L,) are those of all points."""
     total: float
     """Sum of all amplitudes."""
     root: np.ndarray
@@ -35,7 +39,7 @@ class Layout(NamedTuple):
 
 
 @LEAN
-def _group(points, part, tile, x, y, z, starts, parts, centres, radii):
+def _group(points, part, share, tile, x, y, z, starts, parts, centres, radii, weights, strays):
     """Copy the points by coordinate and cut them into groups of one part; returns how many groups there are."""
     count, groups = len(points), 0
     for i in range(count):
@@ -50,14 +54,17 @@ def _group(points, part, tile, x, y, z, starts, parts, centres, radii):
             for i in range(starts[group], starts[group + 1]):
                 low, high = min(low, points[i, j]), max(high, points[i, j])
             centres[group, j] = 0.5 * (low + high)
-        widest = 0.0
+        widest = weights[group] = strays[group] = 0.0
         for i in range(starts[group], starts[group + 1]):
             a, b, c = (
                 points[i, 0] - centres[group, 0],
                 points[i, 1] - centres[group, 1],
                 points[i, 2] - centres[group, 2],
             )
-            widest = max(widest, a * a + b * b + c * c)
+            square = a * a + b * b + c * c
+            widest = max(widest, square)
+            weights[group] += share[i]
+            strays[group] += share[i] * math.sqrt(square)
         radii[group] = math.sqrt(widest)
     return groups
 
@@ -74,19 +81,22 @@ def layout(scene: EchoScene, peak: float) -> Layout:
         points, part, root, rcs = scene.points, scene.part, scene.root_rcs, scene.rcs_m2
     amplitude, padded_root, padded_rcs = np.zeros((3, max(-(-count // MULTIPLE), 1) * MULTIPLE))
     amplitude[:count], padded_root[:count], padded_rcs[:count] = root * peak, root, rcs
+    total = float(amplitude.sum())
+    share = amplitude / total if total > 0 else amplitude
     empty = np.zeros(0)
     if not rigid:
         nothing = np.zeros(0, np.int64)
         return Layout(
-            empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty,
-            float(amplitude.sum()), padded_root, padded_rcs,
+            empty, empty, empty, amplitude, nothing, nothing, np.zeros((0, 3)), empty, share[:count], empty,
+            total, padded_root, padded_rcs,
         )  # fmt: skip
     # Groups are moved in whole multiples of MULTIPLE points, so the arrays go on beyond the last point.
     x, y, z = np.zeros((3, count + MULTIPLE))
     starts, parts = np.empty(count + 1, np.int64), np.empty(count, np.int64)
-    centres, radii = np.empty((count, 3)), np.empty(count)
-    groups = _group(points, part, tile_size(len(amplitude)), x, y, z, starts, parts, centres, radii)
-    total = float(amplitude.sum())
+    centres, (radii, weights, strays) = np.empty((count, 3)), np.empty((3, count))
+    groups = _group(
+        points, part, share, tile_size(len(amplitude)), x, y, z, starts, parts, centres, radii, weights, strays
+    )
     return Layout(
         x,
         y,
@@ -96,6 +106,8 @@ def layout(scene: EchoScene, peak: float) -> Layout:
         starts[: groups + 1],
         centres[:groups],
         radii[:groups],
+        weights[:groups],
+        strays[:groups],
         total,
         padded_root,
         padded_rcs,

@@ -7,9 +7,9 @@ import numpy as np
 from lowalt.common.jit import LEAN
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 
-PSI, OMEGA, SPREAD, SIZE = range(4)
+PSI, OMEGA, SPREAD, SIZE, MEAN = range(5)
 """Columns of the table of extents: direction cosines of the reference, and the largest distance of a point from the
-reference, over the range and in metres."""
+reference, over the range and in metres, and a bound of its mean weighted with the amplitudes (m)."""
 START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
 """Columns of the table of segments: first symbol, end, centre and half-width of the points' direction cosines."""
 DRIFT = 1.0
@@ -18,7 +18,7 @@ DRIFT = 1.0
 
 @LEAN
 def fill_extents(scene, first, lay, refs, radar, out):
-    """Fill the table of extents out (N, 4) and return its largest SPREAD.
+    """Fill the table of extents out (N, 5) and return its largest SPREAD.
 
     first: the part (or point, without rotations) whose translation is the reference. Each point of a group is at most
     radius x norm away from the group's moved centre, where `norm` bounds the norm of the part's matrix.
@@ -28,14 +28,14 @@ def fill_extents(scene, first, lay, refs, radar, out):
     worst = 0.0
     for n in range(len(refs)):
         r = refs[n, RANGE]
-        size = 0.0
+        size, mean = 0.0, 0.0
         if rotation.shape[0] == 0:
             for p in range(translation.shape[1]):
                 x = translation[n, p, 0] - translation[n, first, 0]
                 y = translation[n, p, 1] - translation[n, first, 1]
                 z = translation[n, p, 2] - translation[n, first, 2]
-                size = max(size, x * x + y * y + z * z)
-            size = math.sqrt(size)
+                away = math.sqrt(x * x + y * y + z * z)
+                size, mean = max(size, away), mean + lay.weights[p] * away
         else:
             for group in range(len(parts)):
                 p = parts[group]
@@ -46,13 +46,15 @@ def fill_extents(scene, first, lay, refs, radar, out):
                 x += rotation[n, p, 0, 0] * a + rotation[n, p, 0, 1] * b + rotation[n, p, 0, 2] * c
                 y += rotation[n, p, 1, 0] * a + rotation[n, p, 1, 1] * b + rotation[n, p, 1, 2] * c
                 z += rotation[n, p, 2, 0] * a + rotation[n, p, 2, 1] * b + rotation[n, p, 2, 2] * c
-                reach = norm(rotation, n, p) * radii[group] if radii[group] > 0.0 else 0.0
-                size = max(size, math.sqrt(x * x + y * y + z * z) + reach)
+                bound = norm(rotation, n, p) if radii[group] > 0.0 else 0.0
+                away = math.sqrt(x * x + y * y + z * z)
+                size = max(size, away + bound * radii[group])
+                mean += lay.weights[group] * away + bound * lay.strays[group]
         size *= 1.0 + 1e-12
         out[n, PSI] = (radar.cosine * refs[n, Y] - radar.sine * refs[n, X]) / r if r > 0.0 else 0.0
         out[n, OMEGA] = refs[n, Z] / r if r > 0.0 else 0.0
         out[n, SPREAD] = size / r if r > 0.0 else np.inf
-        out[n, SIZE] = size
+        out[n, SIZE], out[n, MEAN] = size, mean * (1.0 + 1e-12)
         worst = max(worst, out[n, SPREAD])
     return worst
 

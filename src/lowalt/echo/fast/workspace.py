@@ -25,7 +25,7 @@ class Approximation(NamedTuple):
 
 class Symbols(NamedTuple):
     """The symbols to compute: index (B,) of each in the sample, and the rows of its tables: reference ranges (B, 7),
-    extents (B, 4), and the segments (S, 6) that B symbols fall into."""
+    extents (B, 5), and the segments (S, 6) that B symbols fall into."""
 
     index: np.ndarray
     refs: np.ndarray

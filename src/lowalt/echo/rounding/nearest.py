@@ -17,7 +17,7 @@ from lowalt.echo.radar import Radar
 from lowalt.echo.rounding.sums import ROWS, cell_value
 from lowalt.echo.scene import EchoScene
 
-ERROR = 2.0**-70
+ERROR = 2.0**-64
 """Bound of a double-double cell's error relative to the sum of amplitudes."""
 
 

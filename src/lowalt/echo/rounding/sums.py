@@ -1,4 +1,4 @@
-"""One range cell of one symbol in double-double: the sum of the paper over all points, to about 2^-70 of its terms.
+"""One range cell of one symbol in double-double: the sum of the paper over all points, to 2^-64 of its terms.
 
 Points are worked on in short loops without fast-math flags: vector instructions may do them, in any width, since no
 loop adds over points but the last, which keeps the points' order.

@@ -118,6 +118,6 @@ def _at_nodes(scene: EchoScene, radar: Radar, slow: SlowParts, poses: tuple, val
     part = np.searchsorted(slow.parts, mine.part) + 1
     there = mine._replace(rotation=rotation, translation=translation, part=part)
     lay = layout(there, peak)
-    extents = np.empty((count, 4))
+    extents = np.empty((count, 5))
     fill_extents(there, 0, lay, refs, radar, extents)
     return there, lay, refs, extents

@@ -1,0 +1,90 @@
+"""Poses and exact echoes have the same bytes whatever the processor: other ones are emulated in processes of their own.
+
+The quick test takes numpy's and the BLAS's vector instructions away. The slow one also compiles the kernels for two
+other processors, which takes some minutes the first time.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lowalt.common.network import Network
+from lowalt.echo.__main__ import signals
+from lowalt.motion import poses
+from lowalt.targets.cloud import Cloud
+from test_echo_command import NETWORK, craft, row
+
+NEW, OLD = "X86_V4 AVX512_ICL AVX512_SPR", "X86_V3 AVX2 FMA3"
+LIBRARIES = {"NPY_DISABLE_CPU_FEATURES": f"{NEW} {OLD}", "OPENBLAS_CORETYPE": "Nehalem"}
+PROCESSORS = {
+    "haswell": {
+        "NPY_DISABLE_CPU_FEATURES": NEW, "OPENBLAS_CORETYPE": "Haswell", "NUMBA_CPU_NAME": "haswell",
+        "NUMBA_CPU_FEATURES": "+sse4.2,+avx,+avx2,+fma,+bmi,+bmi2,+popcnt,+lzcnt",
+    },
+    "nehalem": LIBRARIES | {"NUMBA_CPU_NAME": "nehalem", "NUMBA_CPU_FEATURES": "+sse4.2,+popcnt"},
+}  # fmt: skip
+
+
+def bird() -> Cloud:
+    """A body and a wing of two hinged segments."""
+    rng, nothing = np.random.default_rng(1), [np.nan] * 3
+    flap = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
+    return Cloud(
+        points=rng.normal(scale=0.3, size=(45, 3)), part=np.repeat(np.arange(3), 15), kinds=("body", "wing", "wing"),
+        names=("body", "inner", "outer"), parents=np.array([-1, -1, 1]),
+        hinges=np.array([nothing, [0.1, 0.0, 0.0], [0.4, 0.0, 0.0]]),
+        axes=np.array([nothing, [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]), normals=np.full((45, 3), np.nan),
+        rcs_m2=rng.uniform(0.1, 2.0, 45),
+        record={"subtype": "Crow", "category": "Bird", "source": "test", "checksum": "0", "flap": flap},
+    )  # fmt: skip
+
+
+def walker() -> Cloud:
+    """Seven nodes of a cyclic recording."""
+    rng, nothing = np.random.default_rng(2), np.full((7, 3), np.nan)
+    return Cloud(
+        points=np.zeros((7, 3)), part=np.arange(7), kinds=("node",) * 7, names=tuple(f"node {i}" for i in range(7)),
+        parents=np.full(7, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(7),
+        record={"subtype": "Walker", "category": "Pedestrian", "source": "test", "checksum": "0",
+                "track_rate_hz": 120.0},
+        track=rng.normal(scale=0.5, size=(130, 7, 3)),
+    )  # fmt: skip
+
+
+def digest(count: int) -> str:
+    """SHA-256 of the poses and of the stored signals of `count` motion models of each target."""
+    network, total = Network.from_settings(NETWORK | {"symbols": 400}), hashlib.sha256()
+    for cloud, more in ((craft(), {}), (bird(), {}), (walker(), {"start_s": 0.3, "playback": 0.9})):
+        for model in range(count):
+            motion = row(model) | more | {"subtype": cloud.subtype, "rate_hz": 3.7 + model}
+            for array in poses(cloud, motion, network.times_s):
+                total.update(np.ascontiguousarray(array).tobytes())
+            total.update(signals(network, ["A", "B"], {cloud.subtype: cloud}, [motion], None).tobytes())
+    return total.hexdigest()
+
+
+def digest_on(processor: dict[str, str], count: int, folder: Path) -> str:
+    """The digest as a process of its own computes it, its libraries and compiler told of another processor."""
+    call = [sys.executable, "-c", f"from test_echo_portable import digest; print(digest({count}))"]
+    paths = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    kept = {"NUMBA_CACHE_DIR": str(folder)} if "NUMBA_CPU_NAME" in processor else {}
+    run = subprocess.run(
+        call, env=os.environ | processor | kept | {"PYTHONPATH": paths}, capture_output=True, text=True
+    )
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
+
+
+def test_bytes_do_not_depend_on_the_libraries_vector_instructions(tmp_path):
+    assert digest_on(LIBRARIES, 2, tmp_path) == digest(2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PROCESSORS)
+def test_bytes_do_not_depend_on_the_processor(name, tmp_path):
+    assert digest_on(PROCESSORS[name], 40, tmp_path) == digest(40)
