@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space campaign reference reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -95,6 +95,14 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
+
+# Full disks need root; add MEMORY_GROUP=/sys/fs/cgroup for kills by the kernel's out-of-memory killer.
+KILLS ?= 30
+DISKS ?= 5
+CONFIGFILE ?= config/tiny.yaml
+campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes: make campaign KILLS=100 CONFIGFILE=config/default.yaml
+	$(BIN)/python -m lowalt.workflow.campaign --configfile $(CONFIGFILE) --kills $(KILLS) --disks $(DISKS) \
+		$(if $(MEMORY_GROUP),--memory-group $(MEMORY_GROUP)) --out results/benchmarks/campaign.csv
 
 space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/tiny results/default' (finished, small to large)
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) --out results/reference/space.csv

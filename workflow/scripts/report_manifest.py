@@ -3,6 +3,6 @@
 import json
 from pathlib import Path
 
-from snakemake.script import snakemake
-
-Path(snakemake.output[0]).write_text(json.dumps(snakemake.params.files, indent=1) + "\n")
+# Snakemake puts the object `snakemake` into the script before its first line.
+job = snakemake  # noqa: F821
+Path(job.output[0]).write_text(json.dumps(job.params.files, indent=1) + "\n")

@@ -1,0 +1,43 @@
+"""Training over two nodes: two launchers of torchrun, one process each, do what two processes of one node do."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from lowalt.recognition import schemes
+from test_recognition_training import views, with_training
+
+pytestmark = pytest.mark.slow
+__all__ = ["views"]
+
+
+def launched(arguments, nodes, processes):
+    """Run one training under `nodes` launchers with so many processes each; all must end well."""
+    port = str(20000 + os.getpid() % 20000 + nodes)
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    launchers = []
+    for node in range(nodes):
+        command = [sys.executable, "-m", "torch.distributed.run", "--nnodes", str(nodes), "--node-rank", str(node)]
+        command += ["--nproc-per-node", str(processes), "--master-addr", "127.0.0.1", "--master-port", port]
+        command += ["-m", "lowalt.recognition", *arguments]
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+        launchers.append(subprocess.Popen(command, env=environment, **pipes))
+    for launcher in launchers:
+        said = launcher.communicate(timeout=300)[0]
+        assert launcher.returncode == 0, said[-3000:]
+
+
+def test_two_nodes_of_one_process_train_to_the_bytes_of_one_node_of_two(views, tmp_path):
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    settings = json.dumps(with_training(steps=12, validate_every=6))
+    for name, nodes, processes in (("one", 1, 2), ("two", 2, 1)):
+        line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "AB:VRP+VT"]
+        line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out", str(tmp_path / name)]
+        launched(line, nodes, processes)
+        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == 2
+    for name in ("model.pt", "history.csv"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name

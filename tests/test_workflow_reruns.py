@@ -1,0 +1,273 @@
+"""Reruns are minimal and explained: for every change the jobs of a dry run are those that a model of the stages names.
+
+The finished run is made by `snakemake --touch`: empty files, but every job recorded with its settings, inputs and code,
+which is all that Snakemake's decisions rest on. The model of what follows from what is written down here again, job by
+job, and knows nothing of the Snakefile.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+
+import pytest
+import yaml
+
+from test_workflow import ROOT, workplace
+
+pytest.importorskip("snakemake")
+pytestmark = pytest.mark.workflow
+
+SEEN, UNSEEN = ("dji-mini-2", "crow"), ("nio-et5t-2023", "walking-pedestrian-5")
+OVERLAY = {
+    "run": "test",
+    "targets": {"select": ["Crow", "NIO ET5T 2023", "DJI Mini 2", "Walking Pedestrian 5"]},
+    "motion": {"models": 20, "models_per_chunk": 10},
+    "noise": {"snr_db": [8, float("inf")]},
+    "report": {"cost": False},
+}
+MESH = "meshes/uav/crazyflie_cf2_assembly.stl"
+
+# --- the model: which jobs follow from which ---
+
+PARTS, STATIONS, FOLDS = ("00000", "00001"), ("A", "B", "C"), ("train", "val", "test")
+GROUPS = {"seen": SEEN, "unseen": UNSEEN}
+CHUNKS = [(group, part) for group in GROUPS for part in PARTS]
+TRAININGS = [(protocol, scheme, "0") for protocol in GROUPS for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt")]
+CLOUD = {("cloud", name) for members in GROUPS.values() for name in members}
+MOTION = {("motion", *chunk) for chunk in CHUNKS}
+ECHO = {("echo", *chunk, station) for chunk in CHUNKS for station in STATIONS}
+NOISE = {("noise", *chunk) for chunk in CHUNKS}
+TILES = {("tiles", *chunk) for chunk in CHUNKS}
+SHARD = {("shard", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
+VIEWS = {("views", "48", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
+TRAIN = {("train", *training) for training in TRAININGS}
+EVALUATE = {("evaluate", *training) for training in TRAININGS}
+INDEX, CARD, SETTINGS, REPORT, TABLES = {("index",)}, {("card",)}, {("configuration",)}, {("report",)}, {("tables",)}
+GALLERY, FREEZE, DISTANCES, MANIFEST = {("gallery",)}, {("freeze",)}, {("distances",)}, {("report_manifest",)}
+WHOLE = {
+    *CLOUD, *MOTION, *ECHO, *NOISE, *TILES, *SHARD, *VIEWS, *TRAIN, *EVALUATE, *INDEX, *CARD, *SETTINGS, *REPORT,
+    *TABLES, *GALLERY, *FREEZE, *DISTANCES, *MANIFEST,
+}  # fmt: skip
+
+
+def next_jobs(job):
+    """Jobs that read what a job makes."""
+    rule, *names = job
+    if rule == "cloud":
+        group = next(group for group, members in GROUPS.items() if names[0] in members)
+        own = {work for work in MOTION | ECHO if work[1] == group}
+        return own | GALLERY | FREEZE | DISTANCES | REPORT
+    if rule == "motion":
+        own = {work for work in ECHO | NOISE if list(work[1:3]) == names}
+        own |= {work for work in SHARD if [work[1], work[3]] == names}
+        return (
+            own | FREEZE | (DISTANCES if names[1] == "00000" else set()) | (REPORT if names == [*CHUNKS[0]] else set())
+        )
+    if rule == "echo":
+        return {("noise", *names[:2])}
+    if rule in ("noise", "tiles"):
+        own = {("shard", names[0], fold, names[1]) for fold in FOLDS}
+        return own | ({("tiles", *names)} if rule == "noise" else set())
+    if rule == "shard":
+        return {("views", "48", *names)} | INDEX
+    after = {
+        "index": CARD | VIEWS | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
+        "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": REPORT, "distances": REPORT,
+        "configuration": CARD | REPORT, "report_manifest": REPORT, "card": set(), "report": set(),
+    }  # fmt: skip
+    return after[rule]
+
+
+def with_what_follows(jobs, images=True):
+    """The jobs, all that follow from them, and the temporary tiles that shards are packed from."""
+    found, todo = set(), list(jobs)
+    while todo:
+        job = todo.pop()
+        if job not in found:
+            found.add(job)
+            todo += next_jobs(job)
+    if not images:
+        return found - TILES
+    return found | {("tiles", job[1], job[3]) for job in found if job[0] == "shard"}
+
+
+# --- the changes ---
+
+
+@dataclass
+class Change:
+    """One change of a finished run: an overlay, or a text replaced in a file; the jobs it touches; the reason named."""
+
+    first: set
+    reasons: tuple[str, ...] = ("Params have changed",)
+    overlay: dict = field(default_factory=dict)
+    edit: tuple[str, str, str] | None = None
+    expected: set | None = None
+
+    @property
+    def jobs(self):
+        settings = SETTINGS if self.overlay else set()
+        return with_what_follows(self.first | settings) if self.expected is None else self.expected
+
+
+def code(path, first):
+    """A comment at the end of a source file."""
+    return Change(first, (f"src/lowalt/{path}",), edit=(f"src/lowalt/{path}", "", "\n# edited\n"))
+
+
+TRAINING = {"recognition": {"training": {"steps": 50}}}
+CHANGES = {
+    # The settings of each stage.
+    "seed": Change(WHOLE - MANIFEST, overlay={"seed": 5}),
+    "tilt": Change(MOTION, overlay={"motion": {"tilt_deg": 10.0}}),
+    "guard subcarriers": Change(ECHO | TILES | SHARD | INDEX, overlay={"network": {"guard_subcarriers": 20}}),
+    "tolerance": Change(ECHO, overlay={"echo": {"tolerance": 1e-3}}),
+    "scene": Change(ECHO, ("power.npy",), overlay={"effects": {"adc": {}}}),
+    "SNR list": Change(NOISE | SHARD, overlay={"noise": {"snr_db": [9, float("inf")]}}),
+    "spectra": Change(TILES | INDEX, overlay={"spectra": {"vrp": {"hop": 2}}}),
+    "colour map": Change(TILES | INDEX | TRAIN, overlay={"images": {"colour_map": "magma"}}),
+    "split": Change(SHARD, overlay={"split": {"val": 2, "train": 7}}),
+    "kind of shards": Change(
+        set(),
+        overlay={"shards": {"kind": "signal"}},
+        expected=with_what_follows(SHARD | SETTINGS | MANIFEST, images=False),
+    ),
+    "training steps": Change(TRAIN, overlay=TRAINING),
+    "network": Change(TRAIN, overlay={"recognition": {"network": {"heads": 2}}}),
+    "augmentation": Change(TRAIN, overlay={"recognition": {"augmentation": {"mirror": 0.0}}}),
+    "evaluation batch": Change(EVALUATE, overlay={"recognition": {"evaluation": {"batch": 32}}}),
+    "protocol": Change(
+        TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"protocols": ["unseen"]}}
+    ),
+    "scheme": Change(
+        TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"schemes": ["ABC:VRP+TRP+VT"]}}
+    ),
+    "a second training seed": Change(
+        {(rule, *training[:2], "1") for rule in ("train", "evaluate") for training in TRAININGS} | TABLES | MANIFEST,
+        ("Missing output files",),
+        overlay={"recognition": {"seeds": [0, 1]}},
+    ),
+    # Files of the user.
+    "a target's record": Change(
+        {("cloud", "crow")},
+        edit=("config/targets/bird.yaml", "length: [46, cm, reference]", "length: [47, cm, reference]"),
+    ),
+    "a target's published row": Change(
+        {("cloud", "nio-et5t-2023"), *((work) for work in MOTION if work[1] == "unseen"), *REPORT},
+        edit=("config/targets.csv", "NIO ET5T 2023,,4,,,,,,4.8,", "NIO ET5T 2023,,4,,,,,,4.9,"),
+    ),
+    "a mesh": Change({("cloud", "dji-mini-2")}, (MESH,), edit=(f"inputs/{MESH}", "", "edited\n")),
+    "the table of schemes": Change(TRAIN | TABLES, ("config/schemes.csv",), edit=("config/schemes.csv", "", "\n")),
+    "published accuracy": Change(
+        TABLES | REPORT, ("published_accuracy.csv",), edit=("config/published_accuracy.csv", "", "\n")
+    ),
+    "text of the report": Change(REPORT, ("page.html",), edit=("src/lowalt/report/page.html", "", "<!-- -->\n")),
+    # The code of each stage.
+    "code of clouds": code("targets/bird.py", CLOUD),
+    "code of the gallery": code("targets/gallery.py", GALLERY),
+    "code of motion": code("motion/__main__.py", MOTION),
+    "code of echoes": code("echo/__main__.py", ECHO),
+    "code of noise": code("noise/__main__.py", NOISE),
+    "code of tiles": code("tiles/png.py", TILES | TRAIN | EVALUATE | VIEWS | SHARD),
+    "code of shards": code("shards/write.py", SHARD | INDEX),
+    "code of the card": code("shards/card.py", CARD),
+    "code of views": code("recognition/views.py", VIEWS | TRAIN | EVALUATE),
+    "code of training": code("recognition/training.py", TRAIN | EVALUATE),
+    "code of tables": code("recognition/tables.py", TABLES),
+    "code of distances": code("recognition/distances.py", DISTANCES),
+    "code of the report": code("report/tables.py", REPORT),
+    "nothing": Change(set(), ()),
+}
+
+DRIVER = """
+import contextlib, io, json, os, sys
+from pathlib import Path
+from snakemake.cli import main
+
+for name, (overlay, edit) in json.loads(Path("changes.json").read_text()).items():
+    Path("change.yaml").write_text(overlay)
+    if edit:
+        path, old, new = Path(edit[0]), edit[1], edit[2]
+        before, times = path.read_text(), path.stat()
+        path.write_text(before.replace(old, new, 1) if old else before + new)
+    said = io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        try:
+            main(["--cores", "1", "--dry-run", "--configfile", "overlay.yaml", "change.yaml"])
+        except SystemExit as end:
+            print("exit", end.code)
+    if edit:
+        path.write_text(before)
+        os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+    Path("said").mkdir(exist_ok=True)
+    Path("said", name + ".txt").write_text(said.getvalue())
+"""
+
+
+def snakemake(folder, *arguments):
+    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--configfile", "overlay.yaml", *arguments]
+    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
+    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, (run.stdout + run.stderr)[-4000:]
+    return run.stdout + run.stderr
+
+
+def jobs(text):
+    """The jobs of a dry run as (rule, wildcards except the run's name), each with the reason that is named."""
+    found = {}
+    for rule, body in re.findall(r"^(?:local)?rule (\w+):\n((?:    .*\n)*)", text, re.MULTILINE):
+        if rule == "all":
+            continue
+        rule = "echo" if rule == "echo_in_scene" else rule
+        wildcards = re.search(r"^    wildcards: (.*)$", body, re.MULTILINE)
+        names = dict(pair.split("=", 1) for pair in wildcards[1].split(", ")) if wildcards else {}
+        names.pop("run", None)
+        order = ("subtype", "size", "protocol", "scheme", "train_seed", "group", "fold", "part", "station")
+        found[(rule, *(names[name] for name in order if name in names))] = body[body.index("reason:") :]
+    return found
+
+
+@pytest.fixture(scope="module")
+def dry_runs(tmp_path_factory):
+    """What a dry run says after each change of a finished run."""
+    folder = workplace(tmp_path_factory.mktemp("reruns"))
+    (folder / "src/sitecustomize.py").unlink()
+    # One subtype has meshes of the user; a dry run asks only whether they are there and what they hold.
+    record = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())["DJI Mini 2"]
+    (folder / "mesh.yaml").write_text(yaml.safe_dump({"DJI Mini 2": record}))
+    for part in record["parts"].values():
+        path = folder / "inputs" / part["meshes"][0]["file"]
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("solid\n")
+    records = yaml.safe_load((ROOT / "config/default.yaml").read_text())["targets"]["records"]
+    overlay = OVERLAY | {"targets": OVERLAY["targets"] | {"records": [*records, "mesh.yaml"]}}
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(overlay))
+    text = snakemake(folder, "--dry-run")
+    assert set(jobs(text)) == WHOLE
+    for line in re.findall(r"^    (?:output|benchmark|log): (.*)$", text, re.MULTILINE):
+        for name in line.split(", "):
+            path = folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(name)
+    snakemake(folder, "--touch", "--forceall")
+    plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items()}
+    (folder / "changes.json").write_text(json.dumps(plan))
+    environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
+    run = subprocess.run([sys.executable, "-c", DRIVER], cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, (run.stdout + run.stderr)[-4000:]
+    return {name: (folder / "said" / f"{name}.txt").read_text() for name in CHANGES}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_a_change_re_runs_the_jobs_that_it_touches_and_names_the_reason(dry_runs, name):
+    change, found = CHANGES[name], jobs(dry_runs[name])
+    missing, more = change.jobs - set(found), set(found) - change.jobs
+    assert (sorted(missing), sorted(more)) == ([], []), dry_runs[name][-600:]
+    # A job that follows from another names that one's files; the others must name the change itself.
+    followers = with_what_follows({after for job in change.jobs for after in next_jobs(job)})
+    reasons = [found[job] for job in change.jobs - followers - TILES - SETTINGS - MANIFEST]
+    assert all(any(word in reason for word in change.reasons) for reason in reasons), reasons
+    assert all(any(word in reason for reason in found.values()) for word in change.reasons)

@@ -1,0 +1,94 @@
+"""A data set from two Slurm nodes has the bytes of the local one, and a lost node costs its jobs only.
+
+Needs a Slurm of at least two nodes (`sinfo`) that this user may take down and up again; elsewhere tests are skipped.
+"""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+
+import pytest
+import yaml
+
+from test_workflow import checksums, snakemake, workplace
+from test_workflow_extension import BASE
+
+pytest.importorskip("snakemake_executor_plugin_slurm")
+pytestmark = [pytest.mark.workflow, pytest.mark.slow]
+
+OVERLAY = BASE | {"motion": BASE["motion"] | {"models": 40}}
+CHUNKS = 8
+
+
+def ask(*command):
+    return subprocess.run(command, capture_output=True, text=True).stdout
+
+
+NODES = ask("sinfo", "-h", "-N", "-o", "%N").split() if shutil.which("sinfo") else []
+needs_slurm = pytest.mark.skipif(len(set(NODES)) < 2, reason="no Slurm of two nodes (sinfo)")
+
+
+@pytest.fixture(scope="module")
+def local(tmp_path_factory):
+    folder = workplace(tmp_path_factory.mktemp("local"))
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY))
+    snakemake(folder, "--", "data")
+    return checksums(folder)
+
+
+def start(folder):
+    """Start the run in the queue with groups small enough for both nodes; return the process."""
+    workplace(folder)
+    (folder / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY))
+    (folder / "src/sitecustomize.py").unlink()
+    command = [sys.executable, "-m", "snakemake", "--profile", "profiles/slurm", "--configfile", "overlay.yaml"]
+    command += ["--cores", "1", "--slurm-status-command", "squeue", "--group-components", "clouds=50", "chunks=2", "--"]
+    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
+    with (folder / "said.txt").open("w") as said:
+        return subprocess.Popen([*command, "data"], cwd=folder, env=environment, stdout=said, stderr=subprocess.STDOUT)
+
+
+def submitted(folder):
+    """Slurm's job numbers by the group that was submitted."""
+    text = (folder / "said.txt").read_text()
+    return {number: path for number, path in re.findall(r"SLURM jobid (\d+) \(log: (\S+)/\d+\.log\)", text)}
+
+
+def node_of(job):
+    found = re.search(r"^\s*NodeList=(\S+)", ask("scontrol", "show", "job", job), re.MULTILINE)
+    return found[1] if found else None
+
+
+def chunk_jobs(folder):
+    return [job for job, path in submitted(folder).items() if "chunks" in path]
+
+
+@needs_slurm
+def test_two_nodes_make_the_local_bytes_in_few_jobs(local, tmp_path):
+    run = start(tmp_path)
+    assert run.wait(900) == 0, (tmp_path / "said.txt").read_text()[-3000:]
+    assert {node_of(job) for job in chunk_jobs(tmp_path)} == set(NODES)
+    # Clouds, half as many as there are chunks, and what describes the data set.
+    assert len(submitted(tmp_path)) <= 1 + CHUNKS // 2 + 2
+    assert checksums(tmp_path) == local
+
+
+@needs_slurm
+def test_a_lost_node_costs_its_jobs_only(local, tmp_path):
+    run = start(tmp_path)
+    stop = time.monotonic() + 300
+    while len({node_of(job) for job in chunk_jobs(tmp_path)} & set(NODES)) < 2:
+        assert run.poll() is None and time.monotonic() < stop, (tmp_path / "said.txt").read_text()[-3000:]
+        time.sleep(0.5)
+    lost = NODES[-1]
+    try:
+        ask("scontrol", "update", f"nodename={lost}", "state=down", "reason=lost")
+        assert "down" in ask("sinfo", "-h", "-N", "-n", lost, "-o", "%T")
+        assert run.wait(900) == 0, (tmp_path / "said.txt").read_text()[-3000:]
+    finally:
+        ask("scontrol", "update", f"nodename={lost}", "state=resume")
+    assert {node_of(job) for job in chunk_jobs(tmp_path)[-1:]} == {NODES[0]}
+    assert checksums(tmp_path) == local
