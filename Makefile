@@ -105,7 +105,8 @@ campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes
 		$(if $(MEMORY_GROUP),--memory-group $(MEMORY_GROUP)) --out results/benchmarks/campaign.csv
 
 space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/tiny results/default' (finished, small to large)
-	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) --out results/reference/space.csv
+	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
+		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done

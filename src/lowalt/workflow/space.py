@@ -75,7 +75,7 @@ def units(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> 
     """Return the size of a job in the units of its rule.
 
     echo, noise and shards of signals: complex values; tiles and shards of images: pixels of tiles; views, training and
-    evaluation: pixels of views; everything else: samples.
+    evaluation: pixels of views, where these are cached; everything else: samples.
     """
     samples = _samples(wildcards, plan)
     stations, symbols = len(config["network"]["stations"]), config["network"]["symbols"]
@@ -85,9 +85,15 @@ def units(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> 
         return samples * stations * symbols
     if rule in ("tiles", "shard"):
         return samples * stations * 3 * config["images"]["size"] ** 2
-    if rule in ("views", "train", "evaluate", "transfer_evaluate"):
+    if rule in TRAINING and not config["recognition"]["cache"]:
+        # Samples are read from the shards as they are needed.
+        return 0.0
+    if rule == "views" or rule in TRAINING:
         return samples * stations * 3 * int(wildcards.get("size", config["recognition"]["size"])) ** 2
     return samples
+
+
+TRAINING = ("train", "evaluate", "transfer_evaluate")
 
 
 def _samples(wildcards: Mapping[str, str], plan: Plan) -> float:

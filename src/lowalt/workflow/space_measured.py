@@ -1,6 +1,6 @@
 """`python -m lowalt.workflow.space_measured`: what jobs wrote and held in finished runs, as lines in their size.
 
-Bytes are those of the files a run left, peak memory is what each job wrote into its log.
+Bytes are those of the files a run left, peak memory is what each job wrote into its log or stands in a table of stages.
 """
 
 import argparse
@@ -13,9 +13,10 @@ import numpy as np
 
 from lowalt.common.command import run
 from lowalt.common.config import load_yaml
-from lowalt.common.csv_tables import write_csv
+from lowalt.common.csv_tables import read_csv, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.plan import Plan
+from lowalt.common.splits import FOLDS
 from lowalt.targets.records import load_records
 from lowalt.workflow.space import COLUMNS, units
 
@@ -53,15 +54,18 @@ def line(points: list[tuple[float, float]]) -> tuple[float, float]:
     return base, slope
 
 
+def _plan(config: dict) -> Plan:
+    records = load_records(config["targets"]["table"], config["targets"]["records"])
+    return Plan.of(config, {name: record["published"] for name, record in records.items()})
+
+
 def jobs(folder: Path) -> list[tuple[str, float, float, float]]:
     """Return (rule, units, bytes of its outputs, peak memory in bytes) of every job of a finished run.
 
     Raises: InputError naming the folder where it holds no benchmarks.
     """
     config = load_yaml(folder / "config.yaml")
-    records = load_records(config["targets"]["table"], config["targets"]["records"])
-    plan = Plan.of(config, {name: record["published"] for name, record in records.items()})
-    found = []
+    plan, found = _plan(config), []
     for path in sorted((folder / "benchmarks").rglob("*.jsonl")):
         row = json.loads(path.read_text().splitlines()[-1])
         rule, wildcards = row["rule_name"], row["wildcards"]
@@ -77,9 +81,33 @@ def jobs(folder: Path) -> list[tuple[str, float, float, float]]:
     return found
 
 
-def measure(folders: list[Path]) -> list[dict]:
-    """Return a row of COLUMNS for every rule of finished runs; two runs of different size tell base and slope apart."""
+def largest(path: Path, config: dict) -> list[tuple[str, float, float]]:
+    """Return (rule, units, peak memory in bytes) of the largest jobs of a run by its table of stages, stages.csv.
+
+    config: the run's merged configuration.
+    """
+    plan = _plan(config)
+    group = max(plan.groups, key=lambda name: len(plan.groups[name]))
+    chunk = {"group": group, "part": "00000"}
+    fold = chunk | {"fold": max(FOLDS, key=lambda name: plan.split[name])}
+    names = dict.fromkeys(("motion", "echo", "noise", "tiles"), chunk) | dict.fromkeys(("shard", "views"), fold)
+    if config["echo"]["job"] == "station":
+        names["echo"] = chunk | {"station": next(iter(config["network"]["stations"]))}
+    return [
+        (row["rule"], units(row["rule"], names.get(row["rule"], {}), plan, config), 2**20 * float(row["peak_mib"]))
+        for row in read_csv(path, "rule", "peak_mib")
+    ]
+
+
+def measure(folders: list[Path], stages: Path | None = None, config: dict | None = None) -> list[dict]:
+    """Return a row of COLUMNS for every rule of finished runs; two runs of different size tell base and slope apart.
+
+    stages, config: the table of stages of one more run and its configuration, for peak memory.
+    """
     disk, memory, runs = defaultdict(list), defaultdict(list), defaultdict(set)
+    for rule, size, held in largest(stages, config) if stages else []:
+        memory[rule].append((size, held))
+        runs[rule].add(stages.stem)
     for folder in folders:
         for rule, size, written, held in jobs(folder):
             disk[rule].append((size, written))
@@ -87,7 +115,10 @@ def measure(folders: list[Path]) -> list[dict]:
             runs[rule].add(folder.name)
     rows = []
     for rule in sorted(disk):
-        (disk_base, disk_slope), (memory_base, memory_slope) = line(disk[rule]), line(memory[rule])
+        disk_base, disk_slope = line(disk[rule])
+        # Jobs of one run differ too little in size to tell how memory grows.
+        points = memory[rule] if len(runs[rule]) > 1 else [(0.0, max(held for _, held in memory[rule]))]
+        memory_base, memory_slope = line(points)
         figures = (disk_base, disk_slope, memory_base / 2**20, memory_slope)
         texts = [f"{value:.6g}" for value in figures]
         temporary = "yes" if rule in TEMPORARY else "no"
@@ -99,9 +130,11 @@ def main(arguments: list[str]) -> None:
     """Measure the disk and memory of the jobs of finished runs and write the table of figures."""
     options = argparse.ArgumentParser(prog="python -m lowalt.workflow.space_measured", description=main.__doc__)
     options.add_argument("--runs", nargs="+", required=True, type=Path, help="folders of finished runs, small to large")
+    options.add_argument("--stages", type=Path, help="table of stages of one more run (stages.csv), for peak memory")
+    options.add_argument("--config", help="configuration of that run (.yaml)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
-    write_csv(given.out, COLUMNS, measure(given.runs))
+    write_csv(given.out, COLUMNS, measure(given.runs, given.stages, load_yaml(given.config) if given.config else None))
 
 
 if __name__ == "__main__":
