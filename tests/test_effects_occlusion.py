@@ -213,8 +213,8 @@ def test_capsules_agree_with_points_along_the_ray():
 def test_strength_scales_and_a_target_without_its_surfaces_is_refused(tmp_path):
     view, _ = built("DJI Mini 2")
     hidden = occlusion.hidden(view)
-    assert (occlusion.visible(occlusion.DEFAULTS, view) == ~hidden).all()
-    assert abs(occlusion.visible({"strength": 1e-9}, view) - 1).max() < 1e-8
+    assert (occlusion.visible({"strength": 1.0, "thin_waves": 0.0}, view) == ~hidden).all()
+    assert abs(occlusion.visible({**occlusion.DEFAULTS, "strength": 1e-9}, view) - 1).max() < 1e-8
     assert occlusion.idle({"strength": 0.0})
     with pytest.raises(
         InputError, match=r"DJI Mini 2 has no surfaces, make them with python -m lowalt\.targets\.occluders"
@@ -277,3 +277,18 @@ def test_the_surfaces_of_a_users_mesh_lie_where_its_cloud_does(name):
     found = occlusion.hidden(view)
     assert (found[200] == cast(view, 200)).all()
     assert 0.2 < found.mean() < 0.8
+
+
+@pytest.mark.parametrize("name, widest, narrow", [("DJI Mini 2", 0.03, True), ("EH 216 S", 0.5, False)])
+def test_narrow_blades_hide_nothing(name, widest, narrow):
+    view, _ = built(name)
+    widths = occlusion.blade_widths_m(view.cloud, view.occluders)
+    assert set(widths) == set(view.cloud.parts_of("rotor"))
+    wavelength = 299792458.0 / view.network.carrier_hz
+    assert min(widths.values()) > 0.003 and max(widths.values()) < widest
+    assert (max(widths.values()) < 0.5 * wavelength) == narrow
+    opaque, bent = occlusion.hidden(view), occlusion.hidden(view, 0.5)
+    assert (bent.sum() < opaque.sum()) == narrow and not (bent & ~opaque).any()
+    only_blades = np.isin(view.occluders["vertex_part"][view.occluders["faces"][:, 0]], list(widths))
+    bare = {**view.occluders, "faces": view.occluders["faces"][~only_blades]}
+    assert (occlusion.hidden(view, 1e6) == occlusion.hidden(replace(view, occluders=bare))).all()

@@ -72,6 +72,14 @@ class Chain:
         amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
         return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor)) * self.amplification
 
+    @cached_property
+    def direct(self) -> np.ndarray:
+        """The target's subcarriers (N, M) on the direct path alone, without physics by need, to rounding."""
+        view = self.view
+        return response(
+            view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, factor=self.factor, error=EXACT
+        )  # fmt: skip
+
     def interpolation(self) -> float:
         """Return how far interpolation over frequencies and instants may put a range cell off (units of the signal)."""
         return (2.0 if "symbol_motion" in self.by_need else 1.0) * self.error * float(self.peaks.sum(axis=1).max())
@@ -114,13 +122,13 @@ class Chain:
             samples = effect.module.receive(effect.settings, samples, self._frame, draws)
         return np.fft.ifft(waveform.demodulate(samples, self._sent[rows]), axis=1)
 
-    def run(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Outcome:
-        """Return the outcome with the physics `on`, of the symbols `chosen` (all by default)."""
+    def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
+        """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
         cells = self.cells(on, chosen)
         for effect in providing(self.detection, FiltersCells):
             cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
-        best = abs(cells).argmax(axis=1)
-        lead = need.gap(cells)
+        size = abs(cells)
+        best, lead = size.argmax(axis=1), need.gap(size) if leads else np.full(len(cells), np.nan)
         for effect in providing(self.detection, ChoosesCells):
             best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
         return Outcome(cells[np.arange(len(cells)), best], best, lead)
@@ -146,6 +154,8 @@ class Chain:
         """The target's subcarriers (N, M), summed over all paths; `paths` where they are not those of `view`."""
         if paths is None:
             paths = self._paths if view is self.view else self._paths_of(view)
+        if view is self.view and factor is self.factor and not paths and not on & {"squint", "wavefront"}:
+            return self.direct
         return response(
             view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m,
             paths=paths, factor=factor, squint="squint" in on,

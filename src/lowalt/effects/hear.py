@@ -14,7 +14,6 @@ from lowalt.common.network import Network, Station
 from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
-from lowalt.echo.api import Path
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
@@ -62,7 +61,8 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     Raises: InputError naming the sample that cannot be computed.
     """
     sample = f"{row['subtype']}, model {row['model']}, station {station.name}"
-    beyond = placed(scene.effects, "channel", "receiver", "detection")
+    fixed = providing(scene.effects, SetsCrossSections)
+    beyond = [one for one in placed(scene.effects, "channel", "receiver", "detection") if one not in fixed]
     asked = [effect.name for effect in beyond if effect.name in BY_NEED]
     # Half the tolerance is for physics that is left out, the other half for the echo engine's approximations.
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
@@ -76,9 +76,9 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
         return Heard(own.signal, own.cell, power, [])
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
     if providing(beyond, WeighsPoints):
-        chain.power = power = rms(seen_alone(chain, sample).astype(np.complex64)) ** 2
+        chain.power = power = rms(seen_alone(chain).astype(np.complex64)) ** 2
     if share is None or math.isinf(chain.amplification):
-        outcome = chain.run(frozenset(asked))
+        outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
         return Heard(outcome.signal, outcome.cell, power, notes)
     largest = float(abs(own.signal).max())
@@ -94,13 +94,10 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     return Heard(outcome.signal, outcome.cell, power, notes)
 
 
-def seen_alone(chain: Chain, sample: str) -> np.ndarray:
-    """Return the target's echo (N,) on the direct path with its visibility and aspect, exact; SNRs refer to it."""
-    view = chain.view
-    path = Path(0.0, np.broadcast_to(chain.factor, view.places.shape[:2]))
-    return echo_signal(
-        view.network, view.station, view.motion, view.cloud.rcs_m2, view.aim_m, paths=[path], sample=sample
-    ).signal  # fmt: skip
+def seen_alone(chain: Chain) -> np.ndarray:
+    """Return the target's echo (N,) on the direct path with its visibility and aspect; SNRs refer to it."""
+    cells = np.fft.ifft(chain.direct, axis=1)
+    return cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
 
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:

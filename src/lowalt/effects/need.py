@@ -68,9 +68,9 @@ def decisions(
     return result
 
 
-def gap(cells: np.ndarray) -> np.ndarray:
-    """Return how much the strongest of all range cells (N, M) exceeds the second, (N,); inf for a single cell."""
-    if cells.shape[1] < 2:
-        return np.full(len(cells), np.inf)
-    top = np.partition(abs(cells), -2, axis=1)[:, -2:]
+def gap(size: np.ndarray) -> np.ndarray:
+    """Return how much the largest magnitude of each symbol (N, M) exceeds the second, (N,); inf for a single cell."""
+    if size.shape[1] < 2:
+        return np.full(len(size), np.inf)
+    top = np.partition(size, -2, axis=1)[:, -2:]
     return top[:, 1] - top[:, 0]

@@ -15,11 +15,12 @@ from lowalt.effects.response import ImagePath
 from lowalt.effects.view import View
 
 SOURCE = (
+    "default: medium dry ground at 4.9 GHz, 15 f^-0.1 and 0.035 f^1.63 S/m with f in GHz, ITU-R P.2040-1, Table 3; "
     "Fresnel coefficients of a lossy half space: ITU-R P.527, and Balanis, Advanced Engineering Electromagnetics, "
     "section 5.3; rough surface: Miller, Brown & Vegh, New derivation for the rough-surface reflection coefficient "
     "and for the distribution of sea-wave elevations, IEE Proc. F 131, 1984"
 )
-DEFAULTS = {"permittivity": 15.0, "conductivity_s_m": 0.01, "roughness_m": 0.0, "polarisation": "vertical"}
+DEFAULTS = {"permittivity": 12.8, "conductivity_s_m": 0.47, "roughness_m": 0.0, "polarisation": "vertical"}
 
 VACUUM_F_M = 8.8541878128e-12
 """Permittivity of the vacuum (F/m), CODATA 2018."""
