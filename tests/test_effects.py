@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.checks import check
 from lowalt.effects.hear import Scene, hear, observe
 from lowalt.effects.response import ImagePath, response
+from lowalt.motion.poses import placed, rotated
 from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud
 
@@ -81,6 +83,15 @@ def test_response_is_the_sum_over_every_element_path_and_subcarrier(rng, shapes,
         radio, station, places, rcs, aim, [(image, coefficient)], factor, squint, wavefront
     )
     assert relative(ours, truth) < 2e-12
+
+
+def test_places_and_normals_are_those_of_the_poses(rng):
+    cloud, row = target(rng, points=11)
+    normals = rng.normal(size=(11, 3))
+    cloud = replace(cloud, normals=normals / np.linalg.norm(normals, axis=1, keepdims=True))
+    view = observe(scene({}), network().stations[0], cloud, row)
+    assert view.places == pytest.approx(placed(cloud, view.motion.rotation, view.motion.translation), rel=1e-14)
+    assert view.normals == pytest.approx(rotated(view.motion.rotation, cloud.normals, cloud.part), abs=1e-14)
 
 
 @pytest.mark.parametrize("error", [1e-2, 1e-4, 1e-7])

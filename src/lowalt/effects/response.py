@@ -69,16 +69,17 @@ def response(
     out = [path.one_way(network.transmit, kappas, squint, wavefront, rest) for path in chosen]
     back = out if symmetric else [path.one_way(network.receive, kappas, squint, wavefront, rest) for path in chosen]
     widest = max(float(abs(excess).max()) for _, excess in (*out, *back))
-    reach = _round_up(float(abs(refs[:, 6]).max()) + radio.cells * widest)
+    reach = _round_up(radio.cells * widest)
     table = _table(reach, radio.subcarriers, rest)
     sums = np.zeros((len(kappas), len(places), len(table)), np.complex128)
     for a, b, times in pairs:
         (there, excess_a), (home, excess_b) = out[a], back[b]
         response_loops.moments(
-            strength, there, home, times, refs[:, 6], excess_a, excess_b, 0.5 * radio.cells, reach, sums
+            strength, there, home, times, excess_a, excess_b, 0.5 * radio.cells, reach, sums
         )  # fmt: skip
     for one, weight in zip(sums, weights, strict=True):
         response_loops.spread(one, own, table, weight, result)
+    response_loops.shift(result, refs[:, 6])
     return result * _whole_cells(refs[:, 5], radio.subcarriers)
 
 

@@ -18,6 +18,8 @@ DEGREE = 11
 WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
 """Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
 COSINE, SINE = 0, 1
+STRIDE = 32
+"""Subcarriers after which a phase ramp starts anew."""
 
 
 @lru_cache(maxsize=16)
@@ -192,11 +194,11 @@ def near_field(places, station, axes, spacing, wave, beam, aims, shape, series, 
 
 
 @LOOPS
-def moments(strength, out, back, times, base, excess_a, excess_b, half_cells, reach, result):
+def moments(strength, out, back, times, excess_a, excess_b, half_cells, reach, result):
     """Add sum over points of z T_p(u) to result (Q, N, P): z = times strength out back, u the two-way range in cells.
 
-    out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L); base: (N,) the reference's range beyond its whole
-    cell; u runs from -1 to 1 over reach cells.
+    out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L); u counts from the reference and runs from -1 to 1 over
+    `reach` cells.
     """
     nodes, symbols, count = out.shape
     x, before, last = np.empty(count), np.empty(count), np.empty(count)
@@ -204,7 +206,7 @@ def moments(strength, out, back, times, base, excess_a, excess_b, half_cells, re
     for n in range(symbols):
         row = n % strength.shape[0]
         for i in range(count):
-            x[i] = (base[n] + half_cells * (excess_a[n, i] + excess_b[n, i])) / reach
+            x[i] = half_cells * (excess_a[n, i] + excess_b[n, i]) / reach
             before[i], last[i] = x[i], 1.0
         for q in range(nodes):
             for i in range(count):
@@ -245,3 +247,21 @@ def spread(sums, own, table, weight, result):
                 im[m] += b * table[p, m]
         for m in range(total):
             result[n, m] += complex(re[m] * weight[m], im[m] * weight[m])
+
+
+@LOOPS
+def shift(result, cells):
+    """Delay result (N, M) by `cells` (N,) range cells about the middle subcarrier, in place.
+
+    A phase step from subcarrier to subcarrier is multiplied on; every STRIDE-th phase is computed anew.
+    """
+    count = result.shape[1]
+    for n in range(result.shape[0]):
+        turn = cells[n] / count
+        step = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
+        for first in range(0, count, STRIDE):
+            angle = 2.0 * math.pi * (turn * (first - 0.5 * (count - 1)))
+            phase = complex(math.cos(angle), -math.sin(angle))
+            for m in range(first, min(first + STRIDE, count)):
+                result[n, m] *= phase
+                phase *= step

@@ -8,7 +8,8 @@ import numpy as np
 from lowalt.common.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.effects.antenna import Element, gain
-from lowalt.motion.poses import Perturbation, placed, poses, rotated
+from lowalt.effects.rigid_loops import carry
+from lowalt.motion.poses import Perturbation, poses
 from lowalt.targets.cloud import Cloud
 
 
@@ -42,14 +43,16 @@ class View:
     @cached_property
     def places(self) -> np.ndarray:
         """Every point's place (N, L, 3) in metres, global frame."""
-        return placed(self.cloud, self.motion.rotation, self.motion.translation)
+        if self.nodes:
+            return self.motion.translation
+        return carry(self.motion.rotation, self.motion.translation, self.cloud.points, self.cloud.part)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
         if self.nodes:
             return np.full(self.places.shape, np.nan)
-        return rotated(self.motion.rotation, self.cloud.normals, self.cloud.part)
+        return carry(self.motion.rotation, None, self.cloud.normals, self.cloud.part)
 
     @property
     def nodes(self) -> bool:
