@@ -17,7 +17,7 @@ $(SETUP): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c envs/constraints.txt \
-		-e '.[workflow,cost,recognition,test,lint]'
+		-e '.[workflow,cost,recognition,test,tools,lint]'
 	touch $@
 
 default: $(SETUP)  ## the embedded default: data, training, evaluation, report in results/default

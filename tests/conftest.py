@@ -6,6 +6,19 @@ import pytest
 
 
 @pytest.fixture
+def mlcroissant(monkeypatch, tmp_path):
+    """Croissant's reference implementation, unpacking into a folder of the test's own.
+
+    It keeps unpacked archives by their relative names, so it would take one data set's shards for another's.
+    """
+    library = pytest.importorskip("mlcroissant")
+    from mlcroissant._src.operation_graph.operations import extract
+
+    monkeypatch.setattr(extract, "EXTRACT_PATH", type(extract.EXTRACT_PATH)(tmp_path / "croissant"))
+    return library
+
+
+@pytest.fixture
 def always_approximate(monkeypatch):
     """Let the echo use the cheap plan of a tolerance even where the exact mode would be as fast."""
     from lowalt.echo import refine

@@ -65,9 +65,8 @@ def test_checksums_of_the_description_are_right(published):
         assert node["contentSize"] == f"{len(data)} B"
 
 
-def test_mlcroissant_validates_and_loads(published):
+def test_mlcroissant_validates_and_loads(published, mlcroissant):
     """The reference implementation finds no fault and reads every sample's row, and images from the shards."""
-    mlcroissant = pytest.importorskip("mlcroissant")
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors and not data.metadata.issues.warnings
     rows = list(data.records("samples"))

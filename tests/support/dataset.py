@@ -38,8 +38,12 @@ def write_settings(kind):
     return json.dumps(block)
 
 
-def build(folder, kind):
-    """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group."""
+def build(folder, kind, inputs=True):
+    """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group.
+
+    inputs: whether motion tables, signals and tiles stay beside the shards.
+    """
+    folder.mkdir(exist_ok=True)
     shards = []
     for group in TARGETS:
         rows = motion_rows(group)
@@ -51,10 +55,12 @@ def build(folder, kind):
         files.write(folder / f"{group}.tiles.npz", pngs)
         for name in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{name}-00000.tar"))
-            inputs = ["--motion", f"{folder}/{group}.csv", "--signals", f"{folder}/{group}.npy"]
-            inputs += ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
-            main(["write", "--settings", write_settings(kind), *inputs, "--fold", name, "--out", shards[-1]])
+            given = ["--motion", f"{folder}/{group}.csv", "--signals", f"{folder}/{group}.npy"]
+            given += ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
+            main(["write", "--settings", write_settings(kind), *given, "--fold", name, "--out", shards[-1]])
     main(["index", "--settings", json.dumps(RENDER), "--shards", *shards, "--out", str(folder / "index.json")])
+    for path in [] if inputs else [*folder.glob("seen.*"), *folder.glob("unseen.*")]:
+        path.unlink()
     return folder
 
 

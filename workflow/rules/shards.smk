@@ -1,7 +1,8 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples beside it, and one index.
 # REQUIRED INPUTS: motion table and noisy signals of a chunk; its tiles, unless the shards hold signals
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json,
-#          and beside them the data card: README.md, samples.csv, croissant.json, SHA256SUMS
+#          and beside them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
+#          SHA256SUMS
 
 
 rule shard:
@@ -52,7 +53,7 @@ rule card:
         index="results/{run}/shards/index.json",
         configuration="results/{run}/config.yaml",
     output:
-        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json", "SHA256SUMS"),
+        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json", ".zenodo.json", "SHA256SUMS"),
     log:
         "results/{run}/logs/card.log",
     conda:

@@ -1,8 +1,13 @@
-"""A whole data set written from its configuration and clouds alone, without a workflow: the same bytes, one process."""
+"""A whole data set written from its configuration and clouds alone, without a workflow: the same bytes, one process.
 
+`python -m lowalt.shards.build` writes clouds, motion tables and shards; the echoes stay in memory.
+"""
+
+import argparse
 import sys
 from pathlib import Path
 
+from lowalt.common.command import run
 from lowalt.common.files import slug
 from lowalt.motion.table import write_table
 from lowalt.shards.dataset import Dataset, Place
@@ -54,3 +59,19 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
         write_shard(paths[-1], rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
     return paths
+
+
+def main(arguments: list[str]) -> None:
+    """Write clouds, motion tables and shards of a merged configuration."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards.build", description=main.__doc__)
+    options.add_argument("--config", required=True, help="merged configuration, such as results/RUN/config.yaml")
+    options.add_argument("--inputs", help="folder of the meshes and recordings that the records name")
+    options.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
+    options.add_argument("--out", required=True, help="folder to write into")
+    given = options.parse_args(arguments)
+    dataset = Dataset(given.config, given.clouds, inputs=given.inputs)
+    write_run(dataset, given.out, dataset.config["shards"]["kind"])
+
+
+if __name__ == "__main__":
+    run(main)

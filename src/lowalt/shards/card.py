@@ -19,6 +19,7 @@ from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
 from lowalt.common.network import station_names
+from lowalt.common.splits import FOLDS
 from lowalt.shards import sums
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.read import ShardSet
@@ -27,9 +28,15 @@ SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
 
+AUTHORS = "The lowalt authors"
+TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
+
 MEMBERS = {
     "image": ("png", "the tile, 8-bit indices with their colour map; rows are the stations, columns VRP, TRP and VT"),
-    "signal": ("npy", "the noisy signals, complex64 (stations, symbols), from which every tile is rendered"),
+    "signal": (
+        "npy",
+        "the noisy signals, float32 (stations, symbols, 2: real and imaginary part), which make the tiles",
+    ),
 }
 
 ODDITIES = """\
@@ -111,12 +118,55 @@ def description(shards: ShardSet) -> str:
     )
 
 
+def size_category(samples: int) -> str:
+    """Return the hub's word for a number of samples, such as "10K<n<100K"."""
+    steps = ["1K", "10K", "100K", "1M", "10M", "100M", "1B"]
+    place = sum(samples >= 10 ** (index + 3) for index in range(len(steps)))
+    if place in (0, len(steps)):
+        return f"n<{steps[0]}" if place == 0 else f"n>{steps[-1]}"
+    return f"{steps[place - 1]}<n<{steps[place]}"
+
+
+def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
+    """Return a pattern that matches the shards of a group and fold, or their names where they are called otherwise."""
+    names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
+    usual = f"{group}-{fold}-"
+    return [f"{usual}*.tar"] if all(name.startswith(usual) for name in names) else names
+
+
+def configs(shards: ShardSet) -> list[dict]:
+    """Return the protocols as a hub's configurations: for each its splits and the shards of each split.
+
+    Shards are matched by group and fold in their names, so the list stays short for thousands of them.
+    """
+    present = {(entry["group"], entry["fold"]) for entry in shards.shards}
+    hub = {"train": "train", "val": "validation", "test": "test"}
+    result = []
+    for protocol in ("seen", "unseen"):
+        files: dict[str, list[str]] = {}
+        for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):
+            # In the unseen protocol all folds of the unseen group are tests, and the seen group has no test.
+            both = protocol == "seen" or group == "seen"
+            if protocol == "unseen" and group == "seen" and fold == "test":
+                continue
+            files.setdefault(hub[fold] if both else "test", []).extend(patterns(shards, group, fold))
+        if protocol == "unseen" and not any(group == "unseen" for group, _ in present):
+            continue
+        splits = [{"split": split, "path": files[split]} for split in hub.values() if split in files]
+        result.append({"config_name": protocol, "data_files": splits})
+    if result:
+        result[0]["default"] = True
+    return result
+
+
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
     first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
     front = {
-        "pretty_name": name, "license": license_name.lower(), "task_categories": ["image-classification"],
-        "tags": ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"],
+        "pretty_name": name, "license": license_name.lower(), "language": ["en"],
+        "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
+        "configs": configs(shards),
+        "tags": TAGS,
     }  # fmt: skip
     member, meaning = MEMBERS[shards.kind]
     return f"""---
@@ -140,6 +190,9 @@ Each shard is a plain tar in the WebDataset layout. A sample has two members:
 size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
 
 ```python
+import datasets
+samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
+
 import webdataset
 for sample in webdataset.WebDataset("seen-train-00000.tar", shardshuffle=False).decode("pil"):
     print(sample["__key__"], sample["json"]["category"], sample["{member}"])
@@ -176,8 +229,20 @@ The exact configuration, which makes the same bytes again with these versions:
 """
 
 
+def zenodo(shards: ShardSet, name: str, license_name: str) -> dict:
+    """Return the data set's metadata as Zenodo's deposits take it.
+
+    Source: Zenodo's developer documentation, deposit metadata.
+    """
+    return {
+        "title": name, "upload_type": "dataset", "description": description(shards), "version": __version__,
+        "creators": [{"name": AUTHORS}], "access_right": "open", "license": license_name.lower(), "language": "eng",
+        "keywords": TAGS,
+    }  # fmt: skip
+
+
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv and croissant.json beside an index, and the checksums of all of it.
+    """Write README.md, samples.csv, croissant.json and .zenodo.json beside an index, and the checksums of all of it.
 
     facts: what Croissant should say besides, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
@@ -198,6 +263,8 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
+    with replacing(folder / ".zenodo.json") as temporary:
+        temporary.write_text(json.dumps(zenodo(shards, name, license_name), indent=1) + "\n")
     sums.write(index_path, shards.index)
 
 

@@ -1,6 +1,6 @@
 """Croissant metadata of a data set: its shards with checksums, and its samples as records that tools can load.
 
-Source: Croissant format specification 1.0 (MLCommons).
+Source: Croissant format specification 1.1 (MLCommons).
 """
 
 from lowalt.shards.table import EXTENSIONS
@@ -64,7 +64,11 @@ FIELDS = {
 
 MEDIA = {
     "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns VRP, TRP, VT."),
-    "signal": ("application/octet-stream", "sc:Text", "Signals (stations, symbols), complex64, as an .npy file."),
+    "signal": (
+        "application/octet-stream",
+        "sc:Text",
+        "Signals (stations, symbols, re and im), float32, as an .npy file.",
+    ),
 }
 
 
@@ -94,7 +98,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
         "@context": CONTEXT,
         "@type": "sc:Dataset",
         **facts,
-        "conformsTo": "http://mlcommons.org/croissant/1.0",
+        "conformsTo": "http://mlcommons.org/croissant/1.1",
         "isLiveDataset": False,
         "distribution": files + sets,
         "recordSet": [_samples(table["path"]), _media(kind, data_type, meaning)],

@@ -15,7 +15,7 @@ from lowalt.common.files import existing, replacing, sha256
 
 STAGES = {
     "clouds": ("clouds/*.npz",), "motion": ("motion/*.csv",), "echo": ("echo/*/*.npy",), "noise": ("noisy/*.npy",),
-    "tiles": ("tiles/*.npz",), "shards": ("shards/*.tar", "shards/*.npz", "shards/index.json", "shards/samples.csv"),
+    "tiles": ("tiles/*.npz",), "shards": ("shards/*.tar", "shards/*.npz", "shards/index.json"),
 }  # fmt: skip
 """Stages in pipeline order, and the files each leaves in a run's folder; tiles go into shards and are then deleted."""
 

@@ -13,7 +13,7 @@ from lowalt.common.files import replacing, sha256
 from lowalt.shards.table import table_path
 
 NAME = "SHA256SUMS"
-CARD = ("README.md", "croissant.json", "samples.csv")
+CARD = (".zenodo.json", "README.md", "croissant.json", "samples.csv")
 LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
 
 

@@ -1,0 +1,66 @@
+"""Publishing a data set on the Hugging Face hub: `python -m lowalt.shards.upload --index INDEX --repository USER/NAME`.
+
+The token is read from the environment (HF_TOKEN), never from the command line. Every byte is checked first: a damaged
+data set is not published.
+"""
+
+import argparse
+import os
+from pathlib import Path
+from typing import Any
+
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.shards.index import load
+from lowalt.shards.verify import faults
+
+TOKEN = "HF_TOKEN"
+
+
+def published_files(index_path: str | Path) -> list[str]:
+    """Return the files of a data set that are published, relative to the index's folder, sorted.
+
+    Raises: InputError naming the first fault where the data set is damaged or has no data card.
+    """
+    for line in faults(index_path):
+        raise InputError(f"{index_path}: {line}, expected an undamaged data set with its data card")
+    folder = Path(index_path).parent
+    load(index_path)
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def upload(index_path: str | Path, repository: str, client: Any, private: bool = True) -> int:
+    """Create the repository where there is none, upload every file of the data set and return their number.
+
+    client: a `huggingface_hub.HfApi` with its token, or what stands in for one.
+    Raises: InputError where the data set is damaged or the repository's name is not USER/NAME.
+    """
+    if repository.count("/") != 1 or not all(repository.split("/")):
+        raise InputError(f"--repository: {repository!r}, expected USER/NAME")
+    names = published_files(index_path)
+    client.create_repo(repository, repo_type="dataset", private=private, exist_ok=True)
+    client.upload_folder(
+        repo_id=repository, repo_type="dataset", folder_path=str(Path(index_path).parent), allow_patterns=names,
+        commit_message=f"Data set {load(index_path)['sha256'][:12]}",
+    )  # fmt: skip
+    return len(names)
+
+
+def main(arguments: list[str]) -> None:
+    """Check every byte of a data set and upload it with the token in HF_TOKEN."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.shards.upload", description=main.__doc__)
+    options.add_argument("--index", required=True, help="the data set's index")
+    options.add_argument("--repository", required=True, metavar="USER/NAME", help="dataset repository on the hub")
+    options.add_argument("--public", action="store_true", help="make a new repository public (default: private)")
+    given = options.parse_args(arguments)
+    token = os.environ.get(TOKEN)
+    if not token:
+        raise InputError(f"{TOKEN}: not set in the environment, expected a token with the right to write")
+    from huggingface_hub import HfApi
+
+    count = upload(given.index, given.repository, HfApi(token=token), private=not given.public)
+    print(f"{given.repository}: {count} files")
+
+
+if __name__ == "__main__":
+    run(main)
