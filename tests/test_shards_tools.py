@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import yaml
 
+from dataset import build
 from lowalt.common.errors import InputError
 from lowalt.shards import ShardSet, upload
 from lowalt.shards.card import main as card
 from lowalt.shards.card import size_category
 from lowalt.shards.sigmf import main as sigmf
-from dataset import build
 from test_shards_card import CONFIG
 
 
