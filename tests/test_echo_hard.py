@@ -1,7 +1,8 @@
 """The echo's hard cases by name, each judged in 50 digits (`reference.cells_mp`), and the table of them.
 
-`python tests/test_echo_hard.py` prints the table that stands in design/echo.md: what a naive formula gives and what
-ours gives. The naive formula is the closed form as first written down: angles, sin(N u) / sin(u), one float64 phase.
+`PYTHONPATH=tests/support python tests/test_echo_hard.py` prints the table that stands in design/echo.md: the errors of
+a naive formula and of ours. The naive formula is the closed form as first written down: angles, sin(N u) / sin(u), one
+float64 phase.
 """
 
 import dataclasses

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from craft import NETWORK, craft, row
 from lowalt.common.network import Network
 from lowalt.echo.__main__ import signals
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud
-from test_echo_command import NETWORK, craft, row
 
 NEW, OLD = "X86_V4 AVX512_ICL AVX512_SPR", "X86_V3 AVX2 FMA3"
 LIBRARIES = {"NPY_DISABLE_CPU_FEATURES": f"{NEW} {OLD}", "OPENBLAS_CORETYPE": "Nehalem"}
