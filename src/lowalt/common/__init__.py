@@ -1,1 +1,1 @@
-"""What every stage shares: configuration, files, errors, random streams, stations. No stage is known here."""
+"""Shared by every stage: configuration, files, errors, random streams, stations. No stage is known here."""

@@ -1,4 +1,4 @@
-"""What every stage's command line shares: the settings argument, clear failure, the peak memory.
+"""Shared by the command lines of all stages: the settings argument, clear failure, the peak memory.
 
 A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
 The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.

@@ -44,7 +44,7 @@ def canonical(value: object) -> str:
 
 
 def _expected(error: jsonschema.ValidationError) -> str:
-    """What the schema wanted, in words."""
+    """Return the schema's expectation in words."""
     rule, wanted = error.validator, error.validator_value
     words = {
         "type": f"type {wanted}",

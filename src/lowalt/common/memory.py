@@ -1,4 +1,4 @@
-"""Memory of a process: what is asked of the C library at its start."""
+"""Memory of a process: the settings of the C library at its start."""
 
 import contextlib
 import ctypes

@@ -1,6 +1,6 @@
 """The network of base stations: carrier, subcarriers, symbols, arrays and where each station stands.
 
-Only facts about the radar live here; what it hears is computed in `lowalt.echo`.
+Only facts about the radar live here; its signals are computed in `lowalt.echo`.
 Axes: x and y horizontal, z up, metres, global frame. Angles in degrees only in the configuration.
 """
 

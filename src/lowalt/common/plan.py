@@ -1,4 +1,4 @@
-"""What a run consists of: subtypes, chunks and shards, all known from the configuration before any job starts."""
+"""The plan of a run: its subtypes, chunks and shards, all known from the configuration before any job starts."""
 
 from dataclasses import dataclass
 

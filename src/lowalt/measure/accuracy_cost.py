@@ -1,4 +1,4 @@
-"""What accuracy costs in time: trained schemes with their measured times, and networks that were only timed.
+"""Recognition accuracy over time: trained schemes with their measured times, and networks that were only timed.
 
     python -m lowalt.measure.accuracy_cost --settings JSON --predictions a.csv ... --speeds a.json ...
         --index index.json --fidelity transfer.csv --out accuracy_cost.csv
@@ -7,7 +7,7 @@ Settings: seed. accuracy_cost.csv, one row a scheme and SNR ("avg": mean over th
     kind                 trained: accuracy and times measured; timed: times of a network that was not trained, without
                          accuracy, its core_s_training extrapolated from the time of one step; fidelity: the first
                          scheme trained on echoes at a tolerance and tested on exact ones
-    backbone, pixels, stations, spectra, steps, train_samples, parameters    what the scheme is
+    backbone, pixels, stations, spectra, steps, train_samples, parameters    of the scheme
     seen_percent         held-out motion models of the trained subtypes, unseen_percent: subtypes never trained on
     difference_points    unseen less that of the first scheme (fidelity: of training on exact echoes), paired
     low, high            its 95 % interval, which resamples whole motion models

@@ -1,4 +1,4 @@
-"""What accuracy costs in time: every method and tolerance, clouds of each category at several distances, as a table.
+"""Accuracy of the echo over its time: every method and tolerance, clouds of each category at several distances.
 
     python -m lowalt.measure.echo_cost --settings JSON --clouds a.npz ... --targets config/targets.csv --out cost.csv
 

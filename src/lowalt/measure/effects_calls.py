@@ -1,4 +1,4 @@
-"""Which calls for effects a run prices, from its configuration: none, every effect alone, and scenes together."""
+"""The calls for effects that are measured, from a run's configuration: none, every effect alone, scenes."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from lowalt.effects.catalogue import PLACES
 from lowalt.effects.checks import check as check_effects
 
 ELSEWHERE = ("network", "targets", "motion", "spectra", "images", "split", "seed")
-"""What a scene may not change here: its samples would no longer be the run's."""
+"""Blocks that a scene may not change here: its samples would no longer be those of the run."""
 
 
 def asked_snrs(snrs: list[float]) -> list[float]:

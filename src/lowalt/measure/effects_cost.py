@@ -1,4 +1,4 @@
-"""What each effect costs and does, alone and together: the table of a run.
+"""Time of each effect and its influence on signals, spectra and recognition, alone and together: the table of a run.
 
     python -m lowalt.measure.effects_cost --settings JSON --samples seen-none.npz unseen-none.npz ...
         --model model.pt --out effects.csv
@@ -81,7 +81,7 @@ def difference(
 def typical_ms(times: np.ndarray, subtype: np.ndarray) -> float:
     """Return the mean over subtypes of each one's median time; times (K, stations), subtype (K,) names.
 
-    What a data set costs is a mean; what one interruption of the machine adds is not part of it.
+    The time of a data set follows from a mean; the medians keep the machine's interruptions out of it.
     """
     return float(np.mean([np.median(times[subtype == name]) for name in np.unique(subtype)]))
 

@@ -32,7 +32,7 @@ from lowalt.tiles import Renderer, resize, split
 from lowalt.tiles.__main__ import renderer
 
 STEP = 8
-"""Steps of the 256 by which a pixel must move to count as changed: about what an eye sees beside the other."""
+"""Steps of the 256 by which a pixel must move to count as changed: about the smallest that an eye sees side by side."""
 ARRAYS = (
     "subtype", "model", "label", "snr_db", "base_ms", "total_ms", "signal_change", "cells_changed", "pixels_changed",
     "pixel_difference", "views", "example", "example_subtype",
@@ -43,7 +43,7 @@ the first UAV (of the first target, without one) without and with the effects, f
 
 
 class Take(NamedTuple):
-    """What the stations heard of K motion models in one scene.
+    """Signals that the stations received from K motion models in one scene.
 
     signal: (K, stations, N) complex64; cell: (K, stations, N) range cells; power: (K, stations) W, of the echoes
     alone; ms: (K, stations), processor time each took.
@@ -74,7 +74,7 @@ def held_out(rows: list[dict], share: dict, seed: int, count: int) -> list[dict]
 
 
 def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occluders: dict[str, dict]) -> list[Take]:
-    """Return what all stations hear of every motion model in each scene, the scenes taking turns sample by sample.
+    """Return the signals of every motion model at all stations in each scene; the scenes take turns sample by sample.
 
     occluders: surfaces of each subtype, where a scene hides points behind them.
     Raises: InputError naming the sample that has no cloud or cannot be computed with.
@@ -95,7 +95,7 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
             # In turns, since whoever comes second finds the target's data in the processor's caches.
             for scene, take in pairs if (index + place) % 2 else pairs[::-1]:
                 if index == place == 0:
-                    # What is compiled or looked up once is no cost of a sample.
+                    # The first call compiles and fills tables once; its time is not that of a sample.
                     hear(scene, station, *given)
                 seconds, heard = once(functools.partial(hear, scene, station, *given), time.process_time)
                 take.ms[index, place] = 1e3 * seconds
@@ -122,7 +122,7 @@ def pixel_change(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
 
 
 def views(tiles: Renderer, signals: np.ndarray, size: int) -> np.ndarray:
-    """Return what a network sees of signals (K, S, stations, N): index images (K, S, 3 stations, size, size) uint8."""
+    """Return the images that a network sees of signals (K, S, stations, N): (K, S, 3 stations, size, size) uint8."""
     return np.stack([[resize(split(tiles.tile(one)), size) for one in levels] for levels in signals])
 
 

@@ -1,4 +1,4 @@
-"""What a scheme's network costs in time on this machine: inference a sample, and a training step a sample.
+"""Time of a scheme's network on this machine: of inference and of a training step, both a sample.
 
     python -m lowalt.measure.network_speed --settings JSON --scheme NAME --stations A B C
         --out speed.json
@@ -87,7 +87,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
         steps.zero_grad(set_to_none=True)
 
     if block["compile"]:
-        # The first call compiles, once a training; it is no part of what a step costs.
+        # The first call compiles, once a training: its time is not that of a step.
         step()
     return {
         "scheme": scheme.name, "size": settings["size"], "parameters": network.parameters(model), **times,

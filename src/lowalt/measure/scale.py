@@ -1,9 +1,9 @@
-"""What a configuration would cost in time and disk, from the measured stages of a finished run.
+"""Time and disk that a configuration would take, scaled from the measured stages of a finished run.
 
 Data stages scale with samples: core-seconds a sample of the measured run, times the samples planned. Training scales
 with images through the backbone: milliseconds a training sample of the same backbone at the same size on one core, as
-accuracy_cost.csv has it, times all steps of all schemes; early stopping and validation are left out, and a network
-that was never timed is not guessed at. A processor's price: no GPU is extrapolated to.
+accuracy_cost.csv has it, times all steps of all schemes. Early stopping and validation are left out. A network that
+was never timed gets no estimate. All times are those of the measured processor, not of a GPU.
 """
 
 import argparse

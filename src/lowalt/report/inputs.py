@@ -1,6 +1,6 @@
 """The manifest of a report: where each table, picture and measurement of a run stands.
 
-A JSON object that names every file by what it is, for example
+A JSON object with every file by its name, for example
 
     {"accuracy": "results/default/accuracy.csv", "clouds": ["results/default/clouds/crow.npz", ...], ...}
 

@@ -1,4 +1,4 @@
-"""What the sections of the page are made from: a run's files, its configuration, its shards and its jobs' times."""
+"""A run as the sections of the page see it: its files, its configuration, its shards and its jobs' times."""
 
 import functools
 
@@ -9,7 +9,7 @@ from lowalt.shards import ShardSet
 
 
 class Run:
-    """What the sections are made from."""
+    """The run that a page shows."""
 
     def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:
         """inputs: the run's files; config: its configuration; targets: row of the table of targets by subtype."""
@@ -18,7 +18,7 @@ class Run:
 
     @functools.cached_property
     def stage_times(self) -> list[dict]:
-        """What each rule took, as `tables.stage_times` gives it."""
+        """Time and memory of each rule, as `tables.stage_times` gives them."""
         return stage_times(self.inputs.paths("benchmarks"))
 
     @property

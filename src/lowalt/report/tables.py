@@ -32,7 +32,7 @@ def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, f
 
 
 def spreads(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
-    """Return what an average over SNRs is a mean of, protocol -> scheme -> words, where there are several seeds."""
+    """Return spread and number of the seeds behind each average, as protocol -> scheme -> words."""
     result: dict = defaultdict(dict)
     for row in rows:
         if row["snr_db"] == "avg" and int(row["seeds"]) > 1:
@@ -60,7 +60,7 @@ def cloud_seconds(paths: Iterable[str | Path]) -> dict[str, float]:
 
 
 def stage_times(paths: Iterable[str | Path]) -> list[dict]:
-    """Return what each rule took, from Snakemake's benchmark files (JSON lines, extended), in order of first sight.
+    """Return the time and memory of each rule, from Snakemake's benchmark files (JSON lines, extended).
 
     One dict a rule: rule, jobs, wall_s and cpu_s (sums over jobs), peak_mib (largest job; sampled, so a short peak
     can be missed).

@@ -62,12 +62,12 @@ def _by_snr(panel, rows: list[dict], trained: list[dict]) -> None:
         labels = [SNR_LABELS.get(other["snr_db"], other["snr_db"]) for other in found]
         panel.plot(labels, [float(other["unseen_percent"]) for other in found], "o-", color=plt.cm.tab20(number % 20))
     panel.set(xlabel="SNR (dB)", ylabel="unseen accuracy (%)")
-    panel.set_title("by SNR, what nothing faster beats", fontsize=9)
+    panel.set_title("by SNR: schemes that no faster one beats", fontsize=9)
     panel.grid(alpha=0.3)
 
 
 def _fidelity(panel, rows: list[dict]) -> None:
-    """What training on echoes of a tolerance changes against training on exact ones, with its interval."""
+    """Accuracy after training on echoes of a tolerance less that after exact ones, with its interval."""
     values = [float(row["difference_points"]) for row in rows]
     bars = [[value - float(row["low"]) for value, row in zip(values, rows, strict=True)],
             [float(row["high"]) - value for value, row in zip(values, rows, strict=True)]]  # fmt: skip
@@ -119,7 +119,7 @@ def draw(rows: list[dict[str, str]]) -> bytes:
     names.update(zip(handles[1], handles[0], strict=True))
     rest.legend(names.values(), names.keys(), loc="center", ncols=2, fontsize=8)
     hardware = next((row["hardware"] for row in trained if row.get("hardware")), "")
-    figure.suptitle(f"What accuracy costs in time ({hardware})", fontsize=10)
+    figure.suptitle(f"Recognition accuracy over time ({hardware})", fontsize=10)
     figure.tight_layout()
     return png(figure)
 

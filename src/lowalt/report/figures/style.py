@@ -1,4 +1,4 @@
-"""What all figures share: PNG bytes that repeat, one colour a scheme, legends that cover no line."""
+"""Helpers of all figures: PNG bytes that repeat, one colour a scheme, legends that cover no line."""
 
 import base64
 import io
