@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost effects-cost scenes tables estimate space campaign reference reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost choices confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins help
 
 all: default
 
@@ -92,6 +92,12 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 	$(SNAKEMAKE)
 	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
 
+choices: $(SETUP)  ## recipes of training compared on validation alone: results/default/choices.csv and choices_subtypes.csv
+	$(SNAKEMAKE) -- choices
+
+confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
+	$(SNAKEMAKE) --configfile config/confirm.yaml
+
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
@@ -107,6 +113,10 @@ campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes
 space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/tiny results/default' (finished, small to large)
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
 		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
+
+reference-choices: $(SETUP)  ## keep the tables of a finished `make choices` and a finished `make confirm`
+	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
+	for table in $(REFERENCE) seeds.csv; do cp results/confirm/$$table results/reference/confirm-$$table; done
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done

@@ -16,6 +16,7 @@ include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
 include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
+include: "workflow/rules/choices.smk"
 include: "workflow/rules/cost.smk"
 include: "workflow/rules/accuracy_cost.smk"
 include: "workflow/rules/effects_table.smk"
@@ -28,6 +29,7 @@ localrules:
     signals,
     data,
     models,
+    choices,
     cost,
     accuracy_cost,
     effects_cost,
@@ -65,6 +67,11 @@ rule data:
     input:
         f"results/{RUN.name}/shards/index.json",
         f"results/{RUN.name}/shards/README.md",
+
+
+rule choices:
+    input:
+        f"results/{RUN.name}/choices.csv",
 
 
 rule models:

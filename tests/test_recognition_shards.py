@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from dataset import RENDER, build
+from dataset import RENDER, SNRS, build
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.recognition import checkpoint, network, predictions, runs, samples, schemes, score, views
@@ -16,7 +16,8 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of
-from lowalt.tiles import resize
+from lowalt.tiles import reduced, resize
+from lowalt.tiles.__main__ import main as tiles_main
 
 SIZE = 32
 SCHEME = schemes.Scheme("BC:VRP+VT", (1, 2), (0, 2))
@@ -126,7 +127,14 @@ def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(datas
 
 def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tmp_path):
     arguments = ["--index", str(dataset / "index.json"), "--model", str(model), "--out", str(tmp_path / "p.csv")]
-    main(["evaluate", "--settings", json.dumps({"batch": 4, "threads": 1, "precision": "fp32"}), *arguments])
+    main(
+        [
+            "evaluate",
+            "--settings",
+            json.dumps({"batch": 4, "threads": 1, "precision": "fp32", "mirror": False}),
+            *arguments,
+        ]
+    )
     ours = predictions.read(tmp_path / "p.csv").of(folds("seen", "test"))
     found = score.score(tmp_path / "p.csv", dataset / "index.json", "seen")
     assert found["samples"] == len(ours) > 0
@@ -161,3 +169,49 @@ def test_unknown_shards_and_sizes_are_refused(dataset, tmp_path):
         views.cache_shard(dataset / "index.json", "seen-train-00000.tar", 4, tmp_path / "x.npz")
     with pytest.raises(InputError, match="no samples"):
         views.ShardSamples(dataset / "index.json", [0], set(), 32, placed=False)
+
+
+def reduce_tiles(dataset, folder, group, sizes):
+    """Run the tiles stage over a group's signals with reduced images; the options of `views` by size."""
+    targets = [f"{size}={folder / f'{group}-{size}.npy'}" for size in sizes]
+    files = ["--signals", str(dataset / f"{group}.npy"), "--out", str(folder / "tiles.npz"), "--reduced", *targets]
+    tiles_main(["--settings", json.dumps(RENDER), *files])
+    motion = ["--motion", str(dataset / f"{group}.csv")]
+    return {size: ["--reduced", str(folder / f"{group}-{size}.npy"), *motion] for size in sizes}
+
+
+@pytest.mark.parametrize("size", [SIZE, 24])
+def test_views_from_the_tiles_stage_are_those_from_decoded_images_byte_for_byte(dataset, tmp_path, size):
+    for shard in ShardSet(dataset / "index.json").shards:
+        given = reduce_tiles(dataset, tmp_path, shard["group"], (SIZE, 24))[size]
+        same = ["--index", str(dataset / "index.json"), "--shard", shard["name"], "--out"]
+        main(["views", "--settings", json.dumps({"size": size}), *same, str(tmp_path / "decoded.npz")])
+        settings = json.dumps({"size": size, "snr_db": SNRS})
+        main(["views", "--settings", settings, *given, *same, str(tmp_path / "reduced.npz")])
+        assert (tmp_path / "reduced.npz").read_bytes() == (tmp_path / "decoded.npz").read_bytes()
+
+
+def test_reduced_images_leave_the_tiles_as_they_are_and_none_are_made_unasked(dataset, tmp_path):
+    reduce_tiles(dataset, tmp_path / "with", "seen", (24,))
+    reduce_tiles(dataset, tmp_path / "without", "seen", ())
+    assert (tmp_path / "with/tiles.npz").read_bytes() == (tmp_path / "without/tiles.npz").read_bytes()
+    assert [path.name for path in (tmp_path / "without").iterdir()] == ["tiles.npz"]
+
+
+def test_reduced_images_of_another_size_chunk_or_snr_are_refused_by_name(dataset, tmp_path):
+    options = reduce_tiles(dataset, tmp_path, "seen", (24,))[24]
+    other = reduce_tiles(dataset, tmp_path, "unseen", (24,))[24]
+    mixed = [*other[:2], *options[2:]]
+    same = ["--index", str(dataset / "index.json"), "--shard", "seen-train-00000.tar", "--out", str(tmp_path / "x.npz")]
+    for size, levels, given, words in (
+        (32, SNRS, options, r"seen-24\.npy: uint8 .* expected uint8 \(16, views, 32, 32\)"),
+        (24, SNRS, mixed, r"unseen-24\.npy"), (24, [3, 5], options, r"no motion model or SNR inf"),
+        (24, SNRS, other, "no motion model or SNR"), (24, SNRS, options[:2], "both --reduced and --motion"),
+        (24, SNRS, ["--reduced", str(tmp_path / "tiles.npz"), *options[2:]], r"tiles\.npz: not reduced images"),
+    ):  # fmt: skip
+        with pytest.raises(InputError, match=words):
+            main(["views", "--settings", json.dumps({"size": size, "snr_db": levels}), *given, *same])
+    assert not (tmp_path / "x.npz").exists()
+    for text in ("24", "=x.npy", "0=x.npy"):
+        with pytest.raises(InputError, match="expected SIZE=PATH"):
+            reduced.target(text)

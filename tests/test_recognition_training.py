@@ -1,6 +1,7 @@
 """Training: it learns, repeats, resumes exactly, stops on NaN by name; two ranks evaluate as one; exports agree."""
 
 import csv
+import dataclasses
 import json
 import os
 import signal
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import torch
 
+from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint, inference, predictions, recipe, runs, samples, schemes
@@ -193,6 +195,52 @@ def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trai
         runs.load(tmp_path / "empty.pt")
 
 
+def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path, monkeypatch):
+    """Inverted images, the same keys and labels: another run, though every count is the same."""
+    step = runs.Trainer._step
+
+    def breaking(self, *batch):
+        if self.at.steps == 5:
+            raise Killed
+        step(self, *batch)
+
+    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    settings = with_training(checkpoint_s=0)
+    with pytest.raises(Killed):
+        train(views, tmp_path, settings)
+    monkeypatch.setattr(runs.Trainer, "_step", step)
+    inverted, relabelled = sources(views), sources(views)
+    inverted["train"].images = 255 - inverted["train"].images
+    facts = relabelled["validation"].facts
+    relabelled["validation"].facts = dataclasses.replace(facts, label=(facts.label + 1) % 4)
+    for found in (inverted, relabelled):
+        with pytest.raises(InputError, match="another run, its samples differ"):
+            runs.train(found, SCHEME, "seen", settings, tmp_path)
+    train(views, tmp_path, settings)
+
+
+def test_a_gpu_s_generator_is_saved_and_taken_up_with_the_processor_s():
+    class Gpu:
+        state = torch.arange(4, dtype=torch.uint8)
+
+        @classmethod
+        def get_rng_state(cls, device):
+            return cls.state.clone()
+
+        @classmethod
+        def set_rng_state(cls, state, device):
+            cls.state = state
+
+    device = torch.device("cuda:1")
+    states = recipe.random_state(device, Gpu)
+    drawn, Gpu.state = torch.rand(3), torch.zeros(4, dtype=torch.uint8)
+    recipe.set_random_state(device, states, Gpu)
+    assert torch.equal(torch.rand(3), drawn) and Gpu.state.tolist() == [0, 1, 2, 3]
+    assert set(recipe.random_state(torch.device("cpu"))) == {"cpu"}
+    with pytest.raises(InputError, match="this training runs on cpu"):
+        recipe.set_random_state(torch.device("cpu"), states)
+
+
 @pytest.mark.parametrize("precision", ["fp32", "bf16"])
 def test_a_loss_that_is_not_a_number_stops_the_run_and_leaves_no_checkpoint(views, tmp_path, precision):
     overflow = with_training(rate=1e30, clip=1e30, warmup=0.0, checkpoint_s=0, ema=0.0, precision=precision)
@@ -294,7 +342,7 @@ def run_ranks(arguments, ranks):
 
 
 def predict_all(trained, views, out, ranks):
-    settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32"})
+    settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32", "mirror": False})
     run_ranks(["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
                "--out", str(out)], ranks)  # fmt: skip
     return predictions.read(out)
@@ -316,7 +364,9 @@ def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
     for name, ranks, batch in (("one", 1, 8), ("two", 2, 8), ("half", 1, 4)):
         settings = with_training(steps=12, validate_every=6, batch=batch)
         settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
-        settings["network"] = {**SETTINGS["network"], "dropout": 0.0}
+        # The shipped backbone, whose batch norm needs the statistics of the whole batch.
+        shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
+        settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
         line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen"]
         run_ranks(
             [
@@ -335,6 +385,7 @@ def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
             ranks,
         )
         found = checkpoint.load(tmp_path / name / "model.pt")[1]["weights"]
+        assert any("running_var" in key for key in found)
         weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
         with (tmp_path / name / "history.csv").open(newline="") as file:
             losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
@@ -409,3 +460,29 @@ def test_an_exported_program_gives_the_same_answers_at_any_batch_size(trained, v
             torch.testing.assert_close(program(index), model.model(index).softmax(1), atol=1e-6, rtol=1e-5)
     with pytest.raises(InputError, match="pt2 or"):
         export(model, tmp_path / "model.bin")
+
+
+def test_batch_norm_over_one_rank_is_that_of_torch_and_keeps_names_and_activations(tmp_path):
+    """In a process group of one rank the sums of all ranks are this rank's own."""
+    from timm.layers import BatchNormAct2d
+    from torch import distributed, nn
+
+    from lowalt.recognition.batch_norm import over_ranks
+
+    def network():
+        torch.manual_seed(5)
+        return nn.Sequential(nn.Conv2d(3, 4, 3), nn.BatchNorm2d(4), nn.Sequential(BatchNormAct2d(4)))
+
+    distributed.init_process_group("gloo", init_method=f"file://{tmp_path}/group", rank=0, world_size=1)
+    try:
+        images = 3 + torch.randn(6, 3, 9, 9, generator=torch.Generator().manual_seed(1))
+        plain, shared = network(), over_ranks(network())
+        assert plain.state_dict().keys() == shared.state_dict().keys()
+        for model in (plain, shared):
+            (model(images) ** 3).sum().backward()
+        for (name, one), other in zip(plain.named_parameters(), shared.parameters(), strict=True):
+            torch.testing.assert_close(other.grad, one.grad, rtol=2e-4, atol=2e-3, msg=name)
+        torch.testing.assert_close(shared.state_dict(), plain.state_dict(), rtol=1e-5, atol=1e-6)
+        torch.testing.assert_close(shared.eval()(images), plain.eval()(images), rtol=1e-5, atol=1e-6)
+    finally:
+        distributed.destroy_process_group()

@@ -315,7 +315,7 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
         )
     # Labels that are right at one sample of each motion model at least.
     label = told[:, 0]
-    settings = {"batch": 4, "threads": 1, "precision": "fp32"}
+    settings = {"batch": 4, "threads": 1, "precision": "fp32", "mirror": False}
     right, about = recognised(tmp_path / "model.pt", [({"name": "none"}, {"views": views, "label": label})], settings)
     np.testing.assert_array_equal(right["none"], told == label[:, None])
     assert about == {"scheme": "BC:VRP+VT", "protocol": "seen"}

@@ -99,7 +99,7 @@ def recognised(folder, network, config, clouds):
         "recognition", "train", "--views", *views, "--protocol", "seen", "--scheme", name, "--schemes", table,
         "--stations", *stations, "--out", folder / "model", **settings,
     )  # fmt: skip
-    evaluation = {"batch": 8, "threads": 1, "precision": "fp32"}
+    evaluation = {"batch": 8, "threads": 1, "precision": "fp32", "mirror": False}
     model = ("--model", folder / "model/model.pt")
     run("recognition", "evaluate", "--views", *views, *model, "--out", folder / "p.csv", **evaluation)
     run("recognition", "evaluate", *index, *model, "--out", folder / "direct.csv", **evaluation)

@@ -54,16 +54,59 @@ def test_a_constant_difference_has_an_interval_of_no_width():
     assert interval == (0.25, 0.25, 0.25)
 
 
-@settings(deadline=None)
-@given(st.integers(0, 12), st.integers(0, 12))
-def test_mcnemar_is_the_two_sided_sign_test_on_discordant_samples(only_first, only_second):
-    first = np.array([True] * only_first + [False] * only_second + [True, False])
-    second = np.array([False] * only_first + [True] * only_second + [True, False])
-    found = statistics.mcnemar(first, second)
-    total = only_first + only_second
-    tail = sum(math.comb(total, k) for k in range(min(only_first, only_second) + 1)) / 2**total
-    assert found[:2] == (only_first, only_second)
-    assert found[2] == pytest.approx(min(1.0, 2 * tail) if only_first != only_second else 1.0, rel=1e-9)
+def nested(rng, seeds, subtypes, models, spreads):
+    """Shares of correct samples (seeds, subtypes x models) with known deviations of seeds, subtypes and models."""
+    seed, subtype, model = spreads
+    shape = (seeds, subtypes, models)
+    parts = seed * rng.standard_normal((seeds, 1, 1)), subtype * rng.standard_normal((1, subtypes, 1))
+    values = parts[0] + parts[1] + model * rng.standard_normal(shape[1:])
+    return np.broadcast_to(values, shape).reshape(seeds, -1)
+
+
+@pytest.mark.parametrize(
+    ("spreads", "whole", "width"),
+    [((0.0, 0.0, 1.0), False, 0.1), ((0.0, 1.0, 0.0), True, 1 / math.sqrt(20)), ((1.0, 0.0, 0.0), True, 1.0)],
+    ids=["motion models", "subtypes", "seeds"],
+)
+def test_an_interval_is_as_wide_as_the_level_that_varies_makes_it(spreads, whole, width):
+    """Twenty subtypes of five models, three seeds: 1.96 times the standard error of a mean of 100, 20 or 3 values."""
+    found, names = [], np.repeat(np.arange(20), 5)
+    for trial in range(40):
+        one = nested(stream(trial, "one"), 3, 20, 5, spreads)
+        low, high = statistics.strict_difference(
+            one, np.zeros_like(one), np.full(100, 6), names, whole, stream(trial, "draw"), 600
+        )[1:]
+        # The standard error of this trial's own values, where only seeds vary.
+        own = one.mean(1).std(ddof=1) / math.sqrt(3) if spreads[0] else width
+        found.append((high - low) / (2 * 1.96 * own))
+    assert np.mean(found) == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_difference_that_only_the_subtypes_decide_is_not_called_certain():
+    """One subtype of five gains a whole point in every model and seed, the others lose a fifth of one."""
+    names = np.repeat(np.arange(5), 40)
+    one = np.tile(np.where(names == 0, 1.0, -0.2), (3, 1))
+    given = (one, np.zeros_like(one), np.full(200, 6), names)
+    plain = statistics.strict_difference(*given, False, stream(1, "draw"))
+    strict = statistics.strict_difference(*given, True, stream(1, "draw"))
+    assert -0.06 < plain.low < plain.value < plain.high < 0.14
+    assert strict.value == plain.value == pytest.approx(0.04)
+    assert strict.low < -0.15 and strict.high > 0.4
+
+
+def test_a_motion_model_brings_one_value_however_many_snrs_it_has():
+    motion = np.array(["b", "a", "b", "a", "b"])
+    first, count, shares = statistics.model_shares(motion, [np.array([1, 0, 0, 1, 1]), np.ones(5)])
+    assert motion[first].tolist() == ["a", "b"] and count.tolist() == [2, 3]
+    np.testing.assert_allclose(shares, [[1 / 2, 2 / 3], [1, 1]])
+
+
+def test_the_95_percent_interval_of_a_mean_is_196_standard_errors_wide_on_either_side():
+    values = stream(3, "normal").standard_normal(400)
+    value, low, high = statistics.bootstrap(np.arange(400), values, stream(4, "b"), 20_000)
+    error = values.std() / 20
+    assert (high - value) / error == pytest.approx(1.96, rel=0.04)
+    assert (value - low) / error == pytest.approx(1.96, rel=0.04)
 
 
 def test_calibration_of_a_perfectly_calibrated_and_of_an_overconfident_model():
@@ -103,3 +146,30 @@ def test_alarm_rates_are_shares_of_each_class():
     detected, alarms = statistics.alarm_rates(scores, labels, 0.7)
     assert detected == 0.5
     assert alarms.tolist() == [0.5, 1.0, 0.0]
+
+
+def alarm_part(rng, models, name, samples=3):
+    """UAVs of score 0.5 to 1, birds of 0 to 0.6, in turn; vehicles and pedestrians of 0."""
+    label = np.repeat(np.arange(models) % 4, samples)
+    score = np.select([label == 0, label == 1], [rng.uniform(0.5, 1, len(label)), rng.uniform(0, 0.6, len(label))])
+    motion = np.repeat([f"{name}{number}" for number in range(models)], samples)
+    return statistics.AlarmPart(score, label, motion, label)
+
+
+def test_alarm_intervals_hold_the_rates_and_narrow_with_the_samples():
+    widths = []
+    for models in (80, 800):
+        parts = [[alarm_part(stream(seed, name), models, name)] for seed, name in ((1, "v"), (2, "t"))]
+        level = statistics.threshold(parts[0][0].scores, parts[0][0].labels, 0.9)
+        detected, alarms = statistics.alarm_rates(parts[1][0].scores, parts[1][0].labels, level)
+        bounds = statistics.alarm_intervals(*parts, 0.9, False, stream(3, "a"), 200)
+        for rate, (low, high) in zip([detected, *alarms], bounds, strict=True):
+            assert low <= rate <= high
+        assert bounds[2:].tolist() == [[0, 0], [0, 0]]
+        widths.append(bounds[1, 1] - bounds[1, 0])
+    assert 2 < widths[0] / widths[1] < 5
+
+
+@pytest.mark.parametrize(("uavs", "detection", "expected"), [(100, 0.9, True), (99, 0.9, False), (300, 0.99, False)])
+def test_a_detection_is_measurable_only_where_ten_uavs_may_lie_below_the_threshold(uavs, detection, expected):
+    assert statistics.measurable(np.r_[np.zeros(uavs, int), np.ones(500, int)], detection) == expected

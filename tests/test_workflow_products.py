@@ -92,11 +92,25 @@ def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
     assert usual.group_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []
 
 
+def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signals():
+    _, products, texts = parts({"tiles": {"reduced": [24, 32]}})
+    for size, made in ((24, True), (32, True), (48, False)):
+        job = SimpleNamespace(run="default", group="seen", part="00001", size=str(size))
+        files = {"reduced": f"reduced/{size}/seen-00001.npy", "motion": "motion/seen-00001.csv"} if made else {}
+        assert products.reduced(job) == {name: f"results/default/{path}" for name, path in files.items()}
+        assert ("snr_db" in json.loads(texts.views(job))) == made
+    _, products, texts = parts({"shards": {"kind": "signal"}})
+    assert products.reduced(SimpleNamespace(size="24")) == {}
+    output = SimpleNamespace(reduced=["results/default/reduced/24/seen-00001.npy"])
+    assert options.reduced(None, output) == "--reduced 24=results/default/reduced/24/seen-00001.npy"
+    assert options.reduced(None, SimpleNamespace(reduced=[])) == ""
+
+
 def test_training_reads_images_of_the_scheme_s_own_size():
     run, products, _ = parts(
-        {"recognition": {"table": "config/accuracy.csv", "schemes": ["base", "24 pixels"], "timed": []}}
+        {"recognition": {"table": "config/accuracy.csv", "schemes": ["base", "48 pixels"], "timed": []}}
     )
-    for scheme, size in (("base", 48), ("24-pixels", 24)):
+    for scheme, size in (("base", 24), ("48-pixels", 48)):
         views = products.samples(SimpleNamespace(scheme=scheme))["views"]
         assert views == [f"results/default/views/{size}/{shard}.npz" for shard in run.plan.shards]
     _, uncached, _ = parts({"recognition": {"cache": False}})
@@ -107,7 +121,8 @@ def test_training_reads_images_of_the_scheme_s_own_size():
     ("overlay", "changed"),
     [
         ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table", "cost_pixels"}),
-        ({"noise": {"snr_db": [9]}}, {"noise", "shard"}),
+        ({"noise": {"snr_db": [9]}}, {"noise", "shard", "views"}),
+        ({"tiles": {"reduced": [48]}}, {"views"}),
         ({"images": {"gamma": 0.7}}, {"images", "cost_pixels"}),
         ({"images": {"colour_map": "magma"}}, {"images", "cost_pixels", "training"}),
         ({"recognition": {"training": {"steps": 7}}}, {"training"}),
@@ -117,7 +132,7 @@ def test_training_reads_images_of_the_scheme_s_own_size():
     ],
 )
 def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
-    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="48", train_seed="3", get=lambda key, default: 3)
+    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
     names = (
         "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "cost_pixels", "views",
         "training", "evaluation", "seed", "effects_table",
@@ -160,7 +175,7 @@ def test_a_run_on_another_s_data_reads_there_and_refuses_other_settings(tmp_path
     made.write_text(yaml.safe_dump(base))
     run, products, _ = parts(overlay)
     job = SimpleNamespace(run="mine", scheme="abc-vrp-trp-vt")
-    assert products.samples(job)["views"][0].startswith("results/default/views/48/")
+    assert products.samples(job)["views"][0].startswith("results/default/views/24/")
     folders = {Path(name).parts[1] for name in products.benchmarks(job) if "/train/" in name or "/evaluate/" in name}
     assert folders == {"mine"} and run.data == "default"
     made.write_text(yaml.safe_dump(base | {"seed": 5}))

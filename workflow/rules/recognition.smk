@@ -6,6 +6,7 @@
 
 rule views:
     input:
+        unpack(products.reduced),
         code=code("lowalt.recognition", "lowalt.recognition.views"),
         index="results/{run}/shards/index.json",
         shard="results/{run}/shards/{group}-{fold}-{part}.tar",
@@ -19,9 +20,10 @@ rule views:
         "../../envs/environment.yaml"
     params:
         settings=settings.views,
+        reduced=options.reduced_chunk,
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.reduced} --out {output:q} 2> {log:q}"
 
 
 rule freeze:

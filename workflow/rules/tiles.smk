@@ -1,6 +1,7 @@
 # Tiles: three spectra a station, nine images a sample, tiled 3 x 3 and encoded without loss.
 # REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy
-# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written
+# OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written, and for every size of tiles.reduced
+#          results/{run}/reduced/{size}/{group}-{part}.npy
 
 
 rule tiles:
@@ -8,7 +9,8 @@ rule tiles:
         code=code("lowalt.tiles"),
         signals="results/{run}/noisy/{group}-{part}.npy",
     output:
-        temp("results/{run}/tiles/{group}-{part}.npz"),
+        tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
+        reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
     log:
         "results/{run}/logs/tiles/{group}-{part}.log",
     benchmark:
@@ -17,5 +19,7 @@ rule tiles:
         "../../envs/environment.yaml"
     params:
         settings=settings.images,
+        reduced=options.reduced,
     shell:
-        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced}"
+        " --out {output.tiles:q} 2> {log:q}"

@@ -164,7 +164,7 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
     from lowalt.recognition import recipe, runs
     from lowalt.recognition.inference import Machine, probabilities
 
-    batch, threads, precision = pick(block, "batch", "threads", "precision")
+    batch, threads, precision, mirror = pick(block, "batch", "threads", "precision", "mirror")
     trained = runs.load(model)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)
@@ -175,7 +175,7 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
             raise InputError(f"{header['name']}: images of {arrays['views'].shape[-1]} pixels, {model} {trained.size}")
         count = arrays["views"].shape[0] * arrays["views"].shape[1]
         held = _Held(arrays["views"], trained.scheme.columns)
-        told = probabilities(network, held, np.arange(count), machine, batch)
+        told = probabilities(network, held, np.arange(count), machine, batch, mirror)
         found[header["name"]] = correct(told.reshape(*arrays["views"].shape[:2], -1), arrays["label"])
     return found, {"scheme": trained.scheme.name, "protocol": trained.protocol}
 

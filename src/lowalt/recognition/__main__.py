@@ -13,16 +13,25 @@ from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
 
 
 def _views(arguments: list[str]) -> None:
-    """Write the cache of views of one shard. Settings: size."""
-    from lowalt.recognition.views import cache_shard
+    """Write the cache of views of one shard. Settings: size; with --reduced also snr_db."""
+    from lowalt.recognition.views import Reduced, cache_shard
 
     line = parser("lowalt.recognition views", _views.__doc__)
     line.add_argument("--index", required=True, help="index of the shards (.json)")
     line.add_argument("--shard", required=True, help="name of the shard, {group}-{fold}-{part}.tar")
+    line.add_argument("--reduced", help="images of the shard's chunk at this size, from the tiles stage (.npy)")
+    line.add_argument("--motion", help="with --reduced: motion table of the chunk")
     line.add_argument("--out", required=True, help="views to write (.npz)")
     given = line.parse_args(arguments)
-    (size,) = pick(given.settings, "size")
-    print(f"{given.out}: {cache_shard(given.index, given.shard, size, given.out)} samples", file=sys.stderr)
+    if (given.reduced is None) != (given.motion is None):
+        raise InputError("expected both --reduced and --motion, or neither")
+    if given.reduced:
+        size, levels = pick(given.settings, "size", "snr_db")
+        source = Reduced(Path(given.reduced), Path(given.motion), tuple(map(float, levels)))
+    else:
+        (size,), source = pick(given.settings, "size"), None
+    count = cache_shard(given.index, given.shard, size, given.out, source)
+    print(f"{given.out}: {count} samples", file=sys.stderr)
 
 
 def _freeze(arguments: list[str]) -> None:
@@ -90,7 +99,7 @@ def _train(arguments: list[str]) -> None:
 
 
 def _evaluate(arguments: list[str]) -> None:
-    """Predict every validation and test sample of a trained model's protocol. Settings: batch, threads, precision."""
+    """Predict all validation and test samples of a model's protocol. Settings: batch, threads, precision, mirror."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import evaluate, load
 

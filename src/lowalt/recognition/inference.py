@@ -60,11 +60,13 @@ class Machine:
 
 @torch.inference_mode()
 def probabilities(
-    model: nn.Module, samples: ViewSamples, numbers: np.ndarray, machine: Machine, batch: int
+    model: nn.Module, samples: ViewSamples, numbers: np.ndarray, machine: Machine, batch: int, mirror: bool = False
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), 4) float64 of the samples `numbers`.
 
-    Whole batches are dealt to the ranks, never parts of one, so that sums do not depend on the number of ranks.
+    mirror: average with the probabilities of the same images turned around along Doppler, which are those of the
+    target seen from behind. Whole batches are dealt to the ranks, never parts of one, so that sums do not depend on the
+    number of ranks.
     """
     model.eval()
     result = torch.zeros(len(numbers), 4, dtype=torch.float64)
@@ -72,9 +74,10 @@ def probabilities(
         if index % machine.ranks != machine.rank:
             continue
         images = torch.from_numpy(samples.views(numbers[start : start + batch])).to(machine.device)
+        seen = (images, images.flip(-2)) if mirror else (images,)
         with machine.autocast():
-            logits = model(images)
-        result[start : start + batch] = logits.double().softmax(1).cpu()
+            logits = [model(image) for image in seen]
+        result[start : start + batch] = torch.stack([found.double().softmax(1) for found in logits]).mean(0).cpu()
     if machine.ranks > 1:
         # Every entry is non-zero on one rank only: the sum is exact.
         result = result.to(machine.device)

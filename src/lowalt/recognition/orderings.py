@@ -14,6 +14,8 @@ CLAIMS = (
       for name in ("", "Swin-B ", "ConvNeXt-B ", "ViT-B/16 ")),
 )  # fmt: skip
 """The paper's claims: the scheme said to be better, the other, and the claim's name."""
+SEEDS = 3
+"""Trainings a scheme must have before its rank is stated: another seed moves accuracies as much as many schemes do."""
 
 
 def read_published(path: str | Path) -> dict[tuple[str, str], float]:
@@ -29,14 +31,20 @@ def read_published(path: str | Path) -> dict[tuple[str, str], float]:
         raise InputError(f"{path}: not a table of accuracies ({error!r})") from error
 
 
-def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:
-    """Yield rows [protocol, scheme, over, claim, paper_points, difference_points, low, high, ordering].
+def verdict(low: float, high: float, seeds: int) -> str:
+    """Return whether an ordering holds by the bounds of its interval, or that too few trainings were made to say."""
+    if seeds < SEEDS:
+        return "not ranked"
+    return "holds" if low > 0 else "reversed" if high < 0 else "undecided"
 
-    compared: the rows of comparisons.csv; those by motion model decide.
+
+def ordering_rows(compared: list[list], published: dict[tuple[str, str], float]) -> Iterable[list]:
+    """Yield rows [protocol, scheme, over, claim, paper_points, seeds, difference_points, low, high, ordering].
+
+    compared: the rows of comparisons.csv.
     """
-    for protocol, better, other, claim, unit, difference, low, high, *_ in compared:
-        if unit == "motion model":
-            theirs = [published.get((protocol, name)) for name in (better, other)]
-            paper = "" if None in theirs else f"{theirs[0] - theirs[1]:.2f}"
-            ordering = "holds" if float(low) > 0 else "reversed" if float(high) < 0 else "undecided"
-            yield [protocol, better, other, claim, paper, difference, low, high, ordering]
+    for protocol, better, other, claim, _, seeds, difference, low, high in compared:
+        theirs = [published.get((protocol, name)) for name in (better, other)]
+        paper = "" if None in theirs else f"{theirs[0] - theirs[1]:.2f}"
+        ordering = verdict(float(low), float(high), seeds)
+        yield [protocol, better, other, claim, paper, seeds, difference, low, high, ordering]

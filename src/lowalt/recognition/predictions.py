@@ -10,6 +10,7 @@ from the data set. Probabilities are not negative and sum to one within 1e-3.
 """
 
 import csv
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,6 +69,21 @@ class Predictions:
         inside = [pair in pairs for pair in zip(self.group.tolist(), self.fold.tolist(), strict=True)]
         rows = np.flatnonzero(inside)
         return self.take(rows[np.argsort(self.key[rows], kind="stable")])
+
+
+def record(path: str | Path) -> dict:
+    """Return the record beside a prediction file.
+
+    Raises: InputError where it is missing or no JSON object.
+    """
+    side = existing(Path(path).with_suffix(".json"), "run record")
+    try:
+        found = json.loads(side.read_text())
+    except ValueError as error:
+        raise InputError(f"{side}: not a run record ({error})") from error
+    if not isinstance(found, dict):
+        raise InputError(f"{side}: not a run record, expected a JSON object")
+    return found
 
 
 def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarray) -> Predictions:

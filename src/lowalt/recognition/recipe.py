@@ -12,7 +12,8 @@ Settings of this module, the block `recognition.training`:
     label_smoothing  0..1
     alone            weight of a second loss, on each station as if it were the only one; 0 for none. Several
                      stations then teach the backbone as often as they are seen, not once a sample
-    ema              largest decay of the moving average of the weights (it rises with the steps); 0 for none
+    ema              decay d of the moving average of the weights: weights of k steps ago count d^k, relative to the
+                     latest; 0 for none
     precision        auto (bf16 where the hardware has it, else fp32) | bf16 (autocast) | fp32
     channels_last    memory layout of images and convolutions
     compile          torch.compile the network
@@ -25,6 +26,7 @@ Settings of this module, the block `recognition.training`:
 
 import math
 import os
+from types import ModuleType
 
 import torch
 from torch import nn
@@ -75,6 +77,15 @@ def schedule(share: float, warmup: float) -> float:
     return 0.5 * (1 + math.cos(math.pi * (share - warmup) / (1 - warmup))) if warmup < 1 else 1.0
 
 
+def averaging(decay: float, step: int) -> float:
+    """Weight of the old average after `step` (1, 2, ...) so that the average is sum d^k w_k / sum d^k over all ages k.
+
+    A constant weight d would keep the first, random weights in the average for 1 / (1 - d) steps. Source: the bias
+    correction of Kingma and Ba, Adam, 2015, section 3.
+    """
+    return 1 - (1 - decay) / (1 - decay**step) if decay < 1 else 1 - 1 / step
+
+
 def optimiser(model: nn.Module, block: dict) -> torch.optim.AdamW:
     """Return AdamW with four groups: backbone or not, matrix (decayed) or not."""
     groups = []
@@ -101,3 +112,24 @@ def seeded(seed: int, keys: tuple, threads: int) -> None:
     torch.use_deterministic_algorithms(True)
     # Filling every new tensor is for finding reads of unset memory; this code has none and it costs a tenth.
     torch.utils.deterministic.fill_uninitialized_memory = False
+
+
+def random_state(device: torch.device, cuda: ModuleType = torch.cuda) -> dict[str, torch.Tensor]:
+    """Return the states of the generators that a training on `device` draws from: the processor's, and a GPU's own.
+
+    cuda: what answers for GPUs. All ranks draw alike, so one rank's states stand for all.
+    """
+    states = {"cpu": torch.get_rng_state()}
+    return {**states, "cuda": cuda.get_rng_state(device)} if device.type == "cuda" else states
+
+
+def set_random_state(device: torch.device, states: dict[str, torch.Tensor], cuda: ModuleType = torch.cuda) -> None:
+    """Take up the states of `random_state`.
+
+    Raises: InputError where a training that ran on another kind of device is to go on.
+    """
+    if ("cuda" in states) != (device.type == "cuda"):
+        raise InputError(f"checkpoint: random states of {sorted(states)}, but this training runs on {device.type}")
+    torch.set_rng_state(states["cpu"])
+    if device.type == "cuda":
+        cuda.set_rng_state(states["cuda"], device)

@@ -48,7 +48,7 @@ def train(
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
         scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
-        samples={part: len(source.facts) for part, source in samples.items()}, torch=torch.__version__,
+        samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
     )  # fmt: skip
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
@@ -114,18 +114,30 @@ def load(path: str | Path) -> Trained:
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path))
 
 
-def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "") -> None:
+def check_size(samples: Samples, size: int) -> None:
+    """Refuse samples of another size than `size` (pixels a side).
+
+    Raises: InputError naming both.
+    """
+    if samples.size != size:
+        raise InputError(f"--views: images of {samples.size} pixels, settings say {size}")
+
+
+def evaluate(
+    trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "", more: dict | None = None
+) -> None:
     """Write the predictions for all samples of a source, and beside them the run's record (.json).
 
-    settings: {batch, threads, precision}; trained_on: the run that trained the model, where it is another.
+    settings: {batch, threads, precision, mirror}; trained_on: the run that trained the model, where it is another;
+    more: what else the record is to say.
     Under torchrun the ranks share the work and rank 0 writes.
     """
-    batch, threads, precision = pick(settings, "batch", "threads", "precision")
+    batch, threads, precision, mirror = pick(settings, "batch", "threads", "precision", "mirror")
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)
     model = trained.model.to(machine.device)
     start = time.monotonic()
-    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch)
+    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch, mirror)
     seconds = time.monotonic() - start
     if machine.rank:
         return
@@ -135,7 +147,7 @@ def evaluate(trained: Trained, samples: Samples, settings: dict, out: str | Path
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
         "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
-        "trained_on": trained_on,
+        "trained_on": trained_on, "mirror": mirror, **(more or {}),
     })  # fmt: skip
 
 

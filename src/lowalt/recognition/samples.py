@@ -8,6 +8,7 @@ A cache file (.npz) holds, for the samples of one shard in its order,
     one array (samples,) for every name of FACTS
 """
 
+import hashlib
 import zipfile
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -64,6 +65,18 @@ def first_models(facts: Facts, share: float) -> np.ndarray:
     return np.flatnonzero(chosen)
 
 
+def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
+    """Return the SHA-256 of keys, labels, subtypes, models and SNRs of some samples, and of `content`."""
+    hasher = hashlib.sha256()
+    for name in ("key", "label", "subtype", "model", "snr_db"):
+        values = np.ascontiguousarray(getattr(facts, name))
+        hasher.update(f"{name} {values.dtype.str} {values.shape}".encode())
+        hasher.update(values.tobytes())
+    for part in content:
+        hasher.update(part)
+    return hasher.hexdigest()
+
+
 class ViewSamples:
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
@@ -100,6 +113,10 @@ class ViewSamples:
     def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         return self.images[numbers]
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all that a training sees of these samples: images, labels, keys and their order."""
+        return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:

@@ -1,7 +1,8 @@
 """Numbers from predictions: accuracy, confusion, intervals, tests, calibration, false alarms. NumPy and SciPy only.
 
 Motion models, not samples, are the independent units: all SNRs of a motion model share its echo, so intervals
-resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007).
+resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007). What is claimed of
+schemes also resamples training seeds and, of unseen subtypes, the subtypes (`strict_difference`).
 """
 
 from typing import NamedTuple
@@ -12,6 +13,17 @@ from lowalt.targets.cloud import CATEGORIES
 
 CLASSES = len(CATEGORIES)
 UAV = CATEGORIES.index("UAV")
+FEWEST_MISSED = 10
+"""UAVs of the validation samples that a threshold must leave undetected: their number varies by a third then."""
+
+
+class AlarmPart(NamedTuple):
+    """What false alarms are counted from, each (samples,): UAV probability, class, motion model, subtype."""
+
+    scores: np.ndarray
+    labels: np.ndarray
+    motion: np.ndarray
+    subtypes: np.ndarray
 
 
 def cross_entropy(probabilities: np.ndarray, labels: np.ndarray) -> float:
@@ -66,17 +78,62 @@ def paired_difference(
     return bootstrap(clusters, np.asarray(one, float) - other, generator)
 
 
-def mcnemar(first: np.ndarray, second: np.ndarray) -> tuple[int, int, float]:
-    """Samples only the first gets right, only the second, and the exact two-sided p value that both are as likely.
+def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the first sample (models,) and the number of samples (models,) of each motion model, and its share of
+    correct samples by seed (seeds, models), so that a motion model brings one value.
 
-    first, second: (samples,) bool. Source: McNemar, Psychometrika 12, 1947, with the exact binomial distribution.
+    motion (samples,): name of the motion model; correct: (samples,) of every training seed.
     """
-    from scipy.stats import binomtest
+    _, first, place, count = np.unique(motion, return_index=True, return_inverse=True, return_counts=True)
+    sums = np.array([np.bincount(place, weights=row) for row in correct])
+    return first, count, sums / count
 
-    only_first, only_second = int(np.sum(first & ~second)), int(np.sum(second & ~first))
-    if only_first + only_second == 0:
-        return 0, 0, 1.0
-    return only_first, only_second, float(binomtest(only_first, only_first + only_second).pvalue)
+
+def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> np.ndarray:
+    """How often each of the seeds is drawn, (repeats, seeds), as a share of the draws.
+
+    Deviations from equal shares are stretched by sqrt(n / (n - 1)): plain resampling of n values gives their mean only
+    (n - 1) / n of its variance, a third too little for three seeds. Source: Davison and Hinkley, Bootstrap Methods and
+    their Application, 1997, section 2.
+    """
+    if seeds == 1:
+        return np.ones((repeats, 1))
+    shares = generator.multinomial(seeds, np.full(seeds, 1 / seeds), repeats) / seeds
+    return 1 / seeds + (shares - 1 / seeds) * np.sqrt(seeds / (seeds - 1))
+
+
+def _model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np.random.Generator) -> np.ndarray:
+    """How often each motion model is drawn, (repeats, models): of all, or where `whole` within subtypes drawn first."""
+    if not whole:
+        return generator.multinomial(len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats).astype(float)
+    names, place = np.unique(subtypes, return_inverse=True)
+    drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
+    weights = np.zeros((repeats, len(subtypes)))
+    for number in range(len(names)):
+        mine = np.flatnonzero(place == number)
+        # A subtype that is drawn twice brings its motion models twice, each time drawn anew.
+        weights[:, mine] = generator.multinomial(drawn[:, number] * len(mine), np.full(len(mine), 1 / len(mine)))
+    return weights
+
+
+def strict_difference(
+    one: np.ndarray, other: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
+    generator: np.random.Generator, repeats: int = 4000,
+) -> Interval:  # fmt: skip
+    """Mean of one - other over seeds and samples, with the 95 % interval that resamples seeds, subtypes and models.
+
+    one, other (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of the
+    two are drawn apart, since equal seeds train two schemes from unlike draws. count (models,): samples of each model;
+    subtypes (models,): the subtype each belongs to. whole_subtypes: draw subtypes before their motion models, for
+    results that are to hold for other subtypes. With one seed the interval is of these trained networks alone.
+    Source: as `bootstrap`; nested levels as in Davison and Hinkley 1997, section 3.8.
+    """
+    weights = _model_weights(subtypes, whole_subtypes, repeats, generator) * count
+    weights /= weights.sum(1, keepdims=True)
+    means = [((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1) for shares in (one, other)]
+    low, high = np.quantile(means[0] - means[1], [0.025, 0.975])
+    value = np.average(one.mean(0) - other.mean(0), weights=count)
+    return Interval(float(value), float(low), float(high))
 
 
 def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> dict[str, float]:
@@ -118,6 +175,54 @@ def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float
     uavs = np.sort(scores[labels == UAV])[::-1]
     needed = int(np.ceil(detection * len(uavs) - 1e-9))
     return float(uavs[max(needed, 1) - 1])
+
+
+def measurable(labels: np.ndarray, detection: float) -> bool:
+    """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` UAVs lie below it.
+
+    labels (samples,) of the validation samples. With fewer the threshold is the score of a handful of them.
+    """
+    return (1 - detection) * np.sum(labels == UAV) >= FEWEST_MISSED - 1e-9
+
+
+def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: float) -> float:
+    """`threshold` of UAV scores (n,) of which the i-th stands weights[i] times."""
+    order = np.argsort(-scores, kind="stable")
+    reached = np.cumsum(weights[order])
+    return float(scores[order][np.searchsorted(reached, detection * reached[-1] - 1e-9)])
+
+
+def alarm_intervals(
+    validation: list["AlarmPart"], test: list["AlarmPart"], detection: float, whole_subtypes: bool,
+    generator: np.random.Generator, repeats: int = 400,
+) -> np.ndarray:  # fmt: skip
+    """Bounds (4, 2) of the 95 % intervals of detection and of the false alarm rates of birds, vehicles, pedestrians.
+
+    validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
+    models of both parts and, where `whole_subtypes`, subtypes of the test part; thresholds are set on what it draws.
+    Source: as `strict_difference`.
+    """
+
+    def sample_weights(part: AlarmPart, whole: bool) -> np.ndarray:
+        _, first, place = np.unique(part.motion, return_index=True, return_inverse=True)
+        return _model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
+
+    judged, set_on = sample_weights(test[0], whole_subtypes), sample_weights(validation[0], False)
+    uavs = validation[0].labels == UAV
+    of_class = [test[0].labels == label for label in range(CLASSES)]
+    drawn = generator.integers(0, len(test), (repeats, len(test)))
+    found = np.full((repeats, CLASSES), np.nan)
+    for repeat in range(repeats):
+        rates = []
+        for seed in drawn[repeat]:
+            level = _weighted_threshold(validation[seed].scores[uavs], set_on[repeat, uavs], detection)
+            called = test[seed].scores >= level
+            totals = [judged[repeat, mine].sum() for mine in of_class]
+            hits = [judged[repeat, mine] @ called[mine] for mine in of_class]
+            rates.append([hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)])
+        found[repeat] = np.mean(rates, axis=0)
+    kept = found[~np.isnan(found).any(1)]
+    return np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((CLASSES, 2), np.nan)
 
 
 def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float) -> tuple[float, np.ndarray]:

@@ -9,14 +9,15 @@ Files written, each with the columns `protocol, scheme` first:
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
-    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test;
-                     each model at its own threshold, means over the seeds
+    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test with
+                     95 % intervals; each model at its own threshold, means over the seeds; "not measurable" where
+                     fewer than ten validation samples would lie below the threshold
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
     reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
-    comparisons.csv  over: the scheme compared with; difference with 95 % interval by resampled unit over all seeds,
-                     and McNemar's test of the first seed's models
-    orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval by
-                     motion model lies above zero), is reversed (below) or is undecided (zero inside)
+    comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the interval resamples:
+                     training seeds (where there are several), subtypes (unseen protocol), motion models
+    orderings.csv    the paper's claims: its own difference, ours, and whether its ordering holds here (the interval
+                     lies above zero), is reversed (below), undecided (zero inside) or not ranked (fewer than 3 seeds)
 """
 
 import json
@@ -34,13 +35,16 @@ from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import (
+    AlarmPart,
     accuracy_by,
+    alarm_intervals,
     alarm_rates,
     calibration,
     confusion,
-    mcnemar,
-    paired_difference,
+    measurable,
+    model_shares,
     reliability,
+    strict_difference,
     threshold,
 )
 from lowalt.targets.cloud import CATEGORIES
@@ -135,17 +139,32 @@ def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], widt
         yield [f"{band * width:g}", f"{(band + 1) * width:g}", _percent(share), count]
 
 
-def alarm_rows(runs: list[Run]) -> Iterable[list]:
-    """Yield rows [asked, threshold, detected, bird, vehicle, pedestrian] in percent; thresholds from validation."""
-    validations = [run.part("validation") for run in runs]
-    for asked in DETECTIONS if all((found.label == 0).any() for found in validations) else ():
-        rows = []
-        for run, found in zip(runs, validations, strict=True):
-            level = threshold(found.probabilities[:, 0], found.label, asked)
-            detected, alarms = alarm_rates(run.test.probabilities[:, 0], run.test.label, level)
-            rows.append([level, detected, *alarms])
-        level, *rates = np.mean(rows, axis=0).tolist()
-        yield [_percent(asked), repr(level), *map(_percent, rates)]
+def _alarm_part(found: Predictions) -> AlarmPart:
+    return AlarmPart(found.probabilities[:, 0], found.label, found.motion, found.subtype)
+
+
+def alarm_rows(runs: list[Run], seed: int) -> Iterable[list]:
+    """Yield rows [asked, threshold, rate, low, high, ...]: detection, then false alarms of bird, vehicle, pedestrian.
+
+    In percent, with 95 % intervals; thresholds come from validation samples. A detection that too few validation
+    samples can set a threshold for is "not measurable".
+    """
+    validations = [_alarm_part(run.part("validation")) for run in runs]
+    tests = [_alarm_part(run.test) for run in runs]
+    for asked in DETECTIONS if all((found.labels == 0).any() for found in validations) else ():
+        if not measurable(validations[0].labels, asked):
+            yield [_percent(asked), *["not measurable"] * (1 + 3 * len(CATEGORIES))]
+            continue
+        levels = [threshold(found.scores, found.labels, asked) for found in validations]
+        rates = []
+        for found, level in zip(tests, levels, strict=True):
+            detected, alarms = alarm_rates(found.scores, found.labels, level)
+            rates.append([detected, *alarms])
+        whole = runs[0].protocol == "unseen"
+        generator = stream(seed, "alarms", runs[0].protocol, runs[0].scheme, asked)
+        bounds = alarm_intervals(validations, tests, asked, whole, generator)
+        cells = [[_percent(rate), *map(_percent, pair)] for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)]
+        yield [_percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
 
 
 def calibration_rows(runs: list[Run]) -> Iterable[list]:
@@ -163,20 +182,21 @@ def reliability_rows(runs: list[Run]) -> Iterable[list]:
 
 
 def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[list]:
-    """Yield rows [unit, difference, low, high, only_first, only_second, p] of two schemes on the same samples.
+    """Yield one row [resampled, seeds, difference, low, high] of two schemes on the same samples.
 
-    Differences in percentage points, mean over the seeds; the last three are of the first seed's models, since
-    McNemar's test is of two classifiers. Raises: InputError where the schemes were tested on different samples.
+    Difference in percentage points, mean over the seeds; seeds: the fewer of the two schemes' trainings.
+    Raises: InputError where the schemes were tested on different samples.
     """
     one, other = first[0].test, second[0].test
     if not np.array_equal(one.key, other.key):
         raise InputError(f"{first[0].scheme} and {second[0].scheme} were tested on different samples")
-    shares = [np.mean([run.test.correct for run in runs], axis=0) for runs in (first, second)]
-    discordant = mcnemar(one.correct, other.correct)
-    for unit, clusters in (("motion model", one.motion), ("subtype", one.subtype)):
-        generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme, unit)
-        interval = paired_difference(clusters, *shares, generator)
-        yield [unit, *map(_percent, interval), *discordant[:2], f"{discordant[2]:.6g}"]
+    shares = [model_shares(one.motion, [run.test.correct for run in runs]) for runs in (first, second)]
+    (place, count, ours), (*_, theirs) = shares
+    whole, seeds = first[0].protocol == "unseen", min(len(first), len(second))
+    generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme)
+    interval = strict_difference(ours, theirs, count, one.subtype[place], whole, generator)
+    levels = ["seeds"] * (seeds > 1) + ["subtypes"] * whole + ["motion models"]
+    yield [", ".join(levels), seeds, *map(_percent, interval)]
 
 
 def _write(path: Path, columns: list[str], rows: list[list]) -> None:
@@ -201,7 +221,8 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
     share = ["accuracy_percent", "samples"]
     measured = ["snr_db", *share, "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
-    alarm = ["asked_percent", "threshold", "detected_percent", "bird_percent", "vehicle_percent", "pedestrian_percent"]
+    rates = ("detected", "bird", "vehicle", "pedestrian")
+    alarm = ["asked_percent", "threshold", *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high"))]
     tables = {
         "accuracy": (measured, lambda group: accuracy_rows(group, "test")),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
@@ -209,7 +230,7 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
         "subtypes": (["category", "subtype", *share], subtype_rows),
         "ranges": (bands, lambda group: band_rows(group, lambda found: found.range_m, 50)),
         "aspects": (bands, lambda group: band_rows(group, lambda found: found.aspect_deg, 30)),
-        "alarms": (alarm, alarm_rows),
+        "alarms": (alarm, lambda group: alarm_rows(group, seed)),
         "calibration": (["calibration_error", "brier", "cross_entropy"], calibration_rows),
         "reliability": (["from", "to", "confidence_percent", "accuracy_percent", "samples"], reliability_rows),
     }
@@ -225,7 +246,7 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
         if (protocol, better) in groups and (protocol, other) in groups
         for row in comparison_rows(groups[protocol, better], groups[protocol, other], seed)
     ]
-    columns = ["over", "claim", "unit", "difference_points", "low", "high", "only_first", "only_second", "mcnemar_p"]
+    columns = ["over", "claim", "resampled", "seeds", "difference_points", "low", "high"]
     _write(Path(folder) / "comparisons.csv", columns, compared)
-    columns = ["over", "claim", "paper_points", "difference_points", "low", "high", "ordering"]
+    columns = ["over", "claim", "paper_points", "seeds", "difference_points", "low", "high", "ordering"]
     _write(Path(folder) / "orderings.csv", columns, list(ordering_rows(compared, published)))

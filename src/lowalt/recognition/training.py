@@ -22,10 +22,11 @@ from lowalt.common.progress import Reporter
 from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint
 from lowalt.recognition.augment import augment
+from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.order import batches, epoch_order
-from lowalt.recognition.recipe import check, optimiser, schedule
+from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.statistics import cross_entropy
 
 HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", "validation_accuracy")
@@ -108,8 +109,9 @@ class Trainer:
         if missing:
             raise InputError(f"training: no training sample of class {sorted(missing)}, expected all of 0..3")
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
-        self.model = model.to(machine.device, memory_format=layout)
-        self.ema = ModelEmaV3(self.model, decay=self.block["ema"], use_warmup=True)
+        shared = over_ranks(model) if machine.ranks > 1 else model
+        self.model = shared.to(machine.device, memory_format=layout)
+        self.ema = ModelEmaV3(self.model, decay=self.block["ema"])
         self.optimiser = optimiser(self.model, self.block)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
         self.best_weights: dict = {}
@@ -130,7 +132,8 @@ class Trainer:
     def _state(self) -> dict:
         return {
             "model": self.model.state_dict(), "ema": self.ema.module.state_dict(), "best": self.best_weights,
-            "optimiser": self.optimiser.state_dict(), "at": vars(self.at), "random": torch.get_rng_state(),
+            "optimiser": self.optimiser.state_dict(), "at": vars(self.at),
+            "random": random_state(self.machine.device),
         }  # fmt: skip
 
     def resume(self) -> bool:
@@ -144,7 +147,7 @@ class Trainer:
         self.optimiser.load_state_dict(state["optimiser"])
         self.best_weights = state["best"]
         self.at = Progress(**state["at"])
-        torch.set_rng_state(state["random"])
+        set_random_state(self.machine.device, state["random"])
         return True
 
     def _finite(self) -> None:
@@ -199,7 +202,8 @@ class Trainer:
         self.optimiser.zero_grad(set_to_none=True)
         self.at.steps += 1
         if self.block["ema"]:
-            self.ema.update(self.model, step=self.at.steps)
+            self.ema.decay = averaging(self.block["ema"], self.at.steps)
+            self.ema.update(self.model)
         else:
             self.ema.set(self.model)
 

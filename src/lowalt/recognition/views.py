@@ -1,21 +1,26 @@
 """From shards to index images at the training size: sample by sample, or a whole shard into a cache file.
 
 Decoding and shrinking 256 x 256 images costs more than a small network's step, so a cache pays as soon as two
-runs share it; at scale a training run reads the shards themselves, and sees the same pixels.
+runs share it; at scale a training run reads the shards themselves, and sees the same pixels. A cache of the sizes that
+the tiles stage reduces its images to needs no decoding either.
 """
 
+import json
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, station_names
+from lowalt.motion import read_table
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.shards import ShardSet
+from lowalt.tiles import reduced
 
 _KEY = re.compile(r"(.+)-\d{6}-snr")
 
@@ -81,9 +86,39 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
     )
 
 
-def cache_shard(index: str | Path, name: str, size: int, out: str | Path) -> int:
+@dataclass(frozen=True)
+class Reduced:
+    """Images of a whole chunk that the tiles stage has reduced already, and what says where each sample stands there.
+
+    path: file of `lowalt.tiles.reduced`; motion: the chunk's motion table; snrs_db: the noise levels of every motion
+    model, in the order of the chunk's signals.
+    """
+
+    path: Path
+    motion: Path
+    snrs_db: tuple[float, ...]
+
+    def images(self, facts: Facts, size: int) -> np.ndarray:
+        """Return the images (len(facts), views, size, size) uint8 of these samples.
+
+        Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit them.
+        """
+        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
+        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
+        images = reduced.read(self.path, size, len(rows) * len(levels))
+        samples_of = zip(facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True)
+        try:
+            places = [rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in samples_of]
+        except KeyError as error:
+            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
+        return images[places]
+
+
+def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None) -> int:
     """Write the cache file of the shard `name` and return its number of samples.
 
+    source: images of the shard's chunk at this size, where the tiles stage has made them; without, every image of the
+    shard is decoded (or rendered) and reduced. Both give the same bytes.
     Raises: InputError where the index has no such shard, the size is wrong, or the shard is damaged.
     """
     if isinstance(size, bool) or not isinstance(size, int) or size < 8:
@@ -95,11 +130,15 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path) -> int
     place = names.index(name)
     start = sum(shard["samples"] for shard in shards.shards[:place])
     numbers = np.arange(start, start + shards.shards[place]["samples"])
-    views = np.empty((len(numbers), len(shards.columns()), size, size), dtype=np.uint8)
-    for row, number in enumerate(numbers):
-        views[row] = shards.images(number, size)
-    # The images' bytes have been checked: the records need no second look.
-    samples.write(out, views, facts_of(ShardSet(index, check=False), numbers))
+    # Images are checked as they are decoded; the records then need no second look.
+    facts = facts_of(ShardSet(index, check=False), numbers)
+    if source:
+        views = source.images(facts, size)
+    else:
+        views = np.empty((len(numbers), len(shards.columns()), size, size), dtype=np.uint8)
+        for row, number in enumerate(numbers):
+            views[row] = shards.images(number, size)
+    samples.write(out, views, facts)
     return len(numbers)
 
 
@@ -134,3 +173,12 @@ class ShardSamples:
         """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         chosen = (self.size, self.stations, self.spectra)
         return np.stack([self.shards.images(self.numbers[number], *chosen) for number in numbers])
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all that a training sees of these samples; the shards' own checksums stand for images.
+
+        Shards are checked against them as they are read. The same samples from a cache have another sum.
+        """
+        render = {"size": self.size, "stations": self.stations, "spectra": self.spectra, **self.shards.index["render"]}
+        sums = sorted(shard["table_sha256"] for shard in self.shards.shards)
+        return samples.fingerprint(self.facts, json.dumps([render, sums], sort_keys=True).encode())

@@ -87,7 +87,9 @@ class ShardSet:
         """The bytes of a member of a sample, after the sample's check."""
         shard, place = self._locate(number)
         row, path = self._table(shard)[place], existing(self._path(shard), "shard")
-        offset, size = int(row["offset"]), int(row["size"])
+        first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
+        # Without a check the member alone is read: a record is a hundredth of its sample's bytes.
+        offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
         # Opened for each sample: a data set may have more shards than a process may have open files, and a memory map
         # of a file cut short would end the process.
         with path.open("rb") as file:
@@ -95,8 +97,7 @@ class ShardSet:
             span = file.read(size)
         if len(span) < size or (self.check and hashlib.sha256(span).digest() != row["sha256"].tobytes()):
             raise InputError(f"{path.name}: sample {row['key'].decode()} is damaged (SHA-256 differs)")
-        first = int(row[f"{member}_offset"]) - offset
-        return span[first : first + int(row[f"{member}_size"])]
+        return span[first - offset : first - offset + length]
 
     def _column(self, name: str) -> np.ndarray:
         parts = [self._table(shard)[name] for shard in range(len(self.shards))]

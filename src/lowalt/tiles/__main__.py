@@ -1,6 +1,6 @@
-"""`python -m lowalt.tiles`: noisy signals of a chunk in, the encoded tiles of the chunk out."""
+"""`python -m lowalt.tiles`: noisy signals of a chunk in, its encoded tiles out, and reduced images where asked for."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ from lowalt.common.files import existing
 from lowalt.common.network import Network
 from lowalt.common.progress import reported
 from lowalt.spectra import Spectra
-from lowalt.tiles import files
+from lowalt.tiles import files, reduced
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images
@@ -41,12 +41,13 @@ def load_signals(path: str | Path, network: Network) -> np.ndarray:
     return signals
 
 
-def encoded(signals: np.ndarray, tiles: Renderer) -> Iterator[bytes]:
-    """Yield the PNG of every sample, model by model, SNR by SNR."""
-    palette = tiles.images.palette
-    for model in reported(signals, len(signals), "models"):
-        for sample in model:
-            yield encode(tiles.tile(sample), palette)
+def encoded(signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None]) -> Iterator[bytes]:
+    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile."""
+    palette, models = tiles.images.palette, reported(signals, len(signals), "models")
+    for number, sample in enumerate(sample for model in models for sample in model):
+        tile = tiles.tile(sample)
+        seen(number, tile)
+        yield encode(tile, palette)
 
 
 def main(arguments: list[str]) -> None:
@@ -54,10 +55,19 @@ def main(arguments: list[str]) -> None:
     options = parser("lowalt.tiles", "Render signals to tiles of spectra.")
     options.add_argument("--signals", required=True, help="noisy signals (.npy, complex64)")
     options.add_argument("--out", required=True, help="tiles file to write (.npz)")
+    options.add_argument(
+        "--reduced",
+        nargs="*",
+        default=[],
+        metavar="SIZE=PATH",
+        help="also write the images at SIZE pixels a side (.npy)",
+    )
     given = options.parse_args(arguments)
     tiles = renderer(given.settings)
     signals = load_signals(given.signals, tiles.network)
-    files.write(given.out, encoded(signals, tiles))
+    targets = [reduced.target(text) for text in given.reduced]
+    with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2]) as seen:
+        files.write(given.out, encoded(signals, tiles, seen))
 
 
 if __name__ == "__main__":

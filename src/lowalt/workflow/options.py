@@ -3,6 +3,7 @@
 Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`.
 """
 
+from pathlib import Path
 from typing import Any
 
 
@@ -19,6 +20,17 @@ def powers(wildcards: Any, input: Any) -> str:
 def tiles(wildcards: Any, input: Any) -> str:
     """The tiles of a chunk, where shards hold images."""
     return f"--tiles {input.tiles}" if input.get("tiles") else ""
+
+
+def reduced(wildcards: Any, output: Any) -> str:
+    """The reduced images of a chunk that the tiles stage writes, by their size, which is the name of their folder."""
+    targets = [f"{Path(path).parent.name}={path}" for path in output.reduced]
+    return f"--reduced {' '.join(targets)}" if targets else ""
+
+
+def reduced_chunk(wildcards: Any, input: Any) -> str:
+    """The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
+    return f"--reduced {input.reduced} --motion {input.motion}" if input.get("reduced") else ""
 
 
 def samples(wildcards: Any, input: Any) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.street import PACKAGE
+from lowalt.recognition import choose
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -85,6 +86,13 @@ class Products:
             return {}
         return {"tiles": f"results/{wildcards.run}/tiles/{wildcards.group}-{wildcards.part}.npz"}
 
+    def reduced(self, wildcards: Any) -> dict[str, str]:
+        """Reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
+        if not self._run.is_reduced(int(wildcards.size)):
+            return {}
+        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
+        return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": f"{base}/motion/{chunk}.csv"}
+
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """What training and evaluation read: images shrunk to the scheme's size, or the shards."""
         base = f"results/{self._run.data}"
@@ -92,6 +100,24 @@ class Products:
             return {"index": f"{base}/shards/index.json"}
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
+
+    def trial_views(self, wildcards: Any) -> list[str]:
+        """Images that a trial may see, shrunk to its candidate's size: trained group, folds train and val."""
+        size = choose.settled(self._config["recognition"], self._changes(wildcards.candidate))["size"]
+        shards = [name for name in self._run.plan.shards if name.startswith(("seen-train-", "seen-val-"))]
+        return [f"results/{self._run.data}/views/{size}/{shard}.npz" for shard in shards]
+
+    def _changes(self, candidate: str) -> dict:
+        table = choose.read(choose.TABLE)
+        return table.candidates[table.named(candidate)]
+
+    def trials(self, wildcards: Any) -> list[str]:
+        """Predictions of all candidates, folds and training seeds, the first candidate's first."""
+        table, seeds = choose.read(choose.TABLE), self._config["recognition"]["seeds"]
+        names = [
+            f"{slug(name)}/{fold}-{seed}" for name in table.candidates for fold in range(table.folds) for seed in seeds
+        ]
+        return [f"results/{wildcards.run}/choices/{name}/predictions.csv" for name in names]
 
     def asked_model(self, wildcards: Any) -> str:
         """The network that shows what effects do."""

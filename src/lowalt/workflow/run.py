@@ -128,6 +128,10 @@ class Run:
             )
         return max(able, key=lambda scheme: len(scheme.columns))
 
+    def is_reduced(self, size: int) -> bool:
+        """Whether the tiles stage reduces its images to this size; signal shards have no tiles."""
+        return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
+
     def pixels(self, scheme: Scheme) -> int:
         """Pixels a side that a scheme's network sees."""
         return scheme.size or self.config["recognition"]["size"]

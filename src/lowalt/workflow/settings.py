@@ -85,8 +85,10 @@ class Settings:
         return self._text("cost_pixels", **self._blocks("network", "motion", "spectra", "images", "seed", "cost"))
 
     def views(self, wildcards: Any) -> str:
-        """Pixels a side of the shrunk images."""
-        return self._text("views", wildcards.size, size=int(wildcards.size))
+        """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""
+        size = int(wildcards.size)
+        more = {"snr_db": self._config["noise"]["snr_db"]} if self._run.is_reduced(size) else {}
+        return self._text("views", wildcards.size, size=size, **more)
 
     def training(self, wildcards: Any) -> str:
         """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
@@ -94,6 +96,12 @@ class Settings:
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
         return self._text("training", seed, seed=seed, colour_map=self._config["images"]["colour_map"], **kept)
+
+    def trial(self, wildcards: Any) -> str:
+        """How a network is trained and asked where no candidate changes it, and the seed of a trial."""
+        block, seed = self._config["recognition"], int(wildcards.train_seed)
+        kept = {key: block[key] for key in ("size", "network", "training", "augmentation", "evaluation")}
+        return self._text("trial", seed, seed=seed, colour_map=self._config["images"]["colour_map"], **kept)
 
     def evaluation(self, wildcards: Any) -> str:
         """How a network is asked."""

@@ -2,12 +2,14 @@
 
 from lowalt.report.run import Run
 
+RATES = ("detected", "bird", "vehicle", "pedestrian")
 COLUMNS = (
-    "protocol", "scheme", "asked_percent", "detected_percent", "bird_percent", "vehicle_percent", "pedestrian_percent",
+    "protocol", "scheme", "asked_percent", "threshold",
+    *(f"{rate}_{end}" for rate in RATES for end in ("percent", "low", "high")),
 )  # fmt: skip
 
 
 def values(run: Run) -> dict | None:
     """Return the rows of the table of false alarms; None where there are none."""
     rows = run.inputs.table("alarms", *COLUMNS)
-    return {"rows": rows} if rows else None
+    return {"rows": rows, "rates": RATES} if rows else None

@@ -2,9 +2,7 @@
 
 from lowalt.report.run import Run
 
-COMPARISONS = (
-    "protocol", "scheme", "over", "difference_points", "low", "high", "unit", "only_first", "only_second", "mcnemar_p",
-)  # fmt: skip
+COMPARISONS = ("protocol", "scheme", "over", "difference_points", "low", "high", "resampled", "seeds")
 ORDERINGS = ("protocol", "scheme", "over", "claim", "paper_points", "difference_points", "ordering")
 
 
@@ -12,7 +10,12 @@ def ordering_words(rows: list[dict[str, str]]) -> str:
     """Return in one sentence how many of the paper's orderings hold, and which do not."""
     holding = [row for row in rows if row["ordering"] == "holds"]
     words = f"Of {len(rows)} orderings of the paper that this run can test, {len(holding)} hold"
-    for verdict, phrase in (("reversed", "the other way round"), ("undecided", "not decided by these samples")):
+    phrases = {
+        "reversed": "the other way round",
+        "undecided": "not decided by these samples",
+        "not ranked": "not ranked, with fewer than three training seeds",
+    }
+    for verdict, phrase in phrases.items():
         names = [
             f"{row['scheme']} over {row['over']} ({row['protocol']})" for row in rows if row["ordering"] == verdict
         ]

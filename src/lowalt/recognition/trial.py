@@ -1,0 +1,75 @@
+"""One trial of a candidate: train it without some subtypes, predict those and the validation samples of the others."""
+
+import copy
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.command import parser, pick, run
+from lowalt.recognition import choose, runs
+from lowalt.recognition.samples import Facts, ViewSamples
+from lowalt.recognition.schemes import TABLE, Scheme, named
+
+BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
+"""What a candidate may change of the block `recognition`."""
+
+
+def part_of(samples: ViewSamples, numbers: np.ndarray) -> ViewSamples:
+    """Return the samples `numbers` of a source as a source of its own."""
+    found = copy.copy(samples)
+    found.keep(numbers)
+    return found
+
+
+def joined(first: ViewSamples, second: ViewSamples) -> ViewSamples:
+    """Return the samples of two sources of one size as one."""
+    found = copy.copy(first)
+    found.images = np.concatenate([first.images, second.images])
+    pairs = zip(vars(first.facts).values(), vars(second.facts).values(), strict=True)
+    found.facts = Facts(*map(np.concatenate, pairs))
+    return found
+
+
+def trial(
+    choices: choose.Choices, candidate: str, fold: int, settings: dict, scheme: Scheme, views: list, out: Path
+) -> None:
+    """Train a candidate in one fold and write `predictions.csv` and its record into the folder `out`.
+
+    settings: {seed, colour_map} and BLOCKS, as the configuration has them; views: cache files of the candidate's size.
+    Raises: InputError for an unknown candidate or fold, and as a training does.
+    """
+    seed, colour_map, *_ = pick(settings, "seed", "colour_map", *BLOCKS)
+    name = choices.named(candidate)
+    block = choose.settled({key: settings[key] for key in BLOCKS}, choices.candidates[name])
+    source = ViewSamples(views, scheme.columns, choose.PAIRS)
+    runs.check_size(source, block["size"])
+    parts = {part: part_of(source, rows) for part, rows in choose.parts(source.facts, fold, choices.folds).items()}
+    evaluation = block.pop("evaluation")
+    given = {"train": parts["train"], "validation": parts["validation"]}
+    runs.train(given, scheme, f"without fold {fold}", {"seed": seed, "colour_map": colour_map, **block}, out)
+    asked = joined(parts["held"], parts["validation"])
+    held = sorted(set(parts["held"].facts.subtype.tolist()))
+    about = {"candidate": name, "fold": fold, "held": held}
+    runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
+
+
+def main(arguments: list[str]) -> None:
+    """Try one candidate. Settings: seed, colour_map, size, network, training, augmentation, evaluation."""
+    line = parser("lowalt.recognition.trial", main.__doc__)
+    line.add_argument(
+        "--views", nargs="+", required=True, help="caches of views (.npz): group seen, folds train and val"
+    )
+    line.add_argument("--candidates", default=choose.TABLE, help=f"table of candidates (default: {choose.TABLE})")
+    line.add_argument("--candidate", required=True, help="name or slug of a candidate")
+    line.add_argument("--fold", type=int, required=True, help="number of the fold held out, from 0")
+    line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
+    line.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
+    line.add_argument("--out", required=True, help="folder for predictions.csv, its record and the model")
+    given = line.parse_args(arguments)
+    table = choose.read(given.candidates)
+    scheme = named(given.schemes, table.scheme, given.stations)
+    trial(table, given.candidate, given.fold, given.settings, scheme, given.views, Path(given.out))
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,70 @@
+"""Reduced images of a chunk, made from its tiles while these are still pixels: no PNG has to be decoded for them.
+
+A file (.npy) holds (samples, views, size, size) uint8 in the order of the tiles file: `resize` of the views of every
+tile, the same bytes as from the decoded PNG, since PNG loses nothing.
+"""
+
+import contextlib
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing
+from lowalt.tiles.render import VIEWS, split
+from lowalt.tiles.resample import resize
+
+_TARGET = re.compile(r"([1-9]\d*)=(.+)", re.DOTALL)
+
+
+def target(text: str) -> tuple[int, Path]:
+    """Return size (pixels a side) and path of a reduced file from the text "SIZE=PATH".
+
+    Raises: InputError where the text has another form.
+    """
+    found = _TARGET.fullmatch(text)
+    if not found:
+        raise InputError(f"--reduced {text!r}: expected SIZE=PATH, such as 24=reduced.npy")
+    return int(found[1]), Path(found[2])
+
+
+@contextlib.contextmanager
+def writing(
+    targets: list[tuple[int, Path]], samples: int, stations: int
+) -> Iterator[Callable[[int, np.ndarray], None]]:
+    """Open reduced files and yield a function (number, tile) that fills the place of one sample in all of them.
+
+    targets: size (pixels a side) and path of each file; a tile is (stations S, 3 S) uint8. The files appear under their
+    names when the block ends without an error.
+    """
+    with contextlib.ExitStack() as stack:
+        arrays = []
+        for size, path in targets:
+            temporary = stack.enter_context(replacing(path))
+            shape = (samples, stations * len(VIEWS), size, size)
+            arrays.append(np.lib.format.open_memmap(temporary, "w+", np.uint8, shape))
+
+        def fill(number: int, tile: np.ndarray) -> None:
+            images = split(tile) if arrays else tile
+            for array in arrays:
+                array[number] = resize(images, array.shape[-1])
+
+        yield fill
+        for array in arrays:
+            array.flush()
+
+
+def read(path: str | Path, size: int, samples: int) -> np.ndarray:
+    """Return a reduced file as a read-only memory map, (samples, views, size, size) uint8.
+
+    Raises: InputError naming the file where it is missing, damaged, or of other samples or another size.
+    """
+    try:
+        found = np.lib.format.open_memmap(existing(path, "reduced images"), "r")
+    except (OSError, ValueError, EOFError) as error:
+        raise InputError(f"{path}: not reduced images ({error})") from error
+    if found.dtype != np.uint8 or found.ndim != 4 or (found.shape[0], *found.shape[2:]) != (samples, size, size):
+        raise InputError(f"{path}: {found.dtype} {found.shape}, expected uint8 ({samples}, views, {size}, {size})")
+    return found
