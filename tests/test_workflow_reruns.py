@@ -42,7 +42,7 @@ ECHO = {("echo", *chunk, station) for chunk in CHUNKS for station in STATIONS}
 NOISE = {("noise", *chunk) for chunk in CHUNKS}
 TILES = {("tiles", *chunk) for chunk in CHUNKS}
 SHARD = {("shard", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
-VIEWS = {("views", "48", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
+VIEWS = {("views", "24", group, fold, part) for group, part in CHUNKS for fold in FOLDS}
 TRAIN = {("train", *training) for training in TRAININGS}
 EVALUATE = {("evaluate", *training) for training in TRAININGS}
 INDEX, CARD, SETTINGS, REPORT, TABLES = {("index",)}, {("card",)}, {("configuration",)}, {("report",)}, {("tables",)}
@@ -51,6 +51,11 @@ WHOLE = {
     *CLOUD, *MOTION, *ECHO, *NOISE, *TILES, *SHARD, *VIEWS, *TRAIN, *EVALUATE, *INDEX, *CARD, *SETTINGS, *REPORT,
     *TABLES, *GALLERY, *FREEZE, *DISTANCES, *MANIFEST,
 }  # fmt: skip
+
+
+def views_of(group, part):
+    """The views of a chunk, which come from its tiles and its motion table."""
+    return {work for work in VIEWS if (work[2], work[4]) == (group, part)}
 
 
 def next_jobs(job):
@@ -62,7 +67,7 @@ def next_jobs(job):
         return own | GALLERY | FREEZE | DISTANCES | REPORT
     if rule == "motion":
         own = {work for work in ECHO | NOISE if list(work[1:3]) == names}
-        own |= {work for work in SHARD if [work[1], work[3]] == names}
+        own |= {work for work in SHARD if [work[1], work[3]] == names} | views_of(*names)
         return (
             own | FREEZE | (DISTANCES if names[1] == "00000" else set()) | (REPORT if names == [*CHUNKS[0]] else set())
         )
@@ -70,9 +75,9 @@ def next_jobs(job):
         return {("noise", *names[:2])}
     if rule in ("noise", "tiles"):
         own = {("shard", names[0], fold, names[1]) for fold in FOLDS}
-        return own | ({("tiles", *names)} if rule == "noise" else set())
+        return own | ({("tiles", *names)} if rule == "noise" else views_of(*names))
     if rule == "shard":
-        return {("views", "48", *names)} | INDEX
+        return {("views", "24", *names)} | INDEX
     after = {
         "index": CARD | VIEWS | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
         "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": REPORT, "distances": REPORT,
