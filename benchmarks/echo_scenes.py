@@ -1,11 +1,11 @@
-"""Random scenes over the whole configuration space, the engine at each tolerance against an independent judge.
+"""Random scenes over the whole configuration space: the echo at each tolerance against an independent reference.
 
     python benchmarks/echo_scenes.py --count 10000 [--seed 1] [--out results/benchmarks/echo_scenes.csv]
 
-Ranges 1 m to 100 km, 1 to 5000 points, 0.5 to 100 GHz, any array sizes. Each scene is judged at eight random symbols
-and the two deepest fades. The judge (`lowalt.measure.echo_baselines`) sums elements and subcarriers one by one, its
+Ranges 1 m to 100 km, 1 to 5000 points, 0.5 to 100 GHz, any array sizes. Each scene is compared at eight random symbols
+and the two deepest fades. The reference (`judge`) sums elements and subcarriers one by one, its
 ranges in extended precision; it shares nothing with the closed form. A tolerance below a scene's floor is refused,
-which is counted, not judged. In every second scene the engine must use what the tolerance allows, also where the exact
+which is counted, not judged. In every second scene the cheap plan of a tolerance is tried even where the exact
 mode would be as fast.
 """
 
@@ -30,7 +30,7 @@ from lowalt.measure.echo_cost import hardware
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48
 PRICES = ((refine.PROBE_COST, pose_series.INTERPOLATION_COST), (-np.inf, 1))
-"""What a shortcut must save to be taken: as shipped, and nothing at all."""
+"""Costs that a cheap plan and interpolation must save: as shipped, and none, so that they are always tried."""
 NEAR_TIE = 1e-12
 
 
@@ -68,7 +68,7 @@ def scene(seed: int, index: int) -> tuple[Network, Station, Rigid, np.ndarray, n
 
 
 def examine(seed: int, index: int) -> list[dict]:
-    """Judge one scene at every tolerance (None: exact, held to 1e-9); a row each."""
+    """Compare one scene with the reference at every tolerance (None: exact, held to 1e-9); return a row each."""
     network, station, motion, rcs, aim = scene(seed, index)
     rows, truth = [], {}
     rng = stream(seed, "judged symbols", index)
@@ -96,7 +96,7 @@ def examine(seed: int, index: int) -> list[dict]:
             strength = abs(cells)
             best = int(strength.argmax())
             if result.cell[n] != best:
-                # A gap that the judge's own double sums cannot tell from none is a near-tie.
+                # A gap below the rounding of the reference's double sums counts as a near-tie.
                 noise = max(NEAR_TIE * strength[best], 1e-13 * largest)
                 ties, wrong = ties + (strength[best] - strength[result.cell[n]] <= noise), wrong + (
                     strength[best] - strength[result.cell[n]] > noise
@@ -109,10 +109,10 @@ def examine(seed: int, index: int) -> list[dict]:
 
 
 def failures(rows: list[dict]) -> list[dict]:
-    """The rows that break a promise: error above the tolerance or above the proved bound, or a wrong cell.
+    """Return the rows whose error is above the tolerance or above the proved bound, or whose cell is wrong.
 
-    What the judge cannot tell is allowed on top of the bound: 3e-12 of its double sums, and eight roundings of its
-    64-bit mantissas in the turns of phase (50 digits side with the engine where the two differ by that much).
+    The reference's own error is allowed on top of the bound: 3e-12 of its double sums, and eight roundings of its
+    64-bit mantissas in the turns of phase. Where both differ by so much, 50 digits agree with the echo.
     """
     bad = []
     for row in rows:
@@ -124,7 +124,7 @@ def failures(rows: list[dict]) -> list[dict]:
 
 
 def main() -> None:
-    """Run the scenes and print how many there were and what they showed."""
+    """Run the scenes, write the table and print the failures."""
     line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     line.add_argument("--count", type=int, default=10_000)
     line.add_argument("--seed", type=int, default=1)

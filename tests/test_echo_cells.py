@@ -60,7 +60,7 @@ def test_no_cell_beyond_the_bound_is_stronger(seed, points, deep, count, place, 
     beyond = np.arange(side + 1, count - side)
     truth = abs(kernel(beyond[:, None] - (centre + table.half * v), count) @ z)
     assert (truth <= limit * (1 + 1e-9) + 1e-13 * total).all()
-    # The bound is worth having: for a shallow target it is close to the nearest cell beyond.
+    # The bound is not too loose: for a shallow target it is close to the value in the nearest cell beyond.
     assert deep > 0.3 or limit <= 1.6 * truth.max() + 1e-3 * total
 
 

@@ -113,12 +113,12 @@ CASES = {
 
 
 def judged(name):
-    """(ours, naive, truth, right cell) of a case; the truth is in the cell that 50 digits say."""
+    """Return (our value, the naive one, the true one in our cell, whether that cell is right, our bound) of a case."""
     _, net, station, points, aim = CASES[name]
     rcs = np.linspace(0.5, 1.5, len(points)) if len(points) != 2 else np.ones(2)
     result = echo_signal(net, station, points[None], rcs, aim)
     ours, cell = result.signal[0], int(result.cell[0])
-    # Around the target every cell, elsewhere some: far cells of one cluster cannot win.
+    # All cells about the target and some of the others: far cells of one cluster cannot be the strongest.
     near = {(cell + j) % net.subcarriers for j in range(-2, 3)} | set(
         range(0, net.subcarriers, max(1, net.subcarriers // 7))
     )
@@ -173,7 +173,7 @@ def test_a_million_symbols_do_not_drift():
     angle = 2 * np.pi * ((n * 137) % 1000) / 1000
     path = np.stack([100 + 0.2 * np.cos(angle), 0.2 * np.sin(angle), 0 * angle + 25.0], axis=1)[:, None]
     result = echo_signal(NET, NET.stations[0], path, 1.0, (100.0, 1.0, 25.0))
-    # Symbols a whole number of turns apart hold equal positions, so equal bits but for the tile they fall in.
+    # Symbols a whole number of turns apart hold equal positions, so their values are equal to rounding.
     late, early = result.signal[-1000:], result.signal[:1000]
     assert abs(late - early).max() < 1e-13 * abs(early).max()
     truth = reference.cell_mp(NET, NET.stations[0], path[-1].tolist(), [1.0], (100.0, 1.0, 25.0), result.cell[-1])

@@ -1,4 +1,4 @@
-"""A sample of the random-scene judgement (`benchmarks/echo_scenes.py`), and that it can tell right from wrong."""
+"""Some of the random scenes of `benchmarks/echo_scenes.py`, and tests that their check finds errors."""
 
 import sys
 from pathlib import Path

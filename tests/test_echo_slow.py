@@ -1,4 +1,4 @@
-"""Slow-time interpolation: its bound on complex ellipses, its weights, and what it may and may not be used for."""
+"""Slow-time interpolation: its bound on complex ellipses, its weights, and the targets it is used for."""
 
 from math import comb
 
@@ -51,7 +51,7 @@ def test_what_is_interpolated_keeps_its_bound(always_approximate, seed, away, si
     assert relative(result.signal, truth.signal) <= min(result.bound, tolerance) + truth.bound
     assert (result.totals >= truth.totals * (1 - 1e-3 * tolerance - 1e-9)).all()
     assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
-    # Blades that turn by a radian a symbol never are; the body is, unless it swings by more than a turn a symbol.
+    # Blades that turn by a radian a symbol are never interpolated; a body is, unless it is large.
     assert result.method.slow[0] in (0, 40) and (result.method.slow[0] == 40 or size > 0.3 or tolerance < 1e-6)
 
 
@@ -99,7 +99,7 @@ def test_the_bound_holds_on_the_whole_ellipse(seed, away, size, speed, yaw, rho)
     assert (np.log(abs(bared)) - 2 * np.pi * turned.imag).max() <= whole + 1e-9
 
 
-def test_the_bound_is_worth_having():
+def test_the_bound_is_not_too_loose():
     net = network()
     radio = radar(net, net.stations[0])
     motion = flight(np.random.default_rng(1), 400, 1, (150.0, 60.0, 60.0), 0.4)
@@ -163,7 +163,7 @@ def test_a_body_that_trembles_is_not_interpolated(always_approximate):
     assert result.method.slow == (0, 0) and relative(result.signal, truth.signal) <= result.bound <= 1e-6
     still = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-6)
     assert still.method.slow[0] == 120
-    # A tenth of a micrometre is nothing to a tolerance of a hundredth.
+    # A tenth of a micrometre is far below a tolerance of 1e-2.
     assert echo_signal(*arguments, 1e-2).method.slow[0] == 120
 
 

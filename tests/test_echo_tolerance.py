@@ -1,4 +1,4 @@
-"""A tolerance is kept: bounds proved before, kept after, cheaper when looser; every shortcut has its own judge."""
+"""A tolerance is kept: errors stay below proved bounds, looser tolerances are cheaper, each polynomial keeps its bound."""
 
 import mpmath
 import numpy as np
@@ -24,7 +24,7 @@ def test_error_and_bound_stay_within_the_tolerance(seed, points, size, away, tol
     rng = np.random.default_rng(seed)
     motion = cloud_in_motion(rng, 40, points, (away, 0.3 * away, 40.0), size, 20.0)
     arguments = (net, net.stations[0], motion, rng.exponential(size=points), motion.translation[0, 0])
-    # Another kernel altogether: point by point, no polynomial, all cells where need be.
+    # The pointwise kernel is independent of the fast one: it has no polynomials, and computes all cells where needed.
     truth = echo_signal(*arguments, paths=[Path()])
     for allowed in (tolerance, None):
         result = echo_signal(*arguments, allowed)
@@ -131,7 +131,7 @@ def test_the_gap_is_a_lower_bound_that_says_something(size, tolerance):
     strengths = np.sort(abs(echo_matrix(*arguments, "cells")), axis=1)
     truth = strengths[:, -1] - strengths[:, -2]
     assert (result.gap <= truth * (1 + 1e-9)).all() and (result.gap >= 0).all()
-    # The bound on far cells seldom hides a clear lead, and so the gap is mostly all there is.
+    # The bound on far cells seldom hides a clear lead, so most gaps are close to the true ones.
     assert np.median(result.gap / truth) > 0.5
     assert (strengths.sum(axis=1) > 0).all() and (result.totals >= strengths[:, -1] * (1 - 1e-9)).all()
     general = echo_signal(*arguments, paths=[Path(), Path(0.0, -0.5j)])
