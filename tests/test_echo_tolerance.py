@@ -1,4 +1,4 @@
-"""A tolerance is kept: errors stay below proved bounds, looser tolerances are cheaper, each polynomial keeps its bound."""
+"""A tolerance is kept: errors stay below proved bounds, looser tolerances are cheaper, polynomials keep their bounds."""
 
 import mpmath
 import numpy as np
