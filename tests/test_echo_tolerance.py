@@ -1,4 +1,4 @@
-"""A tolerance is kept: errors stay below proved bounds, looser tolerances are cheaper, polynomials keep their bounds."""
+"""A tolerance is kept: errors stay below proved bounds, looser ones are cheaper, polynomials keep their bounds."""
 
 import mpmath
 import numpy as np
