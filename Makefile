@@ -29,12 +29,13 @@ data: $(SETUP)  ## the default's data set only, no training
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 	LOWALT_INPUTS=$(INPUTS) $(SNAKEMAKE) --configfile config/real.yaml
 
-# Twice gives equal bytes: figures, distances and pictures stand in results/reference, networks in results/measured.
+# Twice gives equal bytes. Of the recordings only those of vehicles have a licence, so only their picture is kept in git.
 measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
 	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs $(INPUTS) --out results/measured || exit 1; done
 	$(BIN)/python -m lowalt.recordings recognise --inputs $(INPUTS) --out results/measured --models results/measured/models
-	cp results/measured/measured-*.csv results/reference/
-	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/reference --page results/measured/report.html
+	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/measured --page results/measured/report.html
+	cp results/measured/measured-*.csv results/measured/measured-vehicle.png results/reference/
+	cp results/measured/measured-short.png design/pictures/measured.png
 
 test: $(SETUP)  ## the test suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

@@ -3,7 +3,8 @@
     python -m lowalt.report.measured --pairs FOLDER --tables FOLDER --page FILE
 
 draws every pair-NAME.npz as measured-NAME.png into the folder of tables, all pairs side by side as
-measured-overview.png, and writes the page with the one section "Held against measurement".
+measured-overview.png, and the vehicles' pair without its third row as measured-short.png. The page has the one section
+"Held against measurement".
 """
 
 import argparse
@@ -32,6 +33,8 @@ def main(arguments: list[str]) -> None:
         raise InputError(f"{given.pairs}: no pair-*.npz, expected those of `python -m lowalt.recordings pairs`")
     pictures = {name: pair_picture(pair) for name, pair in pairs.items()}
     pictures["overview"] = overview(list(pairs.values()))
+    if "vehicle" in pairs:
+        pictures["short"] = pair_picture(pairs["vehicle"], ("measured", "simulated"))
     for name, picture in pictures.items():
         with replacing(given.tables / f"measured-{name}.png") as temporary:
             temporary.write_bytes(picture)
