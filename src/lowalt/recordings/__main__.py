@@ -17,7 +17,7 @@ from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
 from lowalt.recordings.recognise import settings
 from lowalt.recordings.record import read_record
-from lowalt.recordings.sets import at_carrier, recordings
+from lowalt.recordings.sets import at_carrier, present, recordings
 from lowalt.targets.cloud import CATEGORIES
 from lowalt.targets.records import load_records
 
@@ -69,10 +69,14 @@ def predict(arguments: list[str]) -> None:
     told = facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), "test")
     found = guesses(load_model(given.model, given.radar, block), Windows(images, told), block)
     starts = np.arange(count) * twin.symbols * twin.symbol_interval_s
-    rows = samples.predictions(found, starts)
-    samples.write_table(given.out / "predictions.csv", ("start_s", "class", *CATEGORIES), rows)
-    named = np.bincount(found.argmax(1), minlength=len(CATEGORIES))
-    print(", ".join(f"{category} {share}" for category, share in zip(CATEGORIES, named, strict=True)))
+    seen = present(intervals, twin)
+    rows = samples.predictions(found, starts, seen)
+    samples.write_table(given.out / "predictions.csv", ("start_s", "target", "class", *CATEGORIES), rows)
+    named = np.bincount(found[seen].argmax(1), minlength=len(CATEGORIES))
+    print(
+        f"{seen.sum()} of {count} windows hold a target: "
+        + ", ".join(f"{category} {share}" for category, share in zip(CATEGORIES, named, strict=True))
+    )
 
 
 def pairs(arguments: list[str]) -> None:

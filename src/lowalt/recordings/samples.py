@@ -119,9 +119,10 @@ def _cell(value: object) -> object:
     return value
 
 
-def predictions(probabilities: np.ndarray, starts_s: np.ndarray) -> list[list]:
-    """Return one row a window: its start (s), the class named, and the four probabilities."""
+def predictions(probabilities: np.ndarray, starts_s: np.ndarray, seen: np.ndarray) -> list[list]:
+    """Return one row a window: its start (s), whether it holds a target (`sets.present`), the class named, and the four
+    probabilities. The class of a window without a target means nothing."""
     return [
-        [float(start), CATEGORIES[int(row.argmax())], *map(float, row)]
-        for start, row in zip(starts_s, probabilities, strict=True)
+        [float(start), "yes" if target else "no", CATEGORIES[int(row.argmax())], *map(float, row)]
+        for start, target, row in zip(starts_s, seen, probabilities, strict=True)
     ]
