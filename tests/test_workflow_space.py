@@ -12,8 +12,9 @@ from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError, SpaceError
 from lowalt.common.files import replacing
 from lowalt.common.plan import Plan
+from lowalt.targets.records import load_records
 from lowalt.workflow import space, space_check
-from lowalt.workflow.space_measured import line
+from lowalt.workflow.space_measured import largest, line
 
 ROOT = Path(__file__).parent.parent
 CONFIG = load_yaml(ROOT / "config/default.yaml") | {"run": "space"}
@@ -25,6 +26,11 @@ FIGURES = {
     "tiles": space.Figures(0.0, 0.5, 300e6, 0.0, True),
     "train": space.Figures(2e6, 0.0, 900e6, 0.0, False),
 }
+
+
+def default_plan():
+    records = load_records(CONFIG["targets"]["table"], CONFIG["targets"]["records"])
+    return Plan.of(CONFIG, {name: record["published"] for name, record in records.items()})
 
 
 def test_units_are_what_a_job_s_arrays_consist_of():
@@ -91,6 +97,22 @@ def test_a_measured_line_lies_above_all_points_and_finds_an_exact_law():
         assert base >= 0 and slope >= 0
         assert all(base + slope * size >= value * (1 - 1e-12) for size, value in points)
     assert line([(7.0, 5.0), (7.0, 3.0)]) == (5.0, 0.0)
+
+
+def test_a_table_of_stages_tells_the_memory_of_the_largest_jobs(tmp_path, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    (tmp_path / "stages.csv").write_text("rule,peak_mib\nviews,300\nnoise,100\nechoes,1\ntrain,900\n")
+    found = {rule: (size, held / 2**20) for rule, size, held in largest(tmp_path / "stages.csv", CONFIG)}
+    # The default has 40 subtypes of 100 motion models, and as many seen subtypes as unseen ones, or more.
+    samples = max(map(len, default_plan().groups.values())) * 50 * 6
+    assert found["views"] == (samples * 0.8 * 9 * 48**2, 300)
+    assert found["noise"] == (samples * 3 * 400, 100)
+    assert found["train"] == (40 * 100 * 6 * 9 * 48**2, 900)
+
+
+def test_training_that_reads_shards_holds_no_views():
+    fresh = CONFIG | {"recognition": CONFIG["recognition"] | {"cache": False}}
+    assert space.units("train", {}, PLAN, fresh) == 0 < space.units("train", {}, PLAN, CONFIG)
 
 
 def test_the_kept_figures_are_exact_for_signals():

@@ -44,8 +44,9 @@ def identity(**parts: object) -> str:
 
 def save(path: str | Path, name: str, state: dict) -> None:
     """Write `state` (tensors, numbers, text, nested dicts and lists) of the run `name`."""
-    with replacing(path) as temporary:
-        torch.save({"identity": name, "digest": _digest(state), "state": state}, temporary)
+    # An open file and not its path: torch writes the path's name, which here holds a process id, into the archive.
+    with replacing(path) as temporary, temporary.open("wb") as file:
+        torch.save({"identity": name, "digest": _digest(state), "state": state}, file)
 
 
 def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:

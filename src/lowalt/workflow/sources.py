@@ -25,11 +25,13 @@ def _file(module: str) -> Path | None:
 def _imports(path: Path) -> tuple[str, ...]:
     """Modules of the package that one file imports: anywhere in it, but in a `__main__` only at its top.
 
-    What a command imports inside its functions belongs to the subcommand asked for; the caller names those.
+    Imports inside the functions of a command belong to the subcommand asked for; the caller names those. Imports inside
+    the functions of the package's own `__init__` are for users who ask for a name there, which no stage does.
     """
     tree = ast.parse(path.read_text(), str(path))
     found = []
-    for node in tree.body if path.name == "__main__.py" else ast.walk(tree):
+    deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
+    for node in tree.body if deferred else ast.walk(tree):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:

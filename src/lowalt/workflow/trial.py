@@ -16,7 +16,7 @@ from lowalt.workflow.disturb import MemoryGroup
 
 ROOT = Path(__file__).parents[3]
 PARTS = ("Snakefile", "workflow", "config", "profiles", "src", "envs")
-TIMINGS = ("logs", "benchmarks", "report.html", "stages.csv", "run.json", "progress")
+TIMINGS = ("logs", "benchmarks", "report.html", "stages.csv", "seeds.csv", "run.json", "progress")
 """Names of files and folders of a run that hold times, which no run repeats."""
 LOUD = ("Traceback (most recent call last)", "Directory cannot be locked")
 """Text that a disturbed run must not leave a person with."""
