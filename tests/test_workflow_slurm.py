@@ -19,8 +19,8 @@ from test_workflow_extension import BASE
 pytest.importorskip("snakemake_executor_plugin_slurm")
 pytestmark = [pytest.mark.workflow, pytest.mark.slow]
 
-OVERLAY = BASE | {"motion": BASE["motion"] | {"models": 20}}
-CHUNKS = 4
+OVERLAY = BASE | {"motion": BASE["motion"] | {"models": 40}}
+CHUNKS = 8
 
 
 def ask(*command):
