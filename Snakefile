@@ -23,18 +23,6 @@ include: "workflow/rules/effects_table.smk"
 include: "workflow/rules/report.smk"
 
 
-localrules:
-    all,
-    clouds,
-    signals,
-    data,
-    models,
-    choices,
-    cost,
-    accuracy_cost,
-    effects_cost,
-
-
 onstart:
     space_check.before(workflow, RUN.plan, config)
 
@@ -50,34 +38,40 @@ rule all:
         f"results/{RUN.name}/accuracy.csv",
         f"{DATA}/shards/README.md",
         [f"results/{RUN.name}/transfer.csv"] if config["recognition"]["transfer"] else [],
+    localrule: True
 
 
 rule clouds:
     input:
         expand("results/{run}/clouds/{subtype}.npz", run=RUN.name, subtype=RUN.subtypes),
         f"results/{RUN.name}/clouds.png",
+    localrule: True
 
 
 rule signals:
     input:
         expand("results/{run}/noisy/{chunk}.npy", run=RUN.name, chunk=RUN.plan.chunks),
+    localrule: True
 
 
 rule data:
     input:
         f"results/{RUN.name}/shards/index.json",
         f"results/{RUN.name}/shards/README.md",
+    localrule: True
 
 
 rule choices:
     input:
         f"results/{RUN.name}/choices.csv",
+    localrule: True
 
 
 rule models:
     input:
         expand("results/{run}/models/{training}/model.pt", run=RUN.name, training=RUN.trainings),
         f"results/{RUN.name}/config.yaml",
+    localrule: True
 
 
 rule cost:
@@ -85,15 +79,18 @@ rule cost:
         f"results/{RUN.name}/cost.csv",
         f"results/{RUN.name}/cost_pixels.csv",
         f"results/{RUN.name}/cost.png",
+    localrule: True
 
 
 rule accuracy_cost:
     input:
         f"results/{RUN.name}/accuracy_cost.csv",
         f"results/{RUN.name}/accuracy_cost.png",
+    localrule: True
 
 
 rule effects_cost:
     input:
         f"results/{RUN.name}/effects.csv",
         f"results/{RUN.name}/effects.png",
+    localrule: True

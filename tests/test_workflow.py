@@ -237,3 +237,47 @@ def test_any_one_sample_is_made_again_alone_from_its_row(finished):
     alone = echo_signal(network, network.station("B"), motion, cloud.rcs_m2, aim).signal
     stored = np.load(base / "echo/unseen-00001/B.npy")[number]
     np.testing.assert_array_equal(alone.astype(np.complex64), stored)
+
+
+MODULE = """
+configfile: "{root}/config/default.yaml"
+configfile: "{root}/overlay.yaml"
+
+module lowalt:
+    snakefile: "{root}/Snakefile"
+    config: config
+
+use rule * from lowalt as lowalt_*
+
+rule size:
+    default_target: True
+    input: "results/test/motion/unseen-00001.csv"
+    output: "size.txt"
+    shell: "wc -c < {{input}} > {{output}}"
+"""
+
+
+def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, tmp_path):
+    (tmp_path / "Snakefile").write_text(MODULE.format(root=finished))
+    environment = {**os.environ, "PYTHONPATH": str(finished / "src")}
+    command = [sys.executable, "-m", "snakemake", "--cores", "2"]
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    for name in ("motion/unseen-00001.csv", "clouds/crow.npz"):
+        path = tmp_path / "results/test" / name
+        if path.exists():
+            assert path.read_bytes() == (finished / "results/test" / name).read_bytes(), name
+    assert (
+        int((tmp_path / "size.txt").read_text()) == (finished / "results/test/motion/unseen-00001.csv").stat().st_size
+    )
+    assert not (tmp_path / "config").exists()
+
+
+def test_the_catalogue_s_snakefile_plans_the_same_run(finished):
+    assert planned(finished, "--snakefile", "workflow/Snakefile") - {"default"} == planned(finished)
+
+
+def test_snakemake_s_own_report_shows_figures_and_tables(finished):
+    snakemake(finished, "--report", "report.html", "--", "clouds")
+    page = (finished / "report.html").read_text()
+    assert "results/test/clouds.png" in page and "Calibration point clouds of all subtypes" in page

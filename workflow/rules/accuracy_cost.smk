@@ -36,7 +36,7 @@ rule accuracy_cost_table:
         fidelity=products.fidelity,
         schemes=config["recognition"]["table"],
     output:
-        "results/{run}/accuracy_cost.csv",
+        report("results/{run}/accuracy_cost.csv", caption="../report/accuracy_cost.rst", category="Cost"),
     log:
         "results/{run}/logs/accuracy_cost_table.log",
     benchmark:
@@ -56,7 +56,7 @@ rule accuracy_cost_figure:
         code=code("lowalt.report.figures.accuracy_cost"),
         table="results/{run}/accuracy_cost.csv",
     output:
-        "results/{run}/accuracy_cost.png",
+        report("results/{run}/accuracy_cost.png", caption="../report/accuracy_cost.rst", category="Cost"),
     log:
         "results/{run}/logs/accuracy_cost_figure.log",
     benchmark:

@@ -1,6 +1,7 @@
 # What the rules share: the run that follows from the configuration, and the functions that rules name.
 # RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
-# options: parts of a command line that not every job has; code: the source files that a command runs.
+# options: parts of a command line that not every job has; code: the source files that a command runs; memory: what a job
+# asks of a cluster.
 from snakemake.exceptions import WorkflowError
 
 from lowalt.common.environment import prepare
@@ -8,6 +9,8 @@ from lowalt.common.errors import InputError
 from lowalt.effects.catalogue import dotted
 from lowalt.workflow import locks, options, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.located import located
+from lowalt.workflow.memory import Memory
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
@@ -15,14 +18,17 @@ from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code
 
 locks.install()
 scheduling.install()
+SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
+config.update(located(config, ROOT.parent))
 try:
-    RUN = Run.of(config, workflow.source_path("../schemas/config.schema.yaml"), prepare(ROOT, config["inputs"]))
+    RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
 except InputError as error:
     raise WorkflowError(str(error)) from None
 
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)
 settings = Settings(RUN, calls)
+memory = Memory(RUN, ROOT.parent / space_check.TABLE)
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.
 DATA = f"results/{RUN.data}"

@@ -52,7 +52,7 @@ rule cost_figure:
         table="results/{run}/cost.csv",
         pixels="results/{run}/cost_pixels.csv",
     output:
-        "results/{run}/cost.png",
+        report("results/{run}/cost.png", caption="../report/cost.rst", category="Cost"),
     log:
         "results/{run}/logs/cost_figure.log",
     benchmark:

@@ -31,7 +31,7 @@ rule effects_table:
         samples=products.call_samples,
         model=products.asked_model,
     output:
-        "results/{run}/effects.csv",
+        report("results/{run}/effects.csv", caption="../report/effects.rst", category="Effects"),
     log:
         "results/{run}/logs/effects_table.log",
     benchmark:
@@ -52,7 +52,7 @@ rule effects_figure:
         table="results/{run}/effects.csv",
         samples=products.call_samples,
     output:
-        "results/{run}/effects.png",
+        report("results/{run}/effects.png", caption="../report/effects.rst", category="Effects"),
     log:
         "results/{run}/logs/effects_figure.log",
     benchmark:

@@ -15,6 +15,8 @@ rule motion:
         "results/{run}/benchmarks/motion/{group}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("motion"),
     params:
         settings=settings.motion,
         span=products.span,

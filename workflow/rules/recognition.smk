@@ -18,6 +18,8 @@ rule views:
         "results/{run}/benchmarks/views/{size}/{group}-{fold}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("views"),
     params:
         settings=settings.views,
         reduced=options.reduced_chunk,
@@ -55,6 +57,8 @@ rule distances:
         "results/{run}/benchmarks/distances.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("distances"),
     shell:
         "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q} --motion {input.motion:q}"
         " --out {output:q} 2> {log:q}"
@@ -78,6 +82,8 @@ rule train:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
+    resources:
+        mem_mb=memory("train"),
     params:
         settings=settings.training,
         source=options.samples,
@@ -107,6 +113,8 @@ rule evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        mem_mb=memory("evaluate"),
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -123,13 +131,19 @@ rule tables:
         schemes=config["recognition"]["table"],
         published=config["report"]["published"],
     output:
-        multiext("results/{run}/", *TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
+        report(
+            multiext("results/{run}/", *TABLES, "seeds.csv", "seen_test.csv", "ranges.csv", "aspects.csv"),
+            caption="../report/tables.rst",
+            category="Recognition",
+        ),
     log:
         "results/{run}/logs/tables.log",
     benchmark:
         "results/{run}/benchmarks/tables.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("tables"),
     params:
         settings=settings.seed,
     shell:
@@ -155,6 +169,8 @@ rule transfer_evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        mem_mb=memory("evaluate"),
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -181,7 +197,7 @@ rule transfer:
         configs=expand("results/{name}/config.yaml", name=[RUN.name, *config["recognition"]["transfer"]]),
         schemes=config["recognition"]["table"],
     output:
-        "results/{run}/transfer.csv",
+        report("results/{run}/transfer.csv", caption="../report/transfer.rst", category="Recognition"),
     log:
         "results/{run}/logs/transfer.log",
     benchmark:

@@ -27,7 +27,7 @@ rule report:
         configuration="results/{run}/config.yaml",
         manifest="results/{run}/report.json",
     output:
-        page="results/{run}/report.html",
+        page=report("results/{run}/report.html", caption="../report/report.rst", category="Run"),
         stages="results/{run}/stages.csv",
     log:
         "results/{run}/logs/report.log",

@@ -15,6 +15,8 @@ rule cloud:
         "results/{run}/benchmarks/cloud/{subtype}.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("cloud"),
     params:
         settings=settings.cloud,
     shell:
@@ -26,12 +28,14 @@ rule gallery:
         code=code("lowalt.targets.gallery"),
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
     output:
-        "results/{run}/clouds.png",
+        report("results/{run}/clouds.png", caption="../report/clouds.rst", category="Data set"),
     log:
         "results/{run}/logs/gallery.log",
     benchmark:
         "results/{run}/benchmarks/gallery.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("gallery"),
     shell:
         "python -m lowalt.targets.gallery --clouds {input.clouds:q} --out {output:q} 2> {log:q}"

@@ -17,6 +17,8 @@ rule tiles:
         "results/{run}/benchmarks/tiles/{group}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
+    resources:
+        mem_mb=memory("tiles"),
     params:
         settings=settings.images,
         reduced=options.reduced,

@@ -1,7 +1,6 @@
 """The files each rule reads, by the plan of the run. Each method takes the wildcards of a job and can stand in a rule's
 `input:`. Nothing is read here; whether a file exists is asked only where no rule of the run can make it."""
 
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from lowalt.recognition import choose
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
+from lowalt.workflow.sources import near
 
 FIDELITY = "results/fidelity-exact/transfer.csv"
 """What training on echoes at a tolerance costs: a product of other runs, named in the error where it is missing."""
@@ -166,7 +166,7 @@ class Products:
 
     def page_templates(self, wildcards: Any) -> list[str]:
         """The templates of the page and of its sections."""
-        return [os.path.relpath(path) for path in sorted((PACKAGE / "report").rglob("*.html"))]
+        return [near(path) for path in sorted((PACKAGE / "report").rglob("*.html"))]
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""

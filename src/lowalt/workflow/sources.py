@@ -60,11 +60,13 @@ def sources(*modules: str) -> tuple[Path, ...]:
     return tuple(sorted({_file(name) for name in seen}))
 
 
+def near(path: Path) -> str:
+    """Return a path as it is named from the working directory: relative below it, so that a checkout can move."""
+    here = Path.cwd()
+    return str(path.relative_to(here) if path.is_relative_to(here) else path)
+
+
 @functools.cache
 def code(*modules: str) -> tuple[str, ...]:
-    """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs.
-
-    Paths below the working directory are relative, so that a moved checkout has the same inputs.
-    """
-    here = Path.cwd()
-    return tuple(str(path.relative_to(here) if path.is_relative_to(here) else path) for path in sources(*modules))
+    """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs."""
+    return tuple(near(path) for path in sources(*modules))
