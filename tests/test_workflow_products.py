@@ -1,7 +1,6 @@
 """The workflow's logic without Snakemake: names, files and settings that follow from a configuration."""
 
 import json
-import math
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -17,7 +16,6 @@ from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.located import located
-from lowalt.workflow.memory import Memory
 from lowalt.workflow.products import FIDELITY, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
@@ -249,16 +247,3 @@ def test_files_of_the_checkout_are_found_from_elsewhere_and_own_ones_come_first(
     assert found["targets"]["records"] == [str(ROOT / path) for path in config["targets"]["records"]]
     assert found["recognition"]["table"] == "config/schemes.csv" and found["report"]["accuracy"] is None
     assert located(found, ROOT) == found
-
-
-def test_a_job_asks_for_its_measured_memory_with_a_margin_and_for_more_at_each_attempt(tmp_path):
-    table = tmp_path / "space.csv"
-    head = "rule,runs,disk_base_bytes,disk_unit_bytes,memory_base_mib,memory_unit_bytes,temporary"
-    table.write_text(f"{head}\nnoise,tiny,0,0,2000,10,no\ncloud,tiny,0,0,1,0,no\n")
-    run, memory = run_of(), Memory(run_of(), table)
-    values = 50 * 20 * 6 * 3 * 400  # models of a chunk, subtypes, SNRs, stations, symbols
-    expected = math.ceil(1.5 * (2000 * 2**20 + 10 * values) / 1e6)
-    chunk = {"run": "default", "group": "seen", "part": "00001"}
-    assert [memory("noise")(chunk, attempt) for attempt in (1, 2)] == [expected, 2 * expected]
-    assert memory("cloud")(chunk, 1) == memory("unmeasured")(chunk, 1) == 1000
-    assert Memory(run, tmp_path / "none.csv")("noise")(chunk, 3) == 3000

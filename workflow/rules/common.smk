@@ -1,7 +1,6 @@
 # What the rules share: the run that follows from the configuration, and the functions that rules name.
 # RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
-# options: parts of a command line that not every job has; code: the source files that a command runs; memory: what a job
-# asks of a cluster.
+# options: parts of a command line that not every job has; code: the source files that a command runs.
 from snakemake.exceptions import WorkflowError
 
 from lowalt.common.environment import prepare
@@ -10,7 +9,6 @@ from lowalt.effects.catalogue import dotted
 from lowalt.workflow import locks, options, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.located import located
-from lowalt.workflow.memory import Memory
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
@@ -28,7 +26,6 @@ except InputError as error:
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)
 settings = Settings(RUN, calls)
-memory = Memory(RUN, ROOT.parent / space_check.TABLE)
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.
 DATA = f"results/{RUN.data}"

@@ -16,8 +16,6 @@ rule echo:
         f"results/{{run}}/benchmarks/echo/{{group}}-{{part}}{OF_STATION}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("echo"),
     params:
         settings=settings.echo,
         stations=products.heard,

@@ -20,8 +20,6 @@ rule echo_in_scene:
         f"results/{{run}}/benchmarks/echo/{{group}}-{{part}}{OF_STATION}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("echo"),
     params:
         settings=settings.echo_in_scene,
         occluders=options.occluders,

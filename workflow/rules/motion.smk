@@ -15,8 +15,6 @@ rule motion:
         "results/{run}/benchmarks/motion/{group}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("motion"),
     params:
         settings=settings.motion,
         span=products.span,

@@ -17,8 +17,6 @@ rule noise:
         "results/{run}/benchmarks/noise/{group}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("noise"),
     params:
         settings=settings.noise,
         powers=options.powers,

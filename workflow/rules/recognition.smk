@@ -18,8 +18,6 @@ rule views:
         "results/{run}/benchmarks/views/{size}/{group}-{fold}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("views"),
     params:
         settings=settings.views,
         reduced=options.reduced_chunk,
@@ -57,8 +55,6 @@ rule distances:
         "results/{run}/benchmarks/distances.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("distances"),
     shell:
         "python -m lowalt.recognition distances --settings '{{}}' --clouds {input.clouds:q} --motion {input.motion:q}"
         " --out {output:q} 2> {log:q}"
@@ -82,8 +78,6 @@ rule train:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
-    resources:
-        mem_mb=memory("train"),
     params:
         settings=settings.training,
         source=options.samples,
@@ -113,8 +107,6 @@ rule evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
-    resources:
-        mem_mb=memory("evaluate"),
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -142,8 +134,6 @@ rule tables:
         "results/{run}/benchmarks/tables.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("tables"),
     params:
         settings=settings.seed,
     shell:
@@ -169,8 +159,6 @@ rule transfer_evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
-    resources:
-        mem_mb=memory("evaluate"),
     params:
         settings=settings.evaluation,
         source=options.samples,

@@ -20,8 +20,6 @@ rule shard:
         "results/{run}/benchmarks/shard/{group}-{fold}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("shard"),
     params:
         settings=settings.shard,
         tiles=options.tiles,
@@ -43,8 +41,6 @@ rule index:
         "results/{run}/benchmarks/index.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("index"),
     params:
         settings=settings.index,
     shell:

@@ -15,8 +15,6 @@ rule cloud:
         "results/{run}/benchmarks/cloud/{subtype}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("cloud"),
     params:
         settings=settings.cloud,
     shell:
@@ -35,7 +33,5 @@ rule gallery:
         "results/{run}/benchmarks/gallery.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("gallery"),
     shell:
         "python -m lowalt.targets.gallery --clouds {input.clouds:q} --out {output:q} 2> {log:q}"

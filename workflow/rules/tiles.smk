@@ -17,8 +17,6 @@ rule tiles:
         "results/{run}/benchmarks/tiles/{group}-{part}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    resources:
-        mem_mb=memory("tiles"),
     params:
         settings=settings.images,
         reduced=options.reduced,
