@@ -7,9 +7,11 @@ SETUP := .venv/set-up
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
+# The oldest and the newest NumPy that pyproject.toml allows.
+NUMPYS := 2.0.0 2.4.6
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
 
-.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost choices confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins help
+.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost choices confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
 all: default
 
@@ -101,6 +103,17 @@ choices: $(SETUP)  ## recipes of training compared on validation alone: results/
 
 confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
 	$(SNAKEMAKE) --configfile config/confirm.yaml
+
+check-bytes: $(SETUP)  ## rebuild the default and the tiny data set and compare every byte with results/reference
+	for run in default tiny; do $(SNAKEMAKE) --forceall --configfile config/$$run.yaml -- data && \
+		$(BIN)/python -m lowalt.shards.manifest check --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
+
+# Two environments of their own, so that this one keeps its NumPy.
+check-numpy: $(SETUP)  ## the tiny data set with the oldest and the newest NumPy that pyproject.toml allows
+	for version in $(NUMPYS); do .ci/numpy.sh $(PYTHON) $$version || exit 1; done
+
+manifest:  ## keep the checksums of the finished default and tiny runs
+	for run in default tiny; do $(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 
 estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \

@@ -4,11 +4,14 @@
 """
 
 import argparse
+import functools
 import sys
 from pathlib import Path
 
 from lowalt.common.command import run
+from lowalt.common.config import merge
 from lowalt.common.files import slug
+from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import write_table
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
@@ -64,12 +67,13 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
 def main(arguments: list[str]) -> None:
     """Write clouds, motion tables and shards of a merged configuration."""
     options = argparse.ArgumentParser(prog="python -m lowalt.shards.build", description=main.__doc__)
-    options.add_argument("--config", required=True, help="merged configuration, such as results/RUN/config.yaml")
+    options.add_argument("--config", required=True, nargs="+", help="merged configuration, or a base and its overlays")
     options.add_argument("--inputs", help="folder of the meshes and recordings that the records name")
     options.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
     options.add_argument("--out", required=True, help="folder to write into")
     given = options.parse_args(arguments)
-    dataset = Dataset(given.config, given.clouds, inputs=given.inputs)
+    config = functools.reduce(merge, map(load_yaml, given.config))
+    dataset = Dataset(config, given.clouds, inputs=given.inputs)
     write_run(dataset, given.out, dataset.config["shards"]["kind"])
 
 

@@ -66,18 +66,22 @@ class Dataset:
         folds: Iterable[str] = FOLDS,
         inputs: str | Path | None = None,
         occluders: dict | None = None,
+        published: dict[str, dict] | None = None,
     ) -> None:
         """Take a merged configuration, or the path of one such as results/RUN/config.yaml, and choose groups and folds.
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
         that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
-        surfaces, where the scene hides points behind them.
+        surfaces, where the scene hides points behind them; published: each subtype's row of the published table, by
+        default from the records.
         Raises: InputError naming the key, value or file that is wrong.
         """
         config = load_yaml(config) if isinstance(config, (str, Path)) else config
         self.config, self.folds = config, tuple(folds)
-        records = load_records(config["targets"]["table"], config["targets"]["records"])
-        self.published = {name: item["published"] for name, item in records.items()}
+        records = {}
+        if published is None or clouds is None:
+            records = load_records(config["targets"]["table"], config["targets"]["records"])
+        self.published = published or {name: item["published"] for name, item in records.items()}
         self.plan = Plan.of(config, self.published)
         for what, given, known in (("group", tuple(groups), GROUPS), ("fold", self.folds, FOLDS)):
             if set(given) - set(known):

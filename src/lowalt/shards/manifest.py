@@ -84,12 +84,13 @@ def main(arguments: list[str]) -> None:
     options.add_argument("command", choices=("write", "check"))
     options.add_argument("--run", required=True, help="folder of the run, such as results/default")
     options.add_argument("--manifest", required=True, help="manifest, such as results/reference/default.sha256")
+    options.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
     given = options.parse_args(arguments)
     if given.command == "write":
         with replacing(given.manifest) as temporary:
             temporary.write_text(text(given.run))
         return
-    lines = faults(given.manifest, given.run)
+    lines = faults(given.manifest, given.run, ("tiles", *given.without))
     for line in lines:
         print(line)
     if lines:

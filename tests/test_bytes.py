@@ -1,0 +1,108 @@
+"""The same bytes on every processor: clouds to tiles in short, the whole tiny data set against its manifest in full."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from emulation import EMULATED, able, run
+from lowalt.common.errors import InputError
+from lowalt.shards import manifest
+
+ROOT = Path(__file__).parent.parent
+REFERENCE = ROOT / "results/reference/tiny.sha256"
+NAMES = [pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no {name} here")) for name in EMULATED]
+
+PROBE = """
+import hashlib, json, sys
+import numpy as np
+from lowalt.common.config import load
+from lowalt.common.streams import stream
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.noise.__main__ import noisy_signals
+from lowalt.targets.__main__ import make
+from lowalt.targets.records import load_records
+from lowalt.tiles.__main__ import renderer
+from lowalt.tiles.png import encode
+
+def digest(*arrays):
+    return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
+
+config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
+records = load_records(config["targets"]["table"], config["targets"]["records"])
+found = {}
+masts = np.array([place["position_m"][:2] for place in config["network"]["stations"].values()])
+corners = region_polygon(masts, None)
+for name in ("DJI Avata", "Kingfisher", "Audi A6L 2019", "Running Pedestrian 1"):
+    cloud = make(records[name], None, 7)
+    found[f"cloud of {name}"] = digest(cloud.points, cloud.normals, cloud.hinges, cloud.axes, cloud.track)
+    rng = stream(7, "motion", name, 0)
+    row = draw(rng, cloud, records[name]["published"], masts, corners, config["motion"]) | {"model": 0}
+    found[f"motion of {name}"] = json.dumps(row, sort_keys=True)
+time = np.arange(400) / 400
+clean = np.stack([np.exp(2j * np.pi * (np.rint(99 * k * time) / 400)).round(6) for k in (1, 2, 3)])
+noisy = noisy_signals(clean[:, None].astype(np.complex64), [row], ["A", "B", "C"], [3.0, 23.0], 7)
+found["noise"] = digest(noisy)
+tiles = renderer({key: config[key] for key in ("network", "spectra", "images")})
+for level, sample in enumerate(noisy[0]):
+    found[f"tile {level}"] = hashlib.sha256(encode(tiles.tile(sample), tiles.images.palette)).hexdigest()
+print(json.dumps(found))
+"""
+
+
+@pytest.fixture(scope="module")
+def here():
+    return json.loads(run("native", "-c", PROBE))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_clouds_motion_noise_and_tiles_are_those_of_another_processor(name, here):
+    found = json.loads(run(name, "-c", PROBE))
+    assert {stage for stage in here if found[stage] != here[stage]} == set()
+
+
+def test_emulation_leaves_instructions_out():
+    """Without this the tests above would compare a processor with itself."""
+    program = "import numpy as np, json; from numba.core.registry import cpu_target as t;"
+    program += "from numpy._core._multiarray_umath import __cpu_features__ as f;"
+    program += "print(json.dumps([bool(f.get('X86_V3', f['FMA3'])), t.target_context.codegen().magic_tuple()[1]]))"
+    fused, name = json.loads(run("x86-64-v2", "-c", program))
+    assert not fused and name == "nehalem"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("name", ["native", *NAMES])
+def test_the_tiny_data_set_has_the_bytes_of_its_manifest(name, threads, tmp_path):
+    config = ("config/default.yaml", "config/tiny.yaml")
+    run(name, "-m", "lowalt.shards.build", "--config", *config, "--out", str(tmp_path / "run"), threads=threads)
+    # Echoes and noisy signals stay in memory here; the shards follow from them.
+    assert manifest.faults(REFERENCE, tmp_path / "run", ("echo", "noise", "tiles")) == []
+
+
+def test_a_manifest_names_the_first_stage_that_differs(tmp_path, capsys):
+    run_folder = tmp_path / "run"
+    for name in ("clouds/a.npz", "motion/seen-00000.csv", "noisy/seen-00000.npy", "shards/index.json"):
+        (run_folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (run_folder / name).write_text(name)
+    arguments = ["--run", str(run_folder), "--manifest", str(tmp_path / "run.sha256")]
+    manifest.main(["write", *arguments])
+    manifest.main(["check", *arguments])
+    assert "all 4 files are equal" in capsys.readouterr().out
+    (run_folder / "noisy/seen-00000.npy").write_text("other")
+    (run_folder / "shards/index.json").unlink()
+    (run_folder / "motion/unseen-00000.csv").write_text("more")
+    with pytest.raises(SystemExit):
+        manifest.main(["check", *arguments])
+    told = capsys.readouterr()
+    assert told.out.splitlines() == [
+        "motion: motion/unseen-00000.csv is not in the manifest",
+        "noise: noisy/seen-00000.npy differs",
+        "shards: shards/index.json is missing",
+    ]
+    assert told.err.strip() == "first stage that differs: motion"
+    with pytest.raises(InputError, match="folder of a run"):
+        manifest.text(tmp_path / "nowhere")
+    (tmp_path / "run.sha256").write_text("no checksum\n")
+    with pytest.raises(InputError, match="line 1"):
+        manifest.read(tmp_path / "run.sha256")
