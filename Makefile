@@ -98,6 +98,12 @@ tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the 
 	$(SNAKEMAKE)
 	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
 
+choices: $(SETUP)  ## recipes of training compared on validation alone: results/default/choices.csv and choices_subtypes.csv
+	$(SNAKEMAKE) -- choices
+
+confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
+	$(SNAKEMAKE) --configfile config/confirm.yaml
+
 check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/reference and compare every byte
 	for run in $(basename $(notdir $(wildcard results/reference/*.sha256))); do $(SNAKEMAKE) --forceall --configfile config/$$run.yaml -- data && \
 		$(BIN)/python -m lowalt.shards.manifest check --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
