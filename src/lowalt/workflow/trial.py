@@ -4,6 +4,7 @@ import argparse
 import hashlib
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -62,8 +63,14 @@ class Trial:
         with open(descriptor, "wb") as output:  # noqa: PTH123
             return psutil.Popen(
                 command, cwd=self.folder, env=environment, stdout=output, stderr=subprocess.STDOUT,
-                start_new_session=True, preexec_fn=self.group.enter if self.group else None,
+                start_new_session=True, preexec_fn=self._first,
             )  # fmt: skip
+
+    def _first(self) -> None:
+        # A shell's background job ignores Ctrl-C and hands that on; the run must feel it as at a terminal.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        if self.group:
+            self.group.enter()
 
     def finish(self, main: psutil.Popen) -> int:
         """Wait for a run's end, keep what it printed, and return its exit status (negative: ended by that signal)."""
