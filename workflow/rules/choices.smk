@@ -8,7 +8,7 @@ rule trial:
     input:
         code=code("lowalt.recognition.trial", "lowalt.recognition.choose"),
         views=products.trial_views,
-        candidates="config/choices.yaml",
+        candidates="config/choices/default.yaml",
         schemes=config["recognition"]["table"],
     output:
         table="results/{run}/choices/{candidate}/{held}-{train_seed}/predictions.csv",
