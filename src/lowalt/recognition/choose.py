@@ -4,7 +4,7 @@ A fold of this protocol takes some subtypes of each category out of the group th
 trains on the others and is judged by those taken out. Only the folds "train" and "val" of that group are used: neither
 a subtype nor a motion model that any table tests on is opened. Every subtype of the group is held out in one fold.
 
-A candidate of the table (`config/choices/default.yaml`) is a name and what it changes in the block `recognition`. Trained, it
+A candidate (of `config/choices/default.yaml`) is a name and what it changes in the block `recognition`. Trained, it
 leaves predictions of both parts (`lowalt.recognition.trial`); two tables are made of them:
     choices.csv            candidate; what it took (folds, seeds, steps, batch, pixels, core_s a training);
                            held_percent: subtypes held out; kept_percent: validation motion models of the trained
