@@ -32,7 +32,7 @@ rule accuracy_cost_table:
         predictions=expand("results/{{run}}/predictions/{training}.csv", training=RUN.priced),
         about=expand("results/{{run}}/predictions/{training}.json", training=RUN.priced),
         speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=RUN.schemes_by_slug),
-        index=DATA + "/shards/index.json",
+        index=f"{DATA}/shards/index.json",
         fidelity=products.fidelity,
         schemes=config["recognition"]["table"],
     output:

@@ -66,7 +66,7 @@ rule train:
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen=DATA + "/SHA256SUMS",
+        frozen=f"{DATA}/SHA256SUMS",
         schemes=config["recognition"]["table"],
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
@@ -95,7 +95,7 @@ rule evaluate:
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen=DATA + "/SHA256SUMS",
+        frozen=f"{DATA}/SHA256SUMS",
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
     output:
         table="results/{run}/predictions/{protocol}/{scheme}/{train_seed}.csv",
@@ -147,7 +147,7 @@ rule transfer_evaluate:
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen=DATA + "/SHA256SUMS",
+        frozen=f"{DATA}/SHA256SUMS",
         model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",
     output:
         table="results/{run}/transfer/{other}/{protocol}/{scheme}/{train_seed}.csv",
