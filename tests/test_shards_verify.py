@@ -37,7 +37,7 @@ def lines(folder):
 
 
 def test_an_undamaged_data_set_has_no_fault(published):
-    assert len(names(published)) == 2 * 6 + 5
+    assert len(names(published)) == 2 * 6 + 6
     assert lines(published) == []
     main(["verify", "--index", str(published / "index.json")])
 
@@ -92,7 +92,7 @@ def test_a_checksum_line_more_or_less_or_for_another_file_is_found(copy):
     text = sums.read_text()
     first, *rest = text.splitlines(keepends=True)
     for changed, words in [
-        ("".join(rest), "SHA256SUMS: no line for README.md"),
+        ("".join(rest), "SHA256SUMS: no line for .zenodo.json"),
         (text + f"{'0' * 64}  zebra.txt\n", "SHA256SUMS: a line for zebra.txt, which is no part of the data set"),
         ("".join([*rest, first]), "SHA256SUMS: damaged"),
         (text + first, "SHA256SUMS: damaged"),

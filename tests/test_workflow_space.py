@@ -105,9 +105,10 @@ def test_a_table_of_stages_tells_the_memory_of_the_largest_jobs(tmp_path, monkey
     found = {rule: (size, held / 2**20) for rule, size, held in largest(tmp_path / "stages.csv", CONFIG)}
     # The default has 40 subtypes of 100 motion models, and as many seen subtypes as unseen ones, or more.
     samples = max(map(len, default_plan().groups.values())) * 50 * 6
-    assert found["views"] == (samples * 0.8 * 9 * 48**2, 300)
+    pixels = CONFIG["recognition"]["size"] ** 2
+    assert found["views"] == (samples * 0.8 * 9 * pixels, 300)
     assert found["noise"] == (samples * 3 * 400, 100)
-    assert found["train"] == (40 * 100 * 6 * 9 * 48**2, 900)
+    assert found["train"] == (40 * 100 * 6 * 9 * pixels, 900)
 
 
 def test_training_that_reads_shards_holds_no_views():
