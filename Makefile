@@ -9,7 +9,7 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 # The oldest and the newest NumPy that pyproject.toml allows.
 NUMPYS := 2.0.0 2.4.6
-REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv
+REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 
 .PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost choices confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
@@ -133,7 +133,7 @@ space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/t
 
 reference-choices: $(SETUP)  ## keep the tables of a finished `make choices` and a finished `make confirm`
 	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
-	for table in $(REFERENCE) seeds.csv; do cp results/confirm/$$table results/reference/confirm-$$table; done
+	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done
