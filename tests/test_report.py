@@ -9,6 +9,7 @@ import pytest
 from PIL import Image
 
 from lowalt.common.config import load
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
 from lowalt.report.figures.accuracy_over_snr import accuracy_over_snr
@@ -18,7 +19,7 @@ from lowalt.report.figures.stage_times import stage_bars
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
 from lowalt.report.sections import accuracy_cost, echo_cost, effects, transfer
-from lowalt.report.tables import by_scheme, cloud_seconds, confusion, read_csv, spreads, stage_times
+from lowalt.report.tables import by_scheme, cloud_seconds, confusion, spreads, stage_times
 
 BANDS = [
     {"protocol": protocol, "scheme": "A", "from": low, "to": high, "accuracy_percent": "90.0", "samples": count}

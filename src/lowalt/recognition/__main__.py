@@ -107,7 +107,7 @@ def _evaluate(arguments: list[str]) -> None:
     _sources(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
-    line.add_argument("--out", required=True, help="predictions to write (.csv), with the run's record beside (.json)")
+    line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
     given = line.parse_args(arguments)
     if given.frozen:
         verify(given.frozen)

@@ -117,10 +117,10 @@ def parts(facts: Facts, fold: int, count: int) -> dict[str, np.ndarray]:
 
 
 class Trial:
-    """Predictions of one candidate, fold and seed, and the record beside them."""
+    """Predictions of one candidate, fold and seed, and the JSON record that goes with them."""
 
     def __init__(self, path: str | Path) -> None:
-        """path: the prediction file of `choose`, its record beside it (.json).
+        """path: the prediction file of `choose`, with its record under the same name (.json).
 
         Raises: InputError where one is missing or no such file.
         """

@@ -72,7 +72,7 @@ class Predictions:
 
 
 def record(path: str | Path) -> dict:
-    """Return the record beside a prediction file.
+    """Return the JSON record that goes with a prediction file.
 
     Raises: InputError where it is missing or no JSON object.
     """

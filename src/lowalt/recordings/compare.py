@@ -1,4 +1,4 @@
-"""Measured beside simulated in numbers: figures of each class with intervals, distributions with floor and ceiling.
+"""Measured against simulated in numbers: figures of each class with intervals, distributions with floor and ceiling.
 
 measured-figures.csv: figures of whole recordings and of simulated scenes of the same length, one row a pair and figure.
 measured-distances.csv: Wasserstein distances of the figures of coherent intervals, in the figure's unit,

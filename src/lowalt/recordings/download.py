@@ -6,20 +6,17 @@ Run `python -m lowalt.recordings.download --out FOLDER`; FOLDER is then what `ma
 """
 
 import argparse
-import shutil
 import sys
-import urllib.error
 import urllib.parse
-import urllib.request
 from pathlib import Path
 
 from lowalt.common.command import run
+from lowalt.common.download import download
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, sha256
+from lowalt.common.files import sha256
 from lowalt.common.yaml_files import load_yaml
 
 SOURCES = "config/measured/sources.yaml"
-TIMEOUT_S = 60
 
 
 def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
@@ -34,23 +31,11 @@ def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
     failures = []
     for address in places:
         try:
-            _from(address, target, pinned)
+            download(address, target, pinned)
             return True
         except InputError as error:
             failures.append(str(error))
     raise InputError("; ".join(failures))
-
-
-def _from(address: str, target: Path, pinned: str) -> None:
-    with replacing(target) as temporary:
-        try:
-            with urllib.request.urlopen(address, timeout=TIMEOUT_S) as source, temporary.open("wb") as file:
-                shutil.copyfileobj(source, file)
-        except (urllib.error.URLError, OSError, ValueError) as error:
-            raise InputError(f"{address}: download failed ({error})") from None
-        found = sha256(temporary)
-        if found != pinned:
-            raise InputError(f"{address}: SHA-256 is {found}, expected {pinned}; nothing was kept")
 
 
 def addresses(sources: dict) -> dict[str, tuple[list[str], str]]:

@@ -1,6 +1,5 @@
 """Reading and pivoting the run's small CSV tables for the page; no drawing, no HTML."""
 
-import csv
 import json
 from collections import defaultdict
 from collections.abc import Iterable
@@ -8,19 +7,6 @@ from pathlib import Path
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
-
-
-def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
-    """Return a CSV file's rows as dicts of text.
-
-    Raises: InputError naming the file and the columns it lacks.
-    """
-    with existing(path, "table").open(newline="") as file:
-        reader = csv.DictReader(file)
-        missing = set(needed) - set(reader.fieldnames or ())
-        if missing:
-            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
-        return list(reader)
 
 
 def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:

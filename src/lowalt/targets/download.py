@@ -7,18 +7,14 @@ Run `python -m lowalt.targets.download --out FOLDER`; FOLDER is then what LOWALT
 
 import argparse
 import hashlib
-import shutil
 import sys
-import urllib.error
-import urllib.request
 from pathlib import Path
 
 from lowalt.common.command import run
+from lowalt.common.download import download
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
-TIMEOUT_S = 60
 
 SHA256 = {
     "02/02.asf": "c50c9cf21fa50dcea0b597e8caf5a2191975cd20999935cc50ab60d44382de9b",
@@ -68,16 +64,7 @@ def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
     target = folder / "cmu" / name
     if target.is_file() and checksum(name, target) == SHA256[name]:
         return False
-    address = f"{base}/{name}"
-    with replacing(target) as temporary:
-        try:
-            with urllib.request.urlopen(address, timeout=TIMEOUT_S) as source, temporary.open("wb") as file:
-                shutil.copyfileobj(source, file)
-        except (urllib.error.URLError, OSError, ValueError) as error:
-            raise InputError(f"{address}: download failed ({error})") from None
-        found = checksum(name, temporary)
-        if found != SHA256[name]:
-            raise InputError(f"{address}: SHA-256 is {found}, expected {SHA256[name]}; nothing was kept")
+    download(f"{base}/{name}", target, SHA256[name], lambda path: checksum(name, path))
     return True
 
 
