@@ -74,6 +74,13 @@ def test_blades_that_touch_are_one_rotor_and_separate_ones_are_not(tmp_path):
     assert sorted(len(group) for group in clusters(rotors)) == [2, 2, 2, 2]
 
 
+def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):
+    whole = trimesh.util.concatenate([craft(False), box((0.12, 0.012, 0.004), (0, 0, -0.06))])
+    whole.export(tmp_path / "craft.stl")
+    rotors = [part for part in inspect_mesh(tmp_path / "craft.stl", "UAV").components if part.guess == "rotor"]
+    assert sorted(round(float(part.centre[2]), 3) for part in rotors) == [0.05] * 4
+
+
 def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
     shapes = [box((1.8, 4.5, 1.0), (0, 0, 0.9)), box((0.6, 0.6, 0.6), (0, 0, 1.8)), box((0.2, 0.1, 0.1), (1.1, 1, 1))]
     for x, y in ((-0.8, 1.4), (0.8, 1.4), (-0.8, -1.4), (0.8, -1.4)):
