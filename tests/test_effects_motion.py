@@ -13,7 +13,7 @@ from scipy.integrate import trapezoid
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.effects.motion import gusts, rotor_spread
+from lowalt.effects.motion import flight, gusts, rotor_spread
 from lowalt.effects.motion.markov import steps
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.poses import attitude
@@ -97,7 +97,9 @@ def test_turning_a_part_that_does_not_move_is_refused(name):
 
 def craft(rotors: int = 4, category: str = "UAV") -> SimpleNamespace:
     """The attributes of a cloud that the motion effects use."""
-    return SimpleNamespace(category=category, parts_of=lambda kind: list(range(rotors)) if kind == "rotor" else [])
+    parts = list(range(rotors))
+    record = {"published": {"size_m": 0.4}}
+    return SimpleNamespace(category=category, record=record, parts_of=lambda kind: parts if kind == "rotor" else [])
 
 
 ROW = {
@@ -184,21 +186,56 @@ def test_gusts_and_what_they_do_have_the_variances_of_their_spectra(longitudinal
     each, start, outputs = gusts.axis(scale / step, longitudinal, response / step, lag / step)
     covariance = start @ start.T
     moved = each.transition @ covariance @ each.transition.T + each.root @ each.root.T
-    keep = np.ix_(gusts.MOVING, gusts.MOVING)
     # A step leaves the stationary covariance where it was.
-    size = np.sqrt(np.diag(covariance)[gusts.MOVING])
-    np.testing.assert_allclose(moved[keep] / np.outer(size, size), covariance[keep] / np.outer(size, size), atol=1e-9)
+    size = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose(moved / np.outer(size, size), covariance / np.outer(size, size), atol=1e-9)
     found = np.diag(outputs @ covariance @ outputs.T)
-    slow = 1 / max(scale, response)
-    frequency = np.concatenate([[0.0], np.geomspace(1e-5 * slow, 1e6 / min(scale, response, lag), 400_001)])
+    frequency = np.concatenate([[0.0], np.geomspace(1e-5, 1e6 / min(scale, response, lag), 400_001)])
     gust = _spectrum(longitudinal, scale, frequency)
-    follow = 1 / (1 + (frequency * response) ** 2)
-    tilted = follow * frequency**2 / (1 + (frequency * lag) ** 2)
-    exact = [trapezoid(gust * shape, frequency) / np.pi for shape in (1.0, follow, tilted)]
+    velocity, place, thrust = followed(frequency, response, lag)
+    exact = [trapezoid(gust * abs(shape) ** 2, frequency) / np.pi for shape in (1.0, velocity, place, thrust)]
     assert exact[0] == pytest.approx(1, rel=1e-4)
-    np.testing.assert_allclose(found[[0, 1, 3]], np.array(exact) * [1, 1, step**2], rtol=1e-3)
-    if longitudinal:
-        assert found[1] == pytest.approx(scale / (scale + response), rel=1e-9)
+    np.testing.assert_allclose(found, np.array(exact) * [1, 1, step**-2, step**2], rtol=1e-3)
+
+
+def followed(frequency, response, lag):
+    """Velocity, displacement and thrust of a target by the air's velocity, by the loop's Laplace transform."""
+    s = 1j * frequency
+    asked = gusts.SPEED_GAIN / lag * s + gusts.PLACE_GAIN / lag**2
+    place = 1 / response / (s * (s + 1 / response) + asked / (1 + lag * s))
+    return s * place, place, -asked / (1 + lag * s) * place
+
+
+@pytest.mark.parametrize("response", [0.3, 5.0])
+def test_a_craft_that_holds_its_place_leans_into_a_lasting_gust(response):
+    drift, _, outputs = gusts.process(1e9, True, response, 0.2)
+    # Turbulence of endless scale is a constant wind: the first state stays, the others settle.
+    settled = np.linalg.solve(drift[2:, 2:], -drift[2:, 0])
+    gust, velocity, _, thrust = outputs @ np.array([1.0, 0.0, *settled])
+    assert velocity == pytest.approx(0, abs=1e-12) and thrust == pytest.approx(-gust / response)
+    front = gusts.tilt(np.array([[0.0, thrust / gust * 4.0, 0.0]]), True)[0]
+    assert np.arctan2(*attitude(*front)[1:, 2]) == pytest.approx(-np.arctan(4.0 / response / 9.80665))
+
+
+def test_in_drawn_gusts_the_thrust_acts_against_the_wind():
+    _, start, outputs = gusts.axis(4000.0, True, 400.0, 40.0)
+    covariance = outputs @ start @ start.T @ outputs.T
+    assert covariance[0, 3] < -0.3 * np.sqrt(covariance[0, 0] * covariance[3, 3])
+
+
+def test_response_times_follow_size_and_mass():
+    names = ["Sparrow", "Pigeon", "DJI Mini 2", "DJI Matrice 600 Pro", "EH 216 S"]
+    mass = {name: flight.mass_kg(target(name)[0]) for name in names}
+    # Published masses, up to a factor of two.
+    for name, true in {"Sparrow": 0.03, "DJI Mini 2": 0.249, "DJI Matrice 600 Pro": 10.0}.items():
+        assert true / 2 < mass[name] < true * 2
+    level, up = np.array([flight.response_s(target(name)[0], 8.0) for name in names]).T
+    assert up[0] < 0.15 < 3 < up[-1] and level[2] < level[3] < level[4]
+    lags = [flight.attitude_s(target(name)[0]) for name in names]
+    assert lags[0] < 0.1 < 0.3 < lags[-1] < 0.5
+    # Twice the airspeed doubles a body's drag and a wing's lift.
+    sparrow = target("Sparrow")[0]
+    assert flight.response_s(sparrow, 16.0)[1] == pytest.approx(0.5 * flight.response_s(sparrow, 8.0)[1])
 
 
 def test_low_altitude_turbulence_has_the_tabled_values():
@@ -222,7 +259,10 @@ def test_the_drift_of_many_targets_spreads_as_the_spectrum_says():
     airspeed = gusts.mean_wind_mps(row["z_m"], wind)
     time = TIMES[-1]
     frequency = np.concatenate([[0.0], np.geomspace(1e-6, 1e5, 400_001)])
-    window = (time * np.sinc(frequency * time / (2 * np.pi))) ** 2 / (1 + frequency**2)
+    rate = flight.response_s(craft(), airspeed)[0]
+    place = followed(frequency, rate, flight.attitude_s(craft()))[1]
+    # The offset is a difference of two places, so its spectrum has the factor 4 sin^2(w T / 2).
+    window = abs(place) ** 2 * 4 * np.sin(0.5 * frequency * time) ** 2
     along, across, up = (
         trapezoid(_spectrum(axis == 0, scales[axis] / airspeed, frequency) * window, frequency) / np.pi
         for axis in range(3)

@@ -1,21 +1,28 @@
-"""Gusts: Dryden turbulence at low altitude carries a flying target along and tilts it.
+"""Gusts: Dryden turbulence pushes a flying target, which leans against the push to keep its place and course.
 
-Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. It follows the air with a
-first-order lag; a multirotor tilts by atan(a / g) towards its horizontal acceleration a, a bird banks, both with the
-lag of the body's attitude. Turbulence, velocity, place and tilt are one linear process, discretised exactly.
+Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. Drag carries the target along
+with the air. Its control asks for a thrust against speed and displacement, and the attitude follows with a lag: a
+multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, a bird banks. Drag tilts nothing.
+Turbulence, velocity, place and thrust are one linear process, discretised exactly.
 """
 
 import numpy as np
 
+from lowalt.effects.motion import flight
 from lowalt.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
 from lowalt.motion.poses import Perturbation, attitude
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
     "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, section 3.7 "
-    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight"
+    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight; control: "
+    "gains 0.95/s on place and 1.8/s on speed of PX4 (MPC_XY_P, MPC_XY_VEL_P_ACC) at a lag of 0.1 s, scaled with it; "
+    + flight.SOURCE
 )
-DEFAULTS = {"wind_mps": 7.7, "response_s": 1.0, "attitude_s": 0.1}
+DEFAULTS = {"wind_mps": 7.7, "response_s": None, "attitude_s": None}
+
+SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
+"""Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
 
 FOOT_M = 0.3048
 HEIGHTS_FT = (10.0, 1000.0)
@@ -24,7 +31,7 @@ ROUGHNESS_FT = 2.0
 """Roughness length of the mean wind's profile, all flight phases but landing."""
 SLOWEST_MPS = 0.1
 """Least airspeed, below which turbulence would stand still around the target."""
-GRAVITY_MPS2 = 9.80665
+GRAVITY_MPS2 = flight.GRAVITY_MPS2
 
 
 def idle(settings: dict) -> bool:
@@ -50,50 +57,44 @@ def mean_wind_mps(height_m: float, wind_mps: float) -> float:
     return wind_mps * np.log(feet / ROUGHNESS_FT) / np.log(20.0 / ROUGHNESS_FT)
 
 
-def process(scale: float, longitudinal: bool, response: float, attitude_lag: float) -> tuple[np.ndarray, ...]:
+def process(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[np.ndarray, ...]:
     """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and the target's response; times in steps.
 
-    scale: the turbulence's time L / V. Outputs: gust, the target's velocity (both of unit turbulence), the target's
-    place (that times a step) and the lagged acceleration (that over a step). Each state is an integral of the one
-    before it with unit weight, so their steps' covariances stay well conditioned however short a step is.
+    scale: the turbulence's time L / V; response: of the velocity to the air; lag: of the attitude. Outputs: gust, the
+    target's velocity (both of unit turbulence), its displacement (that times a step) and its thrust's acceleration
+    (that over a step). Each state is an integral of those before it with weights near one, so that their steps'
+    covariances stay well conditioned however short a step is.
     """
-    a, b, c = 1.0 / scale, 1.0 / response, 1.0 / attitude_lag
+    a, b, c = 1.0 / scale, 1.0 / response, 1.0 / lag
     # The lateral filter (1 + sqrt(3) t s) / (1 + t s)^2 is a mix of a first- and a second-order lag.
     mix = 0.0 if longitudinal else (1.0 / np.sqrt(3.0) - 1.0) * a
     gain = np.sqrt(2.0 * a) if longitudinal else np.sqrt(3.0 * a)
     drift = np.array([
         [-a, 0, 0, 0, 0],
         [1, -a, 0, 0, 0],
-        [1, mix, -b, 0, 0],
+        [1, mix, -b, 0, 1],
         [0, 0, 1, 0, 0],
-        [1, mix, -b, 0, -c],
+        [0, 0, -SPEED_GAIN * c * c, -PLACE_GAIN * c * c * c, -c],
     ])  # fmt: skip
     outputs = gain * np.array([
         [1, mix, 0, 0, 0],
         [0, 0, b, 0, 0],
         [0, 0, 0, b, 0],
-        [0, 0, 0, 0, b * c],
+        [0, 0, 0, 0, b],
     ])  # fmt: skip
     return drift, np.array([1.0, 0, 0, 0, 0]), outputs
 
 
-MOVING = [0, 1, 2, 4]
-"""The states that have a stationary spread; the place starts from zero."""
-
-
-def axis(
-    scale: float, longitudinal: bool, response: float, attitude_lag: float
-) -> tuple[Steps, np.ndarray, np.ndarray]:
+def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[Steps, np.ndarray, np.ndarray]:
     """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its outputs (4, 5)."""
-    drift, noise, outputs = process(scale, longitudinal, response, attitude_lag)
-    start = np.zeros((5, 5))
-    start[np.ix_(MOVING, MOVING)] = root_of(stationary(drift[np.ix_(MOVING, MOVING)], noise[MOVING]))
-    return steps(drift, noise), start, outputs
+    drift, noise, outputs = process(scale, longitudinal, response, lag)
+    return steps(drift, noise), root_of(stationary(drift, noise)), outputs
 
 
 def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:
     """Return a flying target's offset (N, 3) m and tilt (N, 3) rad at `times_s` (N,) s, equally spaced.
 
+    The motion table's place is where the target is at the first of the times, wherever the wind has pushed it from.
     The wind's direction is drawn. Nothing for targets on the ground.
     """
     if cloud.category not in ("UAV", "Bird"):
@@ -107,22 +108,24 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     through = velocity - mean_wind_mps(row["z_m"], settings["wind_mps"]) * forward
     airspeed = max(float(np.linalg.norm(through)), SLOWEST_MPS)
     step = step_s(times_s)
+    level, up = (settings["response_s"],) * 2 if settings["response_s"] else flight.response_s(cloud, airspeed)
+    lag = settings["attitude_s"] or flight.attitude_s(cloud)
     axes = [
-        axis(scale / airspeed / step, number == 0, settings["response_s"] / step, settings["attitude_s"] / step)
-        for number, scale in enumerate(scales)
+        axis(scale / airspeed / step, number == 0, response / step, lag / step)
+        for number, (scale, response) in enumerate(zip(scales, (level, level, up), strict=True))
     ]
     start = np.stack([root @ one for (_, root, _), one in zip(axes, first, strict=True)])
     states = walk([each for each, _, _ in axes], start, normal)
     found = np.stack([states[i] @ axes[i][2].T for i in range(3)]) * intensities[:, None, None]
     wind = np.stack([forward, [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
-    offset = found[..., 2].T @ wind * step
+    offset = (found[..., 2] - found[:, :1, 2]).T @ wind * step
     acceleration = found[..., 3].T @ wind / step
     ahead = attitude(row["yaw_rad"], 0.0, 0.0)
     return Perturbation({}, offset, tilt(acceleration @ ahead, pitches=cloud.category == "UAV"))
 
 
 def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:
-    """Return yaw, pitch and roll (N, 3) rad that turn the thrust towards an acceleration (N, 3): right, front, up.
+    """Return yaw, pitch and roll (N, 3) rad that give the thrust an acceleration (N, 3): right, front, up.
 
     pitches: whether the body also pitches for its acceleration to the front, as a multirotor does and a bird does not.
     """
