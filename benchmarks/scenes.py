@@ -19,10 +19,10 @@ from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
 from lowalt.common.network import Network
 from lowalt.common.timing import once
-from lowalt.echo.__main__ import signals as echo_signals
-from lowalt.effects.__main__ import signals as scene_signals
+from lowalt.echo.chunk import clean_signals
 from lowalt.effects.catalogue import called
-from lowalt.effects.hear import Scene
+from lowalt.effects.chunk import scene_signals
+from lowalt.effects.received import Scene
 from lowalt.motion import read_table
 from lowalt.targets.cloud import read
 
@@ -47,7 +47,7 @@ def main() -> None:
     rows = read_table(sorted((given.run / "motion").glob("*.csv"))[0])[: given.models]
     clouds = {cloud.subtype: cloud for cloud in map(read, sorted((given.run / "clouds").glob("*.npz")))}
     name = network.stations[0].name
-    work = {"echo stage": lambda: echo_signals(network, [name], clouds, rows, None)[0]}
+    work = {"echo stage": lambda: clean_signals(network, [name], clouds, rows, None)[0]}
     for label, block in CALLS.items():
         scene = Scene(network, config["seed"], None, tuple(called(block)))
         work[label] = lambda scene=scene: scene_signals(scene, name, clouds, rows)[0]

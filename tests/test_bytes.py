@@ -19,10 +19,10 @@ import numpy as np
 from lowalt.common.config import load
 from lowalt.common.streams import stream
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.noise.__main__ import noisy_signals
-from lowalt.targets.__main__ import make
+from lowalt.noise.chunk import noisy_signals
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
-from lowalt.tiles.__main__ import renderer
+from lowalt.tiles.render import Renderer
 from lowalt.tiles.png import encode
 
 def digest(*arrays):
@@ -43,7 +43,7 @@ time = np.arange(400) / 400
 clean = np.stack([np.exp(2j * np.pi * (np.rint(99 * k * time) / 400)).round(6) for k in (1, 2, 3)])
 noisy = noisy_signals(clean[:, None].astype(np.complex64), [row], ["A", "B", "C"], [3.0, 23.0], 7)
 found["noise"] = digest(noisy)
-tiles = renderer({key: config[key] for key in ("network", "spectra", "images")})
+tiles = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
 for level, sample in enumerate(noisy[0]):
     found[f"tile {level}"] = hashlib.sha256(encode(tiles.tile(sample), tiles.images.palette)).hexdigest()
 print(json.dumps(found))

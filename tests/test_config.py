@@ -103,10 +103,12 @@ def test_slugs_are_plain_and_distinct():
 
 
 def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller():
-    plain = set(sources("lowalt.targets"))
-    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/cloud.py", PACKAGE / "common/errors.py"} <= plain
-    assert PACKAGE / "targets/gait.py" not in plain
-    assert set(sources("lowalt.targets", "lowalt.targets.gait")) > plain | {PACKAGE / "targets/gait.py"}
+    clouds = set(sources("lowalt.targets"))
+    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/gait.py", PACKAGE / "common/errors.py"} <= clouds
+    plain = set(sources("lowalt.recognition"))
+    assert PACKAGE / "recognition/views.py" not in plain
+    views = set(sources("lowalt.recognition", "lowalt.recognition.views"))
+    assert views > plain | {PACKAGE / "recognition/views.py"}
 
 
 def test_sources_of_nothing_are_refused():

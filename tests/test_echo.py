@@ -140,7 +140,7 @@ def test_chebyshev_limits(count):
 
 def test_the_command_s_memory_grows_by_its_output_alone():
     from craft import craft, row
-    from lowalt.echo.__main__ import signals
+    from lowalt.echo.chunk import clean_signals
 
     net, cloud = network(), craft()
 
@@ -148,7 +148,7 @@ def test_the_command_s_memory_grows_by_its_output_alone():
         rows = [row(model) for model in range(models)]
         tracemalloc.start()
         try:
-            signals(net, [net.stations[0].name], {"DJI Mini 2": cloud}, rows, None)
+            clean_signals(net, [net.stations[0].name], {"DJI Mini 2": cloud}, rows, None)
             return tracemalloc.get_traced_memory()[1]
         finally:
             tracemalloc.stop()

@@ -15,7 +15,7 @@ import pytest
 
 from craft import NETWORK, craft, row
 from lowalt.common.network import Network
-from lowalt.echo.__main__ import signals
+from lowalt.echo.chunk import clean_signals
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud
 
@@ -64,7 +64,7 @@ def digest(count: int) -> str:
             motion = row(model) | more | {"subtype": cloud.subtype, "rate_hz": 3.7 + model}
             for array in poses(cloud, motion, network.times_s):
                 total.update(np.ascontiguousarray(array).tobytes())
-            total.update(signals(network, ["A", "B"], {cloud.subtype: cloud}, [motion], None).tobytes())
+            total.update(clean_signals(network, ["A", "B"], {cloud.subtype: cloud}, [motion], None).tobytes())
     return total.hexdigest()
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import Path, Rigid, echo_signal, explain
+from lowalt.echo import Path, Rigid, echo_signal, method_text
 from lowalt.echo.fast import driver
 from lowalt.echo.radar import radar
 from lowalt.echo.slow_time import interpolation as interpolate
@@ -151,7 +151,7 @@ def test_long_looks_are_cut_into_blocks(always_approximate):
     points, nodes = result.method.slow
     assert truth.method.slow == (0, 0) and points == 50 and 3 * 5 <= nodes < 300 and result.method.cheap == 1200
     assert relative(result.signal, truth.signal) <= result.bound <= 1e-6
-    assert f"slow time: 50, from {nodes} nodes" in explain(result)
+    assert f"slow time: 50, from {nodes} nodes" in method_text(result)
 
 
 def test_a_body_that_trembles_is_not_interpolated(always_approximate):

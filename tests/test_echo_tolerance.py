@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.echo import Path, echo_matrix, echo_signal, explain
+from lowalt.echo import Path, echo_matrix, echo_signal, method_text
 from lowalt.echo.fast import polynomials
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.pointwise.reference_range import reference as reference_ranges
@@ -44,7 +44,7 @@ def test_a_looser_tolerance_takes_shorter_polynomials(always_approximate):
         assert result.method.cheap + result.method.exact + result.method.general == 400
     assert orders == sorted(orders) and orders[0] < orders[-1] - 8
     loose = echo_signal(net, net.stations[0], motion, 1.0, motion.translation[0, 0], 1e-2)
-    assert loose.method.single and "float32" in explain(loose)
+    assert loose.method.single and "float32" in method_text(loose)
 
 
 def test_points_in_parts_and_plain_positions_agree():

@@ -18,7 +18,7 @@ from lowalt.echo.radar import radar
 from lowalt.effects import interface, need, waveform
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.checks import check
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import ImagePath, response
 from lowalt.motion.poses import placed, rotated
 from lowalt.motion.table import NUMBERS
@@ -126,7 +126,7 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):
     station = radio.stations[0]
     cloud, row = target(rng, points=5, wheel_hz=500.0)
     called_for = scene({"symbol_motion": {}}, None, radio)
-    ours = hear(called_for, station, cloud, row)
+    ours = received_signal(called_for, station, cloud, row)
     view = observe(called_for, station, cloud, row)
     sent = waveform.sent(stream(5, "effect", "waveform", "Thing", 3, "A"), 2, 16)
     truth = reference_effects.moving(
@@ -134,7 +134,7 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):
     )
     cells = np.fft.ifft(truth, axis=1)
     assert relative(ours.signal, cells[[0, 1], abs(cells).argmax(axis=1)]) < 1e-10
-    still = hear(scene({}, None, radio), station, cloud, row)
+    still = received_signal(scene({}, None, radio), station, cloud, row)
     assert relative(ours.signal, still.signal) > 1e-3
 
 
@@ -173,8 +173,8 @@ def test_idle_effects_leave_every_bit(rng):
     idle = {"adc": {"bits": 0}, "receiver_noise": {"temperature_k": 0.0}}
     assert called(idle) == []
     plain = echo_signal(network(), station, observe(scene({}), station, cloud, row).motion, cloud.rcs_m2, [60, 25, 30])
-    heard = hear(scene(idle), station, cloud, row)
-    assert (heard.signal == plain.signal).all() and (heard.cell == plain.cell).all()
+    received = received_signal(scene(idle), station, cloud, row)
+    assert (received.signal == plain.signal).all() and (received.cell == plain.cell).all()
 
 
 NOTHING = {
@@ -203,8 +203,8 @@ def test_adding_an_effect_moves_no_other_draw(rng):
         {"receiver_noise": {}},
         {"receiver_noise": {}, "iq_imbalance": {"gain_db": 1e-9, "phase_deg": 0.0}},
     ):
-        drawn[len(effects)] = hear(scene(effects), station, cloud, row).signal
-    silent = hear(scene({}), station, cloud, row).signal
+        drawn[len(effects)] = received_signal(scene(effects), station, cloud, row).signal
+    silent = received_signal(scene({}), station, cloud, row).signal
     assert relative(drawn[2], drawn[1]) < 1e-9 < relative(drawn[1], silent)
 
 
@@ -234,7 +234,7 @@ def test_a_link_budget_and_set_snrs_are_refused_together():
 
 def whole(effects, radio, station, cloud, row):
     """Signals with everything the scene asks for computed."""
-    return hear(scene(effects, None, radio), station, cloud, row)
+    return received_signal(scene(effects, None, radio), station, cloud, row)
 
 
 def random_case(rng):
@@ -287,12 +287,12 @@ def scenes_within_tolerance(count, seed):
         rng = np.random.default_rng([seed, index])
         radio, cloud, row, effects, tolerance = random_case(rng)
         station = radio.stations[0]
-        heard = hear(scene(effects, tolerance, radio), station, cloud, row)
+        received = received_signal(scene(effects, tolerance, radio), station, cloud, row)
         truth = whole(effects, radio, station, cloud, row)
-        error, largest = abs(heard.signal - truth.signal).max(), abs(truth.signal).max()
-        assert error <= tolerance * largest, (index, effects, tolerance, error / largest, heard.decisions)
-        out += sum(not decision.computed for decision in heard.decisions)
-        computed += sum(decision.computed for decision in heard.decisions)
+        error, largest = abs(received.signal - truth.signal).max(), abs(truth.signal).max()
+        assert error <= tolerance * largest, (index, effects, tolerance, error / largest, received.decisions)
+        out += sum(not decision.computed for decision in received.decisions)
+        computed += sum(decision.computed for decision in received.decisions)
     return out, computed
 
 
@@ -322,23 +322,26 @@ def test_every_bound_switches_its_effect_on_and_off(rng, name):
     row |= {"vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0}
     tolerance, near, far = SWITCHES[name]
     station = network().stations[0]
-    on, off = (hear(scene({name: {}}, tolerance), station, cloud, row | change).decisions[0] for change in (near, far))
+    on, off = (
+        received_signal(scene({name: {}}, tolerance), station, cloud, row | change).decisions[0]
+        for change in (near, far)
+    )
     assert on.computed and not off.computed
     assert on.bound > tolerance > off.bound > 0
 
 
 def test_with_no_tolerance_everything_asked_for_is_computed(rng):
     cloud, row = target(rng)
-    heard = hear(scene({name: {} for name in BY_NEED}), network().stations[0], cloud, row)
-    assert [decision.computed for decision in heard.decisions] == [True] * len(BY_NEED)
+    received = received_signal(scene({name: {} for name in BY_NEED}), network().stations[0], cloud, row)
+    assert [decision.computed for decision in received.decisions] == [True] * len(BY_NEED)
 
 
 def test_a_discontinuous_receiver_lets_nothing_be_left_out(rng):
     cloud, row = target(rng)
     row |= {"x_m": 9000.0}
     station = network().stations[0]
-    assert not hear(scene({"wavefront": {}}, 0.1), station, cloud, row).decisions[0].computed
-    assert hear(scene({"wavefront": {}, "adc": {}}, 0.1), station, cloud, row).decisions[0].computed
+    assert not received_signal(scene({"wavefront": {}}, 0.1), station, cloud, row).decisions[0].computed
+    assert received_signal(scene({"wavefront": {}, "adc": {}}, 0.1), station, cloud, row).decisions[0].computed
 
 
 def test_smallest_bounds_are_left_out_first_and_together_keep_the_tolerance():

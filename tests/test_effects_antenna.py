@@ -6,7 +6,7 @@ import pytest
 from lowalt.effects.antenna import Element, gain, pattern_db
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import clutter
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from test_effects_bounds import network, target
 
 
@@ -36,7 +36,8 @@ def test_a_point_gains_the_element_twice_and_an_image_by_its_own_direction():
     ground = {"ground_reflection": {"permittivity": 5.0, "conductivity_s_m": 0.1}}
     shaped = {"element_pattern": {"downtilt_deg": 12.0}}
     plain, with_ground, with_both = (
-        hear(scene(radio, effects), station, cloud, row).signal[0] for effects in ({}, ground, ground | shaped)
+        received_signal(scene(radio, effects), station, cloud, row).signal[0]
+        for effects in ({}, ground, ground | shaped)
     )
     view = observe(scene(radio, {}), station, cloud, row)
     direct, image = (

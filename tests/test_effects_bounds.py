@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import differential_evolution
 
 from lowalt.common.network import Network, Station
-from lowalt.effects import hear as scene_signal
+from lowalt.effects import received as module
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import BY_NEED, called
 from lowalt.effects.chain import Chain
 from lowalt.effects.channel import squint, symbol_motion
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import response
 from lowalt.effects.speeds import Speeds
 from lowalt.motion.poses import Perturbation
@@ -48,9 +48,9 @@ def scene(radio, effects, tolerance=None):
 def excess(radio, cloud, row, effects, tolerance):
     """Change by what was left out, over the tolerance: at most 1 where every bound holds."""
     station = radio.stations[0]
-    heard = hear(scene(radio, effects, tolerance), station, cloud, row)
-    truth = hear(scene(radio, effects), station, cloud, row)
-    return abs(heard.signal - truth.signal).max() / abs(truth.signal).max() / tolerance, heard.decisions
+    received = received_signal(scene(radio, effects, tolerance), station, cloud, row)
+    truth = received_signal(scene(radio, effects), station, cloud, row)
+    return abs(received.signal - truth.signal).max() / abs(truth.signal).max() / tolerance, received.decisions
 
 
 @pytest.mark.parametrize("shape", [(16, 4), (32, 8)])
@@ -76,7 +76,7 @@ def test_a_rotor_may_turn_far_within_a_symbol(turns, tolerance):
     cloud, row = target([[0.1, 0, 0], [-0.1, 0, 0], [0, 0.1, 0]], rotor=True, x_m=60.0, rate_hz=turns * 1e3)
     station = radio.stations[0]
     asked = scene(radio, {"symbol_motion": {}}, tolerance)
-    heard, view = hear(asked, station, cloud, row), observe(asked, station, cloud, row)
+    received, view = received_signal(asked, station, cloud, row), observe(asked, station, cloud, row)
     sent = waveform.sent(asked.stream("waveform", row, "A"), radio.symbols, radio.subcarriers)
     samples = np.empty((radio.symbols, radio.subcarriers), complex)
     for i in range(radio.subcarriers):
@@ -85,8 +85,8 @@ def test_a_rotor_may_turn_far_within_a_symbol(turns, tolerance):
         samples[:, i] = whole[:, i]
     cells = np.fft.ifft(waveform.demodulate(samples, sent), axis=1)
     truth = cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
-    assert abs(heard.signal - truth).max() <= (tolerance or 1e-10) * abs(truth).max()
-    assert heard.decisions[0].computed
+    assert abs(received.signal - truth).max() <= (tolerance or 1e-10) * abs(truth).max()
+    assert received.decisions[0].computed
 
 
 def test_travel_is_at_least_every_path_and_little_more():
@@ -115,13 +115,13 @@ def test_interpolation_keeps_the_tolerance_against_what_a_canceller_leaves(monke
             super().__init__(*arguments)
             made.append(self)
 
-    monkeypatch.setattr(scene_signal, "Chain", Recorded)
+    monkeypatch.setattr(module, "Chain", Recorded)
     radio = network(symbols=24, subcarriers=64)
     cloud, row = target([[0, 0, 0], [0.4, 0.2, 0.1]], x_m=80.0, y_m=30.0, vx_mps=2e-4)
     effects = {"squint": {}, "clutter": {"clutter_to_signal_db": -60.0, "wind_mps": 0.0}, "canceller": {}}
-    heard = hear(scene(radio, effects, 1e-3), radio.stations[0], cloud, row)
-    largest = abs(heard.signal).max()
-    assert largest < 0.01 * np.sqrt(heard.power)
+    received = received_signal(scene(radio, effects, 1e-3), radio.stations[0], cloud, row)
+    largest = abs(received.signal).max()
+    assert largest < 0.01 * np.sqrt(received.power)
     assert made[0].interpolation() <= 1e-3 * largest
 
 

@@ -45,7 +45,7 @@ def seen(cloud: Cloud, network: Network = NETWORK, times_s: np.ndarray | None = 
     return View(network, network.station("A"), cloud, row, network.times_s if times_s is None else times_s)
 
 
-def heard(view: View, settings: dict | None) -> np.ndarray:
+def received(view: View, settings: dict | None) -> np.ndarray:
     """The subcarriers of a view, with the ground where there are settings for it."""
     paths = [] if settings is None else ground_reflection.paths(settings, view)
     return response(view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, paths=paths)
@@ -60,7 +60,7 @@ def test_two_rays_add_as_the_closed_form_over_range_and_height(settings):
     wave = 2 * np.pi * frequency / SPEED_OF_LIGHT
     for x in (30.0, 200.0, 1100.0):
         for z in (0.0, 1.0, 40.0, 150.0):
-            found = heard(seen(body([[0, 0, 0]]), PLAIN, np.zeros(1), x_m=x, z_m=z), settings)[0, 0]
+            found = received(seen(body([[0, 0, 0]]), PLAIN, np.zeros(1), x_m=x, z_m=z), settings)[0, 0]
             direct, far = np.hypot(x, z - station[2]), np.hypot(x, z + station[2])
             sine = (z + station[2]) / far
             epsilon = settings["permittivity"] - 1j * settings["conductivity_s_m"] / (
@@ -85,7 +85,7 @@ def test_a_mirror_fades_to_nothing_and_rises_by_twelve_decibels():
     gain = []
     for z in height:
         view = seen(cloud, PLAIN, np.zeros(1), x_m=x, z_m=z)
-        gain.append(abs(heard(view, METAL) / heard(view, None))[0, 0])
+        gain.append(abs(received(view, METAL) / received(view, None))[0, 0])
     gain = 20 * np.log10(np.maximum(gain, 1e-12))
     assert gain.max() == pytest.approx(40 * np.log10(2), abs=0.1)
     assert gain[0] < -200
@@ -123,8 +123,8 @@ def test_ground_like_air_is_idle_and_the_limit_is_continuous():
     assert ground_reflection.idle(air)
     assert not ground_reflection.idle(ground_reflection.DEFAULTS)
     view = seen(body([[0, 0, 0], [0.3, 0.1, 0.2]]), x_m=150.0, y_m=80.0, z_m=50.0)
-    plain = heard(view, None)
-    thin = heard(view, {**air, "permittivity": 1 + 1e-9})
+    plain = received(view, None)
+    thin = received(view, {**air, "permittivity": 1 + 1e-9})
     assert abs(thin - plain).max() < 1e-8 * abs(plain).max()
 
 

@@ -13,10 +13,10 @@ from lowalt.effects.catalogue import called
 from lowalt.effects.channel import fluctuation, mean_cross_section
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.explain import samples
-from lowalt.effects.hear import Scene, hear, observe, with_cross_sections
 from lowalt.effects.interface import SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.effects.levels import levels
-from lowalt.targets.__main__ import make
+from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 from test_effects import network, target
 
@@ -106,8 +106,8 @@ def test_two_patterns_are_refused():
 def test_set_snrs_refer_to_the_echo_as_it_arrives():
     cloud, row = target(np.random.default_rng(3))
     station = network().stations[0]
-    plain = hear(scene({}), station, cloud, row)
-    varied = hear(scene({"fluctuation": {"pattern": False, "spread_db": 6.0}}), station, cloud, row)
+    plain = received_signal(scene({}), station, cloud, row)
+    varied = received_signal(scene({"fluctuation": {"pattern": False, "spread_db": 6.0}}), station, cloud, row)
     assert varied.power == pytest.approx(np.mean(abs(varied.signal) ** 2), rel=1e-6)
     assert abs(10 * np.log10(varied.power / plain.power)) > 1.0
 
@@ -132,7 +132,7 @@ def test_the_levels_worked_by_hand_are_the_codes():
     given = Network.from_settings(config["network"])
     whole = Scene(given, config["seed"], None, alone)
     view = observe(whole, given.stations[0], with_cross_sections(whole, sample.cloud), sample.row, sample.occluders)
-    power = hear(whole, given.stations[0], sample.cloud, sample.row, sample.occluders).power
+    power = received_signal(whole, given.stations[0], sample.cloud, sample.row, sample.occluders).power
     found = {level.name: level for level in levels(view, {one.name: one for one in every}, power)}
     table = documented()
     assert len(table) == len(found) - 1

@@ -18,8 +18,8 @@ from lowalt.effects.motion.markov import steps
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.poses import attitude
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 
 TIMES = np.arange(400) * 2.5e-3

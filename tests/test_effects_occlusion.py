@@ -14,9 +14,9 @@ from lowalt.effects.channel import occlusion
 from lowalt.effects.view import View
 from lowalt.motion.table import NUMBERS
 from lowalt.targets import occluders
-from lowalt.targets.__main__ import make
 from lowalt.targets.builtin import MODULES
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 from lowalt.targets.sampling import sample_surface
 from lowalt.targets.skeleton import NODES

@@ -9,7 +9,7 @@ from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.explain import prefix_line
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import response
 from test_effects_bounds import network, target
 
@@ -43,14 +43,14 @@ def test_the_window_begins_with_the_previous_symbol(tolerance):
     radio = network(subcarriers=32, symbols=3, transmit=(4, 2), receive=(4, 2))
     cloud, row = target([[0, 0, 0], [12.0, 3.0, 1.0], [-25.0, 0, 2.0]], x_m=330.0, y_m=20.0, vx_mps=3.0)
     asked, station = scene(radio, {"cyclic_prefix": {}}, tolerance), radio.stations[0]
-    heard, view = hear(asked, station, cloud, row), observe(asked, station, cloud, row)
+    received, view = received_signal(asked, station, cloud, row), observe(asked, station, cloud, row)
     data, before = (
         waveform.sent(asked.stream(name, row, "A"), 3, 32) for name in ("waveform", "previous waveform")
     )  # fmt: skip
     truth = cut_by_hand(radio, view, cloud.rcs_m2, data, before, 144 / 2048 / 120e3)
     cells = np.fft.ifft(truth, axis=1)
     value = cells[np.arange(3), abs(cells).argmax(axis=1)]
-    assert abs(heard.signal - value).max() <= (tolerance or 1e-10) * abs(value).max()
+    assert abs(received.signal - value).max() <= (tolerance or 1e-10) * abs(value).max()
 
 
 def test_land_is_cut_at_the_delay_of_its_cell():
@@ -102,11 +102,13 @@ def test_an_echo_within_the_prefix_keeps_every_bit():
     radio = network(symbols=4)
     cloud, row = target([[0, 0, 0], [0.3, 0.1, 0.0]], x_m=80.0)
     station = radio.stations[0]
-    plain, named = (hear(scene(radio, effects, 1e-3), station, cloud, row) for effects in ({}, {"cyclic_prefix": {}}))
+    plain, named = (
+        received_signal(scene(radio, effects, 1e-3), station, cloud, row) for effects in ({}, {"cyclic_prefix": {}})
+    )
     assert (plain.signal == named.signal).all() and not named.decisions[0].computed
     assert named.decisions[0].bound == 0
     row |= {"x_m": 95.0}
-    assert hear(scene(radio, {"cyclic_prefix": {}}, 1e-3), station, cloud, row).decisions[0].computed
+    assert received_signal(scene(radio, {"cyclic_prefix": {}}, 1e-3), station, cloud, row).decisions[0].computed
 
 
 def test_explain_says_the_loss_of_every_echo():

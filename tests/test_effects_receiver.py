@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import j0
 
-from effects_frames import frame, heard, network, point
+from effects_frames import frame, network, point, received
 from lowalt.common.errors import InputError
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import ORDER, called
@@ -122,7 +122,7 @@ def test_vanishing_strength_is_continuous(module, strength):
     # A link budget's noise has its own scale; the others are relative.
     scale = 1e-6 if module is receiver_noise else 1.0
     plain = scale * point(look, 12.3, 40.0)
-    change = [np.linalg.norm(heard(module, strength(s), look, plain) - plain) for s in (2.0**-10, 2.0**-20)]
+    change = [np.linalg.norm(received(module, strength(s), look, plain) - plain) for s in (2.0**-10, 2.0**-20)]
     assert 0 < change[1] < 1e-2 * change[0] < 1e-2 * np.linalg.norm(plain)
 
 
@@ -154,7 +154,7 @@ def test_errors_grow_by_no_more_than_amplifies(module, strength):
 
 def test_noise_of_a_subcarrier_is_the_link_budget():
     look = frame(network(400, 64))
-    noise = heard(receiver_noise, {}, look, np.zeros((400, 64)))
+    noise = received(receiver_noise, {}, look, np.zeros((400, 64)))
     expected = 1.380649e-23 * 290 * 120e3 * 10**0.7
     assert np.mean(abs(noise) ** 2) == pytest.approx(expected, rel=5 / math.sqrt(25_600))
     assert abs(np.mean(noise**2)) < 5 * expected / math.sqrt(25_600)
@@ -163,7 +163,7 @@ def test_noise_of_a_subcarrier_is_the_link_budget():
 
 def test_range_compression_gains_m():
     look = frame(network(2000, 64))
-    before = heard(receiver_noise, {}, look, np.zeros((2000, 64)))
+    before = received(receiver_noise, {}, look, np.zeros((2000, 64)))
     cells = np.fft.ifft(before, axis=1)
     gain = np.mean(abs(before) ** 2) / np.mean(abs(cells) ** 2)
     assert gain == pytest.approx(64, rel=1e-12)
@@ -182,7 +182,7 @@ def test_wrong_cells_are_as_frequent_as_theory_says(snr_db):
     snr = 10 ** (snr_db / 10)
     noise = receiver_noise.variance(receiver_noise.DEFAULTS, 120e3) / cells
     response = point(look, 5.0) * math.sqrt(snr * noise)
-    chosen = abs(np.fft.ifft(heard(receiver_noise, {}, look, response), axis=1)).argmax(axis=1)
+    chosen = abs(np.fft.ifft(received(receiver_noise, {}, look, response), axis=1)).argmax(axis=1)
     right = sum((-1) ** k * math.comb(cells - 1, k) / (k + 1) * math.exp(-k / (k + 1) * snr) for k in range(cells))
     wrong = np.mean(chosen != 5)
     assert wrong == pytest.approx(1 - right, abs=4.5 * math.sqrt(right * (1 - right) / trials))
@@ -216,7 +216,7 @@ def test_each_station_has_its_fixed_offset():
 def test_a_late_window_brings_echoes_nearer(late, cell):
     look = frame(network(2, 64))
     plain = point(look, cell)
-    moved = heard(timing_offset, {"fixed_s": late, "sigma_s": 0}, look, plain)
+    moved = received(timing_offset, {"fixed_s": late, "sigma_s": 0}, look, plain)
     shift = late * 64 * 120e3
     centre = look.network.subcarriers // 2
     # Exactly the response of a point nearer by the shift, with the oscillator's own subcarrier left as it was.
@@ -256,7 +256,7 @@ def test_a_fast_clock_is_the_symbol_sum_at_its_own_instants(ppm):
 
 def test_clock_offset_makes_ranges_drift_and_lines_stay():
     look = frame(network())
-    moved = heard(clock_offset, {"fixed_ppm": 0.2, "sigma_ppm": 0}, look, point(look, 60.0))
+    moved = received(clock_offset, {"fixed_ppm": 0.2, "sigma_ppm": 0}, look, point(look, 60.0))
     drift_m = (strongest(moved) - 60.0) * look.network.cell_m
     slope = np.polyfit(look.symbol_times_s, drift_m, 1)[0]
     assert slope == pytest.approx(C * 0.2e-6 / 2, rel=2e-3)
@@ -267,7 +267,7 @@ def test_clock_offset_makes_ranges_drift_and_lines_stay():
 @pytest.mark.parametrize(("hertz", "folded"), [(30.0, 30.0), (-55.0, -55.0), (250.0, -150.0), (1234.0, 34.0)])
 def test_carrier_offset_moves_lines_folded(hertz, folded):
     look = frame(network())
-    moved = heard(carrier_offset, {"fixed_hz": hertz, "sigma_ppm": 0}, look, point(look, 20.0, 0.0))
+    moved = received(carrier_offset, {"fixed_hz": hertz, "sigma_ppm": 0}, look, point(look, 20.0, 0.0))
     line = np.fft.ifft(moved, axis=1)[:, 20]
     size = abs(np.fft.fft(line))
     assert np.fft.fftfreq(400, 2.5e-3)[size.argmax()] == pytest.approx(folded)
@@ -283,7 +283,7 @@ def test_carrier_offset_in_ppm_is_of_the_oscillator():
 def test_carrier_offset_leaks_as_the_dirichlet_kernel_says():
     look = frame(network(300, 64))
     share = 0.3
-    moved = heard(carrier_offset, {"fixed_hz": share * 120e3, "sigma_ppm": 0}, look, np.ones((300, 64)))
+    moved = received(carrier_offset, {"fixed_hz": share * 120e3, "sigma_ppm": 0}, look, np.ones((300, 64)))
     # Moose 1994: the subcarrier keeps sin(pi e) / (M sin(pi e / M)); all power is kept, so the rest is leakage.
     kept = math.sin(math.pi * share) / (64 * math.sin(math.pi * share / 64))
     turn = np.exp(2j * np.pi * share * 120e3 * look.symbol_times_s)[:, None]
@@ -302,7 +302,7 @@ def test_image_rejection_is_the_closed_form(gain_db, phase_deg, subcarriers, ton
     look.sent[:] = 1
     response = np.zeros((1, subcarriers), complex)
     response[0, tone] = 1
-    out = heard(iq_imbalance, {"gain_db": gain_db, "phase_deg": phase_deg}, look, response)[0]
+    out = received(iq_imbalance, {"gain_db": gain_db, "phase_deg": phase_deg}, look, response)[0]
     mirror = (2 * (subcarriers // 2) - tone) % subcarriers
     gain, phi = 10 ** (gain_db / 20), math.radians(phase_deg)
     above, below = 1 + gain**2 + 2 * gain * math.cos(phi), 1 + gain**2 - 2 * gain * math.cos(phi)
@@ -475,7 +475,7 @@ def test_leakage_between_subcarriers_is_the_integral_of_the_spectrum():
     """Small phase: leaked power is int S (1 - |D(f)|^2), D the mean of a tone over a symbol (Petrovic et al. 2007)."""
     look = frame(network())
     points = [[offset, level - 10] for offset, level in STEEP]
-    out = heard(phase_noise, {"points": points, "shared": False}, look, np.ones((400, 256)))
+    out = received(phase_noise, {"points": points, "shared": False}, look, np.ones((400, 256)))
     common = (out.mean(axis=1) / abs(out.mean(axis=1)))[:, None]
     leaked = np.mean(abs(out * common.conj() - abs(out.mean(axis=1))[:, None]) ** 2)
 

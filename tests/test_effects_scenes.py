@@ -17,8 +17,8 @@ from lowalt.effects.checks import check
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import write_table
 from lowalt.noise.__main__ import main as noise_command
-from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import write
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 
 ROOT = Path(__file__).parent.parent

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets import mesh
-from lowalt.targets.__main__ import make
+from lowalt.targets.make import make
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from lowalt.targets.records import load_table, merge, read_records
 from real_inputs import FOLDER, needs_inputs

@@ -8,7 +8,7 @@ import pytest
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
 from lowalt.noise import add_noise
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.noise.normals import circular
 
 

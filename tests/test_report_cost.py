@@ -15,7 +15,7 @@ from lowalt.report.figures.echo_cost import figure
 from lowalt.report.figures.echo_cost import main as draw
 from lowalt.report.page import rendered
 from lowalt.report.sections.echo_cost import summary
-from lowalt.tiles.__main__ import renderer
+from lowalt.tiles.render import Renderer
 
 TARGETS = Path(__file__).parents[1] / "config/targets.csv"
 NETWORK = {
@@ -67,7 +67,7 @@ def test_changes_counts_pixels_and_their_largest_step_both_ways():
 
 
 def test_pixels_are_those_of_rendered_tiles_and_a_fine_tolerance_changes_none(cloud, monkeypatch):
-    tiles = renderer({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
     coarse, fine = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, BLOCK)
     assert (coarse["tolerance"], fine["tolerance"]) == (0.3, 1e-9)
     assert coarse["pixels"] == fine["pixels"] == 2 * (2 * 16) * (3 * 16)

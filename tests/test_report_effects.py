@@ -17,7 +17,7 @@ from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES, called
-from lowalt.effects.hear import Scene
+from lowalt.effects.received import Scene
 from lowalt.measure.effects_calls import asked_snrs, calls
 from lowalt.measure.effects_cost import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
 from lowalt.measure.effects_samples import (
@@ -30,13 +30,12 @@ from lowalt.measure.effects_samples import (
     takes,
 )
 from lowalt.motion import write_table
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.report.figures.effects import figure, most_changed, read_rows
 from lowalt.report.page import rendered
 from lowalt.report.sections.effects import COLUMNS as SHOWN
 from lowalt.targets.cloud import write as write_cloud
-from lowalt.tiles import resize, split
-from lowalt.tiles.__main__ import renderer
+from lowalt.tiles import Renderer, resize, split
 
 BASE, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
 INFINITY = float("inf")
@@ -55,7 +54,7 @@ def scene(effects=None, seed=3):
 
 
 def measured(effects, snrs=(3.0, INFINITY), models=2):
-    tiles = renderer({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
     given = [row(model) for model in range(models)]
     return measure((scene(), scene(effects)), tiles, {"DJI Mini 2": craft()}, given, {}, list(snrs), SIZE)
 
@@ -134,7 +133,7 @@ def test_no_effect_changes_nothing_and_gives_the_images_of_the_run():
     for name in ("signal_change", "cells_changed", "pixels_changed", "pixel_difference"):
         assert not found[name].any()
     np.testing.assert_array_equal(*found["example"])
-    tiles = renderer({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
     clean = takes([scene()], {"DJI Mini 2": craft()}, [row(0), row(1)], {})[0].signal
     noisy = noisy_signals(clean.swapaxes(0, 1), [row(0), row(1)], ["A", "B"], [3.0, INFINITY], 3)
     for model, level in np.ndindex(2, 2):

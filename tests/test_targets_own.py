@@ -11,10 +11,10 @@ from PIL import Image
 
 from lowalt.__main__ import main
 from lowalt.report.figures.target import target_animation
-from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import read
 from lowalt.targets.draft import clusters
 from lowalt.targets.inspection import described, guessed_axes, guessed_unit, inspect_mesh
+from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
 from lowalt.targets.mesh_scene import selected
 from lowalt.targets.records import load_table, merge, read_records

@@ -68,7 +68,7 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
     run, products, _ = parts({"network": {"stations": {"D": {"position_m": [0, 9, 25], "normal_deg": 0}}}})
     base = "results/default"
     assert products.chunk_echoes(CHUNK) == [f"{base}/echo/seen-00001/{name}.npy" for name in "ABCD"]
-    assert products.heard(CHUNK) == ["B"]
+    assert products.listening(CHUNK) == ["B"]
     assert products.span(CHUNK) == "--first 50 --count 50"
     assert products.shard_tiles(CHUNK) == {"tiles": f"{base}/tiles/seen-00001.npz"}
     clouds = products.group_clouds(CHUNK)
@@ -78,7 +78,7 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
 
 def test_an_echo_job_for_all_stations_hears_all():
     run, products, _ = parts({"echo": {"job": "chunk"}})
-    assert products.heard(CHUNK) == run.stations == ["A", "B", "C"]
+    assert products.listening(CHUNK) == run.stations == ["A", "B", "C"]
     names = products.benchmarks(CHUNK)
     assert "results/default/benchmarks/echo/seen-00001.jsonl" in names and len(set(names)) == len(names)
 

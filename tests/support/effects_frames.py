@@ -28,7 +28,7 @@ def point(look: waveform.Frame, cell: float, doppler_hz: float = 0.0) -> np.ndar
     return np.outer(slow, np.exp(-2j * np.pi * np.arange(radar.subcarriers) * radar.subcarrier_spacing_hz * delay))
 
 
-def heard(module, given: dict, look: waveform.Frame, responses: np.ndarray, seed: int = 1) -> np.ndarray:
+def received(module, given: dict, look: waveform.Frame, responses: np.ndarray, seed: int = 1) -> np.ndarray:
     """Responses (N, M) after one receiver effect."""
     samples = waveform.transmit(responses, look.sent)
     samples = module.receive({**module.DEFAULTS, **given}, samples, look, np.random.default_rng(seed))

@@ -30,7 +30,7 @@ settings = Settings(RUN, calls)
 # The run whose data set is trained on, RUN's own unless the configuration names another.
 DATA = f"results/{RUN.data}"
 # An echo job makes the signals of one station, or of all.
-HEARD = ["{station}"] if RUN.echo_per_station else RUN.stations
+LISTENING = ["{station}"] if RUN.echo_per_station else RUN.stations
 OF_STATION = "-{station}" if RUN.echo_per_station else ""
 
 

@@ -9,7 +9,7 @@ rule echo:
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=products.group_clouds,
     output:
-        expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
+        expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
     log:
         f"results/{{run}}/logs/echo/{{group}}-{{part}}{OF_STATION}.log",
     benchmark:
@@ -18,7 +18,7 @@ rule echo:
         "../../envs/environment.yaml"
     params:
         settings=settings.echo,
-        stations=products.heard,
+        stations=products.listening,
     shell:
         "python -m lowalt.echo --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " --station {params.stations:q} --out {output:q} 2> {log:q}"

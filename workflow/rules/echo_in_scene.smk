@@ -12,8 +12,8 @@ rule echo_in_scene:
         clouds=products.group_clouds,
         occluders=products.group_occluders,
     output:
-        signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=HEARD),
-        power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=HEARD),
+        signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
+        power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=LISTENING),
     log:
         f"results/{{run}}/logs/echo/{{group}}-{{part}}{OF_STATION}.log",
     benchmark:
@@ -23,7 +23,7 @@ rule echo_in_scene:
     params:
         settings=settings.echo_in_scene,
         occluders=options.occluders,
-        stations=products.heard,
+        stations=products.listening,
     shell:
         "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " {params.occluders} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"

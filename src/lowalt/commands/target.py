@@ -87,7 +87,7 @@ def _new(given: argparse.Namespace) -> str:
 
 
 def _make(given: argparse.Namespace) -> str:
-    from lowalt.targets.__main__ import make
+    from lowalt.targets.make import make
 
     records = read_records(given.record)
     subtype = given.subtype or (next(iter(records)) if len(records) == 1 else None)

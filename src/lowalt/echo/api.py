@@ -111,7 +111,7 @@ def echo_signals(
     ])  # fmt: skip
 
 
-def explain(result: EchoResult) -> str:
+def method_text(result: EchoResult) -> str:
     """Return in words how a signal was computed and which bounds allowed it."""
     method = result.method
     kind = "float32 after the phase" if method.single else "float64"

@@ -8,28 +8,11 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
-from lowalt.common.progress import reported
 from lowalt.effects.catalogue import called
-from lowalt.effects.hear import Scene, hear
+from lowalt.effects.chunk import scene_signals
+from lowalt.effects.received import Scene
 from lowalt.motion import read_table
-from lowalt.targets.cloud import Cloud, cloud_of, read
-
-
-def signals(
-    scene: Scene, name: str, clouds: dict[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
-
-    occluders: each subtype's surfaces, where the scene hides points behind them.
-    Raises: InputError naming the sample where a subtype has no cloud or cannot be computed with.
-    """
-    station, occluders = scene.network.station(name), occluders or {}
-    result = np.empty((len(rows), scene.network.symbols), np.complex64)
-    power = np.empty(len(rows))
-    for index, row in enumerate(reported(rows, len(rows), "models")):
-        heard = hear(scene, station, cloud_of(clouds, row), row, occluders.get(row["subtype"]))
-        result[index], power[index] = heard.signal, heard.power
-    return result, power
+from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
@@ -58,7 +41,7 @@ def main(arguments: list[str]) -> None:
 
         occluders = read_all(given.occluders)
     rows = read_table(given.motion)
-    found = [signals(scene, station, clouds, rows, occluders) for station in given.station]
+    found = [scene_signals(scene, station, clouds, rows, occluders) for station in given.station]
     for files in zip(zip(given.out, given.power, strict=True), found, strict=True):
         for path, values in zip(*files, strict=True):
             with replacing(path) as temporary:

@@ -14,16 +14,15 @@ from lowalt.common.hardware import describe
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.streams import stream
 from lowalt.common.timing import median_s
-from lowalt.echo import echo_signal
-from lowalt.echo import explain as explain_echo
+from lowalt.echo import echo_signal, method_text
 from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
-from lowalt.effects.hear import Scene, hear, observe, with_cross_sections
 from lowalt.effects.levels import levels, table
+from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 
 REPEATS = 3
@@ -79,7 +78,10 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
 
     def mean(effects: tuple[NamedEffect, ...]) -> float:
         part = Scene(scene.network, scene.seed, scene.tolerance, effects)
-        times = [1e3 * median_s(lambda s=s: hear(part, station, s.cloud, s.row, s.occluders), REPEATS) for s in chosen]
+        times = [
+            1e3 * median_s(lambda s=s: received_signal(part, station, s.cloud, s.row, s.occluders), REPEATS)
+            for s in chosen
+        ]
         return sum(times) / len(times)
 
     result = {"base": mean(())}
@@ -93,19 +95,19 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
     cloud = with_cross_sections(scene, sample.cloud)
     view = observe(scene, station, cloud, sample.row, sample.occluders)
     own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, scene.tolerance)
-    heard = hear(scene, station, sample.cloud, sample.row, sample.occluders)
+    received = received_signal(scene, station, sample.cloud, sample.row, sample.occluders)
     range_m = np.linalg.norm(view.aim_m - np.asarray(station.position_m))
     lines = [f"{sample.row['subtype']}, model {sample.row['model']}, station {station_name}, range {range_m:.0f} m"]
-    lines += [f"  {line}" for line in explain_echo(own).splitlines()]
+    lines += [f"  {line}" for line in method_text(own).splitlines()]
     lines.append(f"  {prefix_line(scene, float(range_m))}")
-    for decision in heard.decisions:
+    for decision in received.decisions:
         verb = "computed" if decision.computed else "left out"
         bound = "" if np.isinf(decision.bound) else f", bound {decision.bound:.2g} of the largest value"
         lines.append(f"  {decision.name}: {verb}{bound} ({decision.reason})")
     named = {effect.name: effect for effect in scene.effects}
-    lines += [f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, heard.power)))]
-    moved = np.sqrt(np.mean(abs(heard.signal - own.signal) ** 2) / heard.power) if heard.power > 0 else np.nan
-    other = np.mean(heard.cell != own.cell)
+    lines += [f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, received.power)))]
+    moved = np.sqrt(np.mean(abs(received.signal - own.signal) ** 2) / received.power) if received.power > 0 else np.nan
+    other = np.mean(received.cell != own.cell)
     lines.append(
         f"  against the target's echo alone: rms change {moved:.2g}, other range cell in {other:.1%} of symbols"
     )

@@ -87,8 +87,8 @@ def entries(
     found = {}
     for name, speed in speeds.items():
         scheme = named(table, name, stations)
-        heard = joined([stations[number] for number in scheme.stations])
-        found[name] = Entry(scheme, heard, speed, shard_bytes)
+        names_joined = joined([stations[number] for number in scheme.stations])
+        found[name] = Entry(scheme, names_joined, speed, shard_bytes)
     return found
 
 

@@ -21,7 +21,7 @@ def calls(config: dict, schema: str | Path) -> dict[str, dict]:
     """Return {effects, tolerance, snr_db} of every call by its name, in the chain's order, scenes last.
 
     config: the checked configuration; its report.effect_scenes name the scenes, by file. An effect alone has its
-    defaults. A call with a link budget (receiver_noise) is heard without noise at set SNRs.
+    defaults. A call with a link budget (receiver_noise) gets no noise at set SNRs.
     Raises: InputError where the run has effects itself, or a scene is refused, changes the run's samples or has a
     name that is taken.
     """

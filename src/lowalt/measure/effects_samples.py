@@ -24,12 +24,11 @@ from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.common.timing import once
 from lowalt.effects.catalogue import called
-from lowalt.effects.hear import Scene, hear
+from lowalt.effects.received import Scene, received_signal
 from lowalt.motion import read_table
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.targets.cloud import CATEGORIES, Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
-from lowalt.tiles.__main__ import renderer
 
 STEP = 8
 """Steps of the 256 by which a pixel must move to count as changed: about the smallest that an eye sees side by side."""
@@ -61,7 +60,7 @@ def held_out(rows: list[dict], share: dict, seed: int, count: int) -> list[dict]
     Raises: InputError where motion models are in several folds, or a subtype has none in the test fold.
     """
     if share["by"] != "motion":
-        raise InputError(f"split.by: {share['by']!r}, expected 'motion': else training has heard the test's models")
+        raise InputError(f"split.by: {share['by']!r}, expected 'motion': else training has seen the test's models")
     found: dict[str, list[dict]] = {}
     for row in rows:
         mine = found.setdefault(row["subtype"], [])
@@ -96,11 +95,11 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
             for scene, take in pairs if (index + place) % 2 else pairs[::-1]:
                 if index == place == 0:
                     # The first call compiles and fills tables once; its time is not that of a sample.
-                    hear(scene, station, *given)
-                seconds, heard = once(functools.partial(hear, scene, station, *given), time.process_time)
+                    received_signal(scene, station, *given)
+                seconds, received = once(functools.partial(received_signal, scene, station, *given), time.process_time)
                 take.ms[index, place] = 1e3 * seconds
-                take.signal[index, place], take.cell[index, place] = heard.signal, heard.cell
-                take.power[index, place] = heard.power
+                take.signal[index, place], take.cell[index, place] = received.signal, received.cell
+                take.power[index, place] = received.power
     return found
 
 
@@ -180,7 +179,7 @@ def main(arguments: list[str]) -> None:
     keys = ("name", "effects", "network", "spectra", "images", "split", "seed", "tolerance", "snr_db", "size", "models")
     block = dict(zip(keys, pick(given.settings, *keys), strict=True))
     network = Network.from_settings(block["network"])
-    tiles = renderer({key: block[key] for key in ("network", "spectra", "images")})
+    tiles = Renderer.from_settings({key: block[key] for key in ("network", "spectra", "images")})
     rows = [row for path in given.motion for row in read_table(path)]
     rows = held_out(rows, block["split"], block["seed"], block["models"])
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}

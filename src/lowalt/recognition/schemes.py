@@ -105,10 +105,10 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
         raise InputError(f"{where}: fusion {row['fusion']!r}, expected one of {FUSIONS}")
     protocols = tuple(row["protocols"].split("+"))
     _indices(row["protocols"], list(protocols), PROTOCOLS, "protocols", where)
-    heard = _station_names(row["stations"], stations)
+    listed = _station_names(row["stations"], stations)
     return Scheme(
         name=row["scheme"],
-        stations=_indices(row["stations"], heard, tuple(stations), "stations", where),
+        stations=_indices(row["stations"], listed, tuple(stations), "stations", where),
         spectra=_indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
         fusion=row["fusion"],
         backbone=row["backbone"],

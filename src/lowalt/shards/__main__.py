@@ -12,8 +12,8 @@ from lowalt.shards.index import build
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
 from lowalt.shards.write import npy, write_shard
-from lowalt.tiles.__main__ import load_signals
 from lowalt.tiles.files import Tiles
+from lowalt.tiles.signals import load_signals
 
 
 def write(arguments: list[str]) -> None:

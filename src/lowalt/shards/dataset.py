@@ -50,7 +50,7 @@ def made_clouds(records: dict[str, dict], seed: int, inputs: Path | None) -> dic
 
     Raises: InputError where a record or an input is wrong.
     """
-    from lowalt.targets.__main__ import make
+    from lowalt.targets.make import make
 
     return {name: make(item, inputs, seed) for name, item in records.items()}
 

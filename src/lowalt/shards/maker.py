@@ -9,8 +9,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from lowalt.common.network import Network
-from lowalt.echo.__main__ import signals as echoes
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.echo.chunk import clean_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.png import encode
@@ -37,41 +37,41 @@ class Maker:
         self.network = Network.from_settings(render["network"])
         self.kept = KEPT
         self.images = Images.from_settings(render["images"])
-        self._heard: dict[tuple[str, int], tuple[np.ndarray, np.ndarray | None]] = {}
+        self._received: dict[tuple[str, int], tuple[np.ndarray, np.ndarray | None]] = {}
 
     def __getstate__(self) -> dict:
         # Workers prepare tables of their own.
-        return {**{name: value for name, value in self.__dict__.items() if name != "renderer"}, "_heard": {}}
+        return {**{name: value for name, value in self.__dict__.items() if name != "renderer"}, "_received": {}}
 
     @functools.cached_property
     def renderer(self) -> Renderer:
         """What turns signals into tiles."""
         return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
 
-    def heard(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
+    def received(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
         """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
         refer to, None where they are the echoes' own.
 
         Raises: InputError naming the sample that cannot be computed.
         """
         key = row["subtype"], row["model"]
-        if key not in self._heard:
-            if len(self._heard) >= self.kept:
-                del self._heard[next(iter(self._heard))]
-            self._heard[key] = self._listen(row)
-        return self._heard[key]
+        if key not in self._received:
+            if len(self._received) >= self.kept:
+                del self._received[next(iter(self._received))]
+            self._received[key] = self._listen(row)
+        return self._received[key]
 
     def _listen(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
         names = [station.name for station in self.network.stations]
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
-            return echoes(self.network, names, self.clouds, [row], tolerance)[:, 0], None
-        from lowalt.effects.__main__ import signals
+            return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
         from lowalt.effects.catalogue import called
-        from lowalt.effects.hear import Scene
+        from lowalt.effects.chunk import scene_signals
+        from lowalt.effects.received import Scene
 
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
-        found = [signals(scene, name, self.clouds, [row], self.occluders) for name in names]
+        found = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
         return np.stack([signal[0] for signal, _ in found]), np.stack([power for _, power in found])
 
     def signal(self, row: dict, snr_db: float) -> np.ndarray:
@@ -79,7 +79,7 @@ class Maker:
 
         Raises: InputError naming the sample that cannot be computed.
         """
-        clean, powers = self.heard(row)
+        clean, powers = self.received(row)
         names = [station.name for station in self.network.stations]
         return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers)[0, 0]
 

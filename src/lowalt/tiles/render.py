@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numba import njit
 
+from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.portable import sine_cosine
@@ -92,6 +93,15 @@ class Renderer:
         tables = {name: lookup(images.scale, 127 if name == "vt" else 255) for name in VIEWS}
         self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in tables.items()}
         self._image = np.empty((images.size, images.size), np.float32)
+
+    @classmethod
+    def from_settings(cls, settings: dict) -> "Renderer":
+        """Return the renderer of a settings object with exactly `network`, `spectra` and `images`.
+
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        network, spectra, images = pick(settings, "network", "spectra", "images")
+        return cls(Network.from_settings(network), Spectra.from_settings(spectra), Images.from_settings(images))
 
     def _plan(self, name: str) -> tuple:
         """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the axes' order."""

@@ -66,7 +66,7 @@ class Products:
             first.setdefault(record["published"]["category"], name)
         return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
 
-    def heard(self, wildcards: Any) -> list[str]:
+    def listening(self, wildcards: Any) -> list[str]:
         """Names of the stations whose signals one echo job makes."""
         return [wildcards.station] if self._run.echo_per_station else self._run.stations
 

@@ -40,7 +40,7 @@ class Scene:
         return stream(self.seed, "effect", name, row["subtype"], row["model"], *more)
 
 
-class Heard(NamedTuple):
+class Received(NamedTuple):
     """The signal of one target at one station.
 
     signal: (N,) complex128, Y_bin; cell: (N,) chosen range cells; power: mean |Y_bin|^2 of the target's echo alone as
@@ -54,7 +54,7 @@ class Heard(NamedTuple):
     decisions: list[Decision]
 
 
-def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> Heard:
+def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> Received:
     """Return the signal at `station` of the motion model `row` (motion table) under the scene's effects.
 
     occluders: the target's surfaces, for self-occlusion.
@@ -73,14 +73,14 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
     # without effects.
     power = rms(own.signal.astype(np.complex64)) ** 2
     if not beyond:
-        return Heard(own.signal, own.cell, power, [])
+        return Received(own.signal, own.cell, power, [])
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
     if providing(beyond, WeighsPoints):
         chain.power = power = rms(seen_alone(chain).astype(np.complex64)) ** 2
     if share is None or math.isinf(chain.amplification):
         outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
-        return Heard(outcome.signal, outcome.cell, power, notes)
+        return Received(outcome.signal, outcome.cell, power, notes)
     largest = float(abs(own.signal).max())
     chain.limit(INTERPOLATION * share * largest)
     # Where the scene names only physics by need, the engine's echo is the outcome without any of it.
@@ -91,7 +91,7 @@ def hear(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dic
         chain.limit(0.5 * INTERPOLATION * share * largest_of(trial))
         trial = chain.run(frozenset())
     outcome, notes = settle(chain, asked, share, trial)
-    return Heard(outcome.signal, outcome.cell, power, notes)
+    return Received(outcome.signal, outcome.cell, power, notes)
 
 
 def seen_alone(chain: Chain) -> np.ndarray:

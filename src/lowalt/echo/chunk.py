@@ -1,0 +1,39 @@
+"""Clean signals of a chunk: its motion table and clouds seen from several stations."""
+
+import numpy as np
+
+from lowalt.common.network import Network
+from lowalt.common.progress import reported
+from lowalt.echo.api import echo_signal, method_text
+from lowalt.echo.scene import Rigid, target
+from lowalt.motion import poses
+from lowalt.targets.cloud import Cloud, cloud_of
+
+
+def clean_signals(
+    network: Network,
+    names: list[str],
+    clouds: dict[str, Cloud],
+    rows: list[dict],
+    tolerance: float | None,
+    notes: list[str] | None = None,
+) -> np.ndarray:
+    """Return clean signals (stations, models, N) complex64 of the motion table `rows` at the stations `names`.
+
+    The beams aim at each cloud's origin at the first symbol. `notes` gets a text a signal: how it was computed.
+    Raises: InputError naming the sample where a subtype has no cloud or a position cannot be computed with.
+    """
+    stations, times_s = [network.station(name) for name in names], network.times_s
+    result = np.empty((len(stations), len(rows), network.symbols), np.complex64)
+    for index, row in enumerate(reported(rows, len(rows), "models")):
+        sample = f"{row['subtype']}, model {row['model']}"
+        cloud = cloud_of(clouds, row)
+        seen = target(Rigid(*poses(cloud, row, times_s), cloud.points, cloud.part), cloud.rcs_m2, sample)
+        aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
+        for place, station in enumerate(stations):
+            where = f"{sample}, station {station.name}"
+            found = echo_signal(network, station, seen, None, aim, tolerance, sample=where)
+            result[place, index] = found.signal
+            if notes is not None:
+                notes.append(f"{where}\n{method_text(found)}\n")
+    return result

@@ -1,0 +1,24 @@
+"""The noisy signals that tiles and shards are made from, read from their file."""
+
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.common.network import Network
+
+
+def load_signals(path: str | Path, network: Network) -> np.ndarray:
+    """Return noisy signals as a memory map, (models, snrs, stations, symbols) complex64.
+
+    Raises: InputError naming the file and what does not fit.
+    """
+    try:
+        signals = np.load(existing(path, "noisy signals"), mmap_mode="r")
+    except (ValueError, EOFError) as error:
+        raise InputError(f"{path}: not a NumPy array ({error})") from error
+    shape = (len(network.stations), network.symbols)
+    if signals.dtype != np.complex64 or signals.ndim != 4 or signals.shape[2:] != shape:
+        raise InputError(f"{path}: {signals.dtype} {signals.shape}, expected complex64 (models, snrs, {shape})")
+    return signals
