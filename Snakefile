@@ -61,6 +61,14 @@ rule data:
     localrule: True
 
 
+rule training_samples:
+    input:
+        products.own_views,
+        f"results/{RUN.name}/SHA256SUMS",
+        f"results/{RUN.name}/config.yaml",
+    localrule: True
+
+
 rule choices:
     input:
         f"results/{RUN.name}/choices.csv",

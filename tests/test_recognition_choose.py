@@ -55,8 +55,10 @@ def test_nothing_that_a_table_tests_on_is_opened():
 def test_the_candidates_are_those_of_the_file_and_change_only_what_there_is():
     table = choose.read(choose.TABLE)
     block = load_yaml("config/default.yaml")["recognition"]
-    settled = [choose.settled(block, changes) for changes in table.candidates.values()]
-    assert all(one not in settled[:number] for number, one in enumerate(settled))
+    settled = [choose.settled(block, changes) for changes in map(table.changes, table.candidates)]
+    assert table.extra("also-sizes-that-no-maker-has-built") == ["invented"] and table.extra("32 pixels") == []
+    own = [one for name, one in zip(table.candidates, settled, strict=True) if not table.extra(name)]
+    assert all(one not in own[:number] for number, one in enumerate(own))
     for one in settled:
         recipe.check(one["training"])
     assert table.named("32-pixels") == "32 pixels"
@@ -113,11 +115,18 @@ def test_a_trial_from_the_command_line_trains_without_what_it_predicts(tmp_path,
     )
     block = {**SETTINGS, "network": {**SETTINGS["network"], "backbone": "test_resnet"}, "training": TRAINING}
     block["evaluation"] = {"batch": 16, "threads": 1, "precision": "fp32", "mirror": True}
-    trial_main(["--settings", json.dumps(block), "--views", str(tmp_path / "views.npz"), "--candidate", "quick",
-                "--candidates", str(tmp_path / "choices.yaml"), "--fold", "1",
-                "--stations", *"ABC", "--out", str(tmp_path)])  # fmt: skip
+    given = ["--settings", json.dumps(block), "--views", str(tmp_path / "views.npz"), "--candidate", "quick",
+             "--candidates", str(tmp_path / "choices.yaml"), "--fold", "1", "--stations", *"ABC"]  # fmt: skip
+    trial_main([*given, "--out", str(tmp_path)])
     made = choose.Trial(tmp_path / "predictions.csv")
     assert set(made.held.subtype.tolist()) == set(choose.held_out(found, 1, 3)) == set(made.about["held"])
     assert set(made.kept.fold.tolist()) == {"val"} and not set(made.kept.subtype.tolist()) & set(made.about["held"])
     assert made.about["train_samples"] == (20 - 8) * 2 * 2 and made.about["steps"] == 3
     assert made.about["mirror"] is True
+    # Another run's samples are trained on too, but not those of a held-out subtype.
+    other = facts(models=6, folds=("train",))
+    samples.write(tmp_path / "extra.npz", views[:1].repeat(len(other), 0), other)
+    trial_main([*given, "--extra", str(tmp_path / "extra.npz"), "--out", str(tmp_path / "more")])
+    more = choose.Trial(tmp_path / "more/predictions.csv")
+    assert more.about["train_samples"] == (20 - 8) * 2 * (2 + 6)
+    assert sorted(more.held.key.tolist()) == sorted(made.held.key.tolist())

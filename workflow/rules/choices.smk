@@ -8,6 +8,7 @@ rule trial:
     input:
         code=code("lowalt.recognition.trial", "lowalt.recognition.choose"),
         views=products.trial_views,
+        extra=products.trial_extra,
         candidates="config/choices/default.yaml",
         schemes=config["recognition"]["table"],
     output:
@@ -24,8 +25,10 @@ rule trial:
     params:
         settings=settings.trial,
         stations=RUN.stations,
+        extra=options.extra,
     shell:
         "python -m lowalt.recognition.trial --settings {params.settings:q} --views {input.views:q}"
+        " {params.extra}"
         " --candidates {input.candidates:q} --candidate {wildcards.candidate} --fold {wildcards.held}"
         " --schemes {input.schemes:q} --stations {params.stations:q} --out $(dirname {output.table:q}) 2> {log:q}"
 

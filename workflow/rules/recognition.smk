@@ -62,11 +62,11 @@ rule distances:
 
 rule train:
     input:
-        unpack(products.samples),
+        unpack(products.training_samples),
         code=code(
             "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
         ),
-        frozen=f"{DATA}/SHA256SUMS",
+        frozen=products.frozen,
         schemes=config["recognition"]["table"],
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
@@ -81,10 +81,12 @@ rule train:
     params:
         settings=settings.training,
         source=options.samples,
+        extra=options.extra,
         events="--tensorboard" if config["recognition"]["tensorboard"] else "",
         stations=RUN.stations,
     shell:
-        "python -m lowalt.recognition train --settings {params.settings:q} {params.source} --frozen {input.frozen:q}"
+        "python -m lowalt.recognition train --settings {params.settings:q} {params.source} {params.extra}"
+        " --frozen {input.frozen:q}"
         " --schemes {input.schemes:q} --stations {params.stations} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
         " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"
 

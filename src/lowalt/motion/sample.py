@@ -11,8 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
-from lowalt.motion.table import NUMBERS, PHASES
-from lowalt.targets.cloud import Cloud
+from lowalt.motion.table import NUMBERS, PHASES, SCALE
+from lowalt.targets.cloud import Cloud, extent
 
 AIRBORNE = ("UAV", "Bird")
 
@@ -74,6 +74,19 @@ def _rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, s
             row["playback"] = speed / cloud.record["track_speed_mps"]
 
 
+def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float, row: dict) -> None:
+    """Draw the target's longest side between `low_m` and `high_m`, alike on a logarithmic scale, and what follows.
+
+    A craft or bird `s` times as large turns or beats `s` times as slowly, so blade tips and wings keep their speed; a
+    wheel of `s` times the diameter turns `s` times as slowly at the same road speed. A recording keeps its cadence.
+    """
+    low, high = map(float, portable.log(np.array([low_m, high_m])))
+    scale = row[SCALE] = float(portable.exp(rng.uniform(low, high))) / extent(cloud)
+    row["rate_hz"] /= scale
+    if cloud.category not in AIRBORNE:
+        row["z_m"] *= scale
+
+
 def draw(
     rng: np.random.Generator,
     cloud: Cloud,
@@ -85,8 +98,9 @@ def draw(
     """Return one motion model's row (without group and model) for the target `cloud`.
 
     published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places; corners: (K, 2) m
-    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform.
-    Wheels turn at F = v / (pi D) (paper Eq. 16).
+    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform, only the target's
+    size, where `sizes_m` asks for one of its own, is so on a logarithmic scale. Wheels turn at F = v / (pi D) (paper
+    Eq. 16).
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
@@ -107,4 +121,9 @@ def draw(
         sine, cosine = map(float, portable.sine_cosine(row["yaw_rad"]))
         row["vx_mps"], row["vy_mps"], row["vz_mps"] = -speed * sine, speed * cosine, 0.0
     _rates(rng, cloud, published, row, speed, settings["cadence"])
+    sizes = settings.get("sizes_m", {})
+    if cloud.category in sizes:
+        _resize(rng, cloud, *sizes[cloud.category], row)
+    elif sizes:
+        row[SCALE] = 1.0  # every row of a table has the column
     return {"subtype": cloud.subtype, "category": cloud.category, **row}

@@ -18,15 +18,21 @@ NUMBERS = (
     "rate_hz", *(f"phase_{index}_rad" for index in range(PHASES)), "start_s", "playback",
 )  # fmt: skip
 COLUMNS = (*TEXTS, "model", *NUMBERS)
+SCALE = "scale"
+"""A last column of tables whose targets have drawn sizes: how many times as large as its cloud a target is."""
 
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
-    """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes."""
-    write_csv(path, COLUMNS, map(_cells, rows))
+    """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes.
+
+    Rows of targets with drawn sizes all have the key SCALE, which becomes the last column.
+    """
+    more = (SCALE,) if rows and SCALE in rows[0] else ()
+    write_csv(path, (*COLUMNS, *more), (_cells(row, (*NUMBERS, *more)) for row in rows))
 
 
-def _cells(row: dict) -> list:
-    numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in NUMBERS)
+def _cells(row: dict, names: tuple[str, ...]) -> list:
+    numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in names)
     return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
 
@@ -38,16 +44,16 @@ def read_table(path: str | Path) -> list[dict]:
     with existing(path, "motion table").open(newline="") as file:
         reader = csv.reader(file)
         header = tuple(next(reader, ()))
-        if header != COLUMNS:
+        if header not in (COLUMNS, (*COLUMNS, SCALE)):
             raise InputError(f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order")
-        return [_row(path, line, cells) for line, cells in enumerate(reader, start=2)]
+        return [_row(path, line, header, cells) for line, cells in enumerate(reader, start=2)]
 
 
-def _row(path: str | Path, line: int, cells: list[str]) -> dict:
-    if len(cells) != len(COLUMNS):
-        raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(COLUMNS)}")
-    row: dict = dict(zip(COLUMNS, cells, strict=True))
-    for name in ("model", *NUMBERS):
+def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str]) -> dict:
+    if len(cells) != len(header):
+        raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(header)}")
+    row: dict = dict(zip(header, cells, strict=True))
+    for name in header[len(TEXTS) :]:
         text = row[name]
         try:
             row[name] = int(text) if name == "model" else float(text) if text else math.nan
@@ -55,4 +61,6 @@ def _row(path: str | Path, line: int, cells: list[str]) -> dict:
             raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a number") from None
         if math.isinf(row[name]):
             raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a finite number")
+    if SCALE in row and not row[SCALE] > 0:
+        raise InputError(f"{path}, line {line}, column {SCALE}: {row[SCALE]}, expected a positive number")
     return row

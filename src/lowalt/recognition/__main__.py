@@ -51,7 +51,7 @@ def _freeze(arguments: list[str]) -> None:
 def _sources(line) -> None:
     line.add_argument("--views", nargs="+", help="caches of views (.npz)")
     line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
-    line.add_argument("--frozen", help="SHA256SUMS of clouds and motion tables, checked first")
+    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
 
 
 def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
@@ -73,10 +73,11 @@ def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
-    from lowalt.recognition.samples import first_models
+    from lowalt.recognition.samples import ViewSamples, first_models, joined_views
 
     line = parser("lowalt.recognition train", _train.__doc__)
     _sources(line)
+    line.add_argument("--extra", nargs="+", help="caches of views of other runs that are trained on too")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
@@ -84,8 +85,8 @@ def _train(arguments: list[str]) -> None:
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     given = line.parse_args(arguments)
-    if given.frozen:
-        verify(given.frozen)
+    for sums in given.frozen:
+        verify(sums)
     scheme = named(given.schemes, given.scheme, given.stations)
     pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation")
     settings = scheme.settled(given.settings)
@@ -95,6 +96,9 @@ def _train(arguments: list[str]) -> None:
     }
     if scheme.share < 1:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
+    if given.extra:
+        more = ViewSamples(given.extra, scheme.columns, folds(given.protocol, "train"))
+        samples["train"] = joined_views(samples["train"], more)
     train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
 
 
@@ -109,8 +113,8 @@ def _evaluate(arguments: list[str]) -> None:
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
     given = line.parse_args(arguments)
-    if given.frozen:
-        verify(given.frozen)
+    for sums in given.frozen:
+        verify(sums)
     trained = load(given.model)
     parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
     pairs = set().union(*(folds(trained.protocol, part) for part in parts))

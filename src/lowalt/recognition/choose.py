@@ -41,7 +41,10 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Choices:
-    """Candidates by name, each what it changes in the block `recognition`; number of folds; name of the scheme."""
+    """Candidates by name, each what it changes in the block `recognition`; number of folds; name of the scheme.
+
+    A candidate's key `extra`, as the block's, names other runs whose samples are trained on too.
+    """
 
     candidates: dict[str, dict]
     folds: int
@@ -56,6 +59,14 @@ class Choices:
             if name in (candidate, slug(candidate)):
                 return candidate
         raise InputError(f"choices: no candidate {name!r}, expected one of {list(self.candidates)}")
+
+    def changes(self, name: str) -> dict:
+        """Return what a candidate, by name or file name, changes in the settings of the block."""
+        return {key: value for key, value in self.candidates[self.named(name)].items() if key != "extra"}
+
+    def extra(self, name: str) -> list[str]:
+        """Return the names of the runs whose samples a candidate trains on too."""
+        return self.candidates[self.named(name)].get("extra", [])
 
 
 def read(path: str | Path) -> Choices:

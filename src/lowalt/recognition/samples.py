@@ -8,9 +8,10 @@ A cache file (.npz) holds, for the samples of one shard in its order,
     one array (samples,) for every name of FACTS
 """
 
+import copy
 import hashlib
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,21 @@ class ViewSamples:
     def sha256(self) -> str:
         """Return the SHA-256 of all that a training sees of these samples: images, labels, keys and their order."""
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
+
+
+def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
+    """Return the samples of two sources as one; motion models of the second are counted on from those of the first.
+
+    So the two never share a motion model, of which an epoch visits few SNRs.
+    Raises: InputError where their images differ in size.
+    """
+    if first.size != second.size:
+        raise InputError(f"views: image sizes {first.size} and {second.size}, expected one size")
+    found = copy.copy(first)
+    found.images = np.concatenate([first.images, second.images])
+    later = replace(second.facts, model=second.facts.model + 1 + first.facts.model.max())
+    found.facts = joined([first.facts, later])
+    return found
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:

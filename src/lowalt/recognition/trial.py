@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
-from lowalt.recognition.samples import Facts, ViewSamples
+from lowalt.recognition.samples import Facts, ViewSamples, joined_views
 from lowalt.recognition.schemes import TABLE, Scheme, named
 
 BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
@@ -31,24 +31,36 @@ def joined(first: ViewSamples, second: ViewSamples) -> ViewSamples:
 
 
 def trial(
-    choices: choose.Choices, candidate: str, fold: int, settings: dict, scheme: Scheme, views: list, out: Path
+    choices: choose.Choices,
+    candidate: str,
+    fold: int,
+    settings: dict,
+    scheme: Scheme,
+    views: list,
+    extra: list,
+    out: Path,
 ) -> None:
     """Train a candidate in one fold and write `predictions.csv` and its record into the folder `out`.
 
-    settings: {seed, colour_map} and BLOCKS, as the configuration has them; views: cache files of the candidate's size.
+    settings: {seed, colour_map} and BLOCKS, as the configuration has them; views, extra: cache files of the candidate's
+    size, the latter of other runs whose samples are trained on too; held-out subtypes are left out of them.
     Raises: InputError for an unknown candidate or fold, and as a training does.
     """
     seed, colour_map, *_ = pick(settings, "seed", "colour_map", *BLOCKS)
     name = choices.named(candidate)
-    block = choose.settled({key: settings[key] for key in BLOCKS}, choices.candidates[name])
+    block = choose.settled({key: settings[key] for key in BLOCKS}, choices.changes(name))
     source = ViewSamples(views, scheme.columns, choose.PAIRS)
     runs.check_size(source, block["size"])
     parts = {part: part_of(source, rows) for part, rows in choose.parts(source.facts, fold, choices.folds).items()}
+    held = sorted(set(parts["held"].facts.subtype.tolist()))
+    if extra:
+        more = ViewSamples(extra, scheme.columns, choose.PAIRS)
+        more.keep(np.flatnonzero(~np.isin(more.facts.subtype, held)))
+        parts["train"] = joined_views(parts["train"], more)
     evaluation = block.pop("evaluation")
     given = {"train": parts["train"], "validation": parts["validation"]}
     runs.train(given, scheme, f"without fold {fold}", {"seed": seed, "colour_map": colour_map, **block}, out)
     asked = joined(parts["held"], parts["validation"])
-    held = sorted(set(parts["held"].facts.subtype.tolist()))
     about = {"candidate": name, "fold": fold, "held": held}
     runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
 
@@ -59,6 +71,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument(
         "--views", nargs="+", required=True, help="caches of views (.npz): group seen, folds train and val"
     )
+    line.add_argument("--extra", nargs="+", default=[], help="caches of views of other runs that are trained on too")
     line.add_argument("--candidates", default=choose.TABLE, help=f"table of candidates (default: {choose.TABLE})")
     line.add_argument("--candidate", required=True, help="name or slug of a candidate")
     line.add_argument("--fold", type=int, required=True, help="number of the fold held out, from 0")
@@ -68,7 +81,7 @@ def main(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     table = choose.read(given.candidates)
     scheme = named(given.schemes, table.scheme, given.stations)
-    trial(table, given.candidate, given.fold, given.settings, scheme, given.views, Path(given.out))
+    trial(table, given.candidate, given.fold, given.settings, scheme, given.views, given.extra, Path(given.out))
 
 
 if __name__ == "__main__":

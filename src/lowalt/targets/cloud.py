@@ -19,7 +19,8 @@ up +z. Every point belongs to one part; every part but the body moves.
 
 import json
 import zipfile
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -130,14 +131,26 @@ def check(cloud: Cloud, where: str) -> Cloud:
     return cloud
 
 
-def cloud_of(clouds: dict[str, Cloud], row: dict) -> Cloud:
-    """Return the cloud of a motion table's row among `clouds`, by subtype.
+def extent(cloud: Cloud) -> float:
+    """Return the longest side (m) of the box around a cloud's points, or around all places of a recording's points."""
+    places = cloud.track.reshape(-1, 3) if len(cloud.track) else cloud.points
+    return float((places.max(axis=0) - places.min(axis=0)).max())
+
+
+def scaled(cloud: Cloud, factor: float) -> Cloud:
+    """Return a cloud `factor` times as large in every direction; cross sections and turning rates stay."""
+    return replace(cloud, points=factor * cloud.points, hinges=factor * cloud.hinges, track=factor * cloud.track)
+
+
+def cloud_of(clouds: Mapping[str, Cloud], row: dict) -> Cloud:
+    """Return the cloud of a motion table's row among `clouds`, by subtype, at the row's own size where it has one.
 
     Raises: InputError naming the sample where there is none.
     """
     if row["subtype"] not in clouds:
         raise InputError(f"{row['subtype']}, model {row['model']}: no cloud of this subtype among {sorted(clouds)}")
-    return clouds[row["subtype"]]
+    cloud = clouds[row["subtype"]]
+    return scaled(cloud, row["scale"]) if "scale" in row else cloud
 
 
 def write(path: str | Path, cloud: Cloud) -> None:

@@ -33,6 +33,11 @@ def reduced_chunk(wildcards: Any, input: Any) -> str:
     return f"--reduced {input.reduced} --motion {input.motion}" if input.get("reduced") else ""
 
 
+def extra(wildcards: Any, input: Any) -> str:
+    """The shrunk images of other runs that are trained on too."""
+    return f"--extra {input.extra}" if input.get("extra") else ""
+
+
 def samples(wildcards: Any, input: Any) -> str:
     """The shrunk images, or the index of the shards."""
     return f"--views {input.views}" if input.get("views") else f"--index {input.index}"

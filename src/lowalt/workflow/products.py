@@ -101,15 +101,53 @@ class Products:
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
+    def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """What one training reads: `samples`, and those of other runs that are trained on too."""
+        size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
+        names = self._config["recognition"].get("extra", [])
+        extra = [path for name in names for path in self._extra(name, size)]
+        return {**self.samples(wildcards), **({"extra": extra} if extra else {})}
+
+    def _extra(self, name: str, size: int) -> list[str]:
+        """Images of another run's fold train, in the shards' order.
+
+        Raises: InputError naming the command that makes those that are missing.
+        """
+        shards = sorted(Path(f"results/{name}/shards").glob("*-train-*.tar"))
+        views = [f"results/{name}/views/{size}/{shard.stem}.npz" for shard in shards]
+        missing = [path for path in views if not Path(path).is_file()]
+        if missing or not views:
+            raise InputError(
+                f"recognition.extra: no {(missing or [f'results/{name}/shards'])[0]}; expected what the target "
+                f"`training_samples` makes in the run {name!r} (at {size} pixels)"
+            )
+        return views
+
+    def own_views(self, wildcards: Any) -> list[str]:
+        """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
+        sizes = sorted({self._run.pixels(scheme) for scheme in self._run.trained})
+        shards = self._run.plan.shards
+        return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
+
+    def frozen(self, wildcards: Any) -> list[str]:
+        """Checksums of the clouds and motion tables of all samples that are trained on."""
+        names = [self._run.data, *self._config["recognition"].get("extra", [])]
+        return [f"results/{name}/SHA256SUMS" for name in names]
+
     def trial_views(self, wildcards: Any) -> list[str]:
         """Images that a trial may see, shrunk to its candidate's size: trained group, folds train and val."""
-        size = choose.settled(self._config["recognition"], self._changes(wildcards.candidate))["size"]
+        size = self._trial_size(wildcards)
         shards = [name for name in self._run.plan.shards if name.startswith(("seen-train-", "seen-val-"))]
         return [f"results/{self._run.data}/views/{size}/{shard}.npz" for shard in shards]
 
-    def _changes(self, candidate: str) -> dict:
-        table = choose.read(choose.TABLE)
-        return table.candidates[table.named(candidate)]
+    def trial_extra(self, wildcards: Any) -> list[str]:
+        """Images of the other runs whose samples a trial's candidate trains on too, none for most candidates."""
+        names = choose.read(choose.TABLE).extra(wildcards.candidate)
+        return [path for name in names for path in self._extra(name, self._trial_size(wildcards))]
+
+    def _trial_size(self, wildcards: Any) -> int:
+        changes = choose.read(choose.TABLE).changes(wildcards.candidate)
+        return choose.settled(self._config["recognition"], changes)["size"]
 
     def trials(self, wildcards: Any) -> list[str]:
         """Predictions of all candidates, folds and training seeds, the first candidate's first."""

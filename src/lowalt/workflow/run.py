@@ -52,6 +52,7 @@ class Run:
         }
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
+        _check_sizes(config)
         if config["effects"]:
             from lowalt.effects.checks import check as check_effects
 
@@ -60,6 +61,8 @@ class Run:
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         _check_data(config)
+        for name in block.get("extra", []):
+            _check_extra(config, name)
         return cls(config, Path(schema), inputs, chosen, plan, schemes)
 
     @property
@@ -135,6 +138,34 @@ class Run:
     def pixels(self, scheme: Scheme) -> int:
         """Pixels a side that a scheme's network sees."""
         return scheme.size or self.config["recognition"]["size"]
+
+
+def _check_sizes(config: dict) -> None:
+    """Refuse sizes of motion models that are no ranges, or that stand beside effects, which know the clouds' own."""
+    sizes = config["motion"].get("sizes_m", {})
+    for category, (low, high) in sizes.items():
+        if low > high:
+            raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
+    if sizes and config["effects"]:
+        raise InputError(f"motion.sizes_m: given beside effects {sorted(config['effects'])}, expected one or the other")
+
+
+def _check_extra(config: dict, name: str) -> None:
+    """Refuse a run to train on that is not there, whose samples differ in form, or that may hold tested samples."""
+    made = Path("results") / name / "config.yaml"
+    if name in (config["run"], config.get("data")) or not made.is_file():
+        raise InputError(f"recognition.extra: {name!r}, expected another, finished run; no {made} or it is this run")
+    if not config["recognition"]["cache"]:
+        raise InputError("recognition.extra: given without recognition.cache, expected true")
+    own, other = plain(config), plain(load_yaml(made))
+    differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
+    if differ:
+        raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
+    if own["seed"] == other["seed"]:
+        raise InputError(
+            f"recognition.extra: run {name!r} has this run's seed {own['seed']}, so its motion models would be those "
+            "that are tested; expected another seed"
+        )
 
 
 def _check_data(config: dict) -> None:

@@ -10,6 +10,9 @@ from lowalt.common.config import canonical
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
+MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m")
+"""Keys of the block `motion` that decide what is drawn; the last one may be left out."""
+
 
 class Settings:
     """Settings of the stages of one run."""
@@ -42,7 +45,7 @@ class Settings:
             "motion", wildcards.group,
             seed=self._config["seed"],
             masts_m=[place["position_m"][:2] for place in stations.values()],
-            motion={key: block[key] for key in ("region", "height_m", "tilt_deg", "cadence")},
+            motion={key: block[key] for key in MOTION if key in block},
             published={
                 name: self._run.records[name]["published"] for name in self._run.plan.groups[wildcards.group]
             },
