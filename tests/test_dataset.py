@@ -79,15 +79,16 @@ def run_stages(dataset: Dataset, folder: Path, kind: str) -> Path:
         block |= {"snr_db": config["noise"]["snr_db"], "shards": {"kind": kind}}
         for name in plan.folds(chunk):
             written.append(str(folder / "shards" / f"{group}-{name}-{chunk.rpartition('-')[2]}.tar"))
-            shards(["write", "--settings", canonical(block), "--motion", table, "--signals", noisy, "--tiles", drawn,
-                    "--fold", name, "--out", written[-1]])  # fmt: skip
+            given = ["--echoes", *heard] if kind == "recipe" else ["--signals", noisy, "--tiles", drawn]
+            shards(["write", "--settings", canonical(block), "--motion", table, *given, "--fold", name,
+                    "--out", written[-1]])  # fmt: skip
     render |= {"echo": {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}}
     index = folder / "shards" / "index.json"
     shards(["index", "--settings", canonical(render), "--shards", *written, "--out", str(index)])
     return index
 
 
-@pytest.fixture(scope="module", params=["image", "signal"])
+@pytest.fixture(scope="module", params=["image", "signal", "recipe"])
 def index(request, dataset, tmp_path_factory):
     return run_stages(dataset, tmp_path_factory.mktemp(request.param), request.param)
 

@@ -70,7 +70,9 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
     assert products.chunk_echoes(CHUNK) == [f"{base}/echo/seen-00001/{name}.npy" for name in "ABCD"]
     assert products.listening(CHUNK) == ["B"]
     assert products.span(CHUNK) == "--first 50 --count 50"
-    assert products.shard_tiles(CHUNK) == {"tiles": f"{base}/tiles/seen-00001.npz"}
+    content = {"signals": f"{base}/noisy/seen-00001.npy", "tiles": f"{base}/tiles/seen-00001.npz"}
+    assert products.shard_content(CHUNK) == content
+    assert options.content(None, content) == f"--signals {content['signals']} --tiles {content['tiles']}"
     clouds = products.group_clouds(CHUNK)
     assert len(clouds) == len(run.plan.groups["seen"]) and len(set(clouds)) == len(clouds)
     assert all(Path(path).stem in run.subtypes for path in clouds)
@@ -85,12 +87,24 @@ def test_an_echo_job_for_all_stations_hears_all():
 
 def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
     _, products, _ = parts({"shards": {"kind": "signal"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
-    assert products.shard_tiles(CHUNK) == {}
+    assert products.shard_content(CHUNK) == {"signals": "results/default/noisy/seen-00001.npy"}
     surfaces = products.group_occluders(CHUNK)
     assert [path.replace("occluders", "clouds") for path in surfaces] == products.group_clouds(CHUNK)
     assert [Path(path).name for path in products.chunk_powers(CHUNK)] == ["A.power.npy", "B.power.npy", "C.power.npy"]
     _, usual, _ = parts()
     assert usual.group_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []
+
+
+def test_recipe_shards_need_clean_echoes_and_neither_noise_nor_tiles():
+    _, products, _ = parts({"shards": {"kind": "recipe"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
+    stem = "results/default/echo/seen-00001"
+    content = {"echoes": [f"{stem}/{name}.npy" for name in "ABC"], "powers": [f"{stem}/{n}.power.npy" for n in "ABC"]}
+    assert products.shard_content(CHUNK) == content
+    assert products.reduced(SimpleNamespace(size="24")) == {}
+    made = {Path(path).parent.name for path in products.benchmarks(CHUNK)}
+    assert "shard" in made and not made & {"noise", "tiles"}
+    _, usual, _ = parts({"shards": {"kind": "recipe"}})
+    assert usual.shard_content(CHUNK)["powers"] == []
 
 
 def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signals():
@@ -197,10 +211,10 @@ def test_the_table_of_other_runs_is_named_with_its_command_where_it_is_missing(t
 def test_options_stand_only_where_their_input_does():
     none = Inputs(occluders="", powers="", index="i")
     every = Inputs(occluders="o", powers="p", views="v w", tiles="t")
-    found = {name: getattr(options, name) for name in ("occluders", "powers", "tiles")}
+    found = {name: getattr(options, name) for name in ("occluders", "powers", "content")}
     assert {name: build(CHUNK, none) for name, build in found.items()} == dict.fromkeys(found, "")
     assert [build(CHUNK, every) for build in found.values()] == [
-        "--occluders o", "--powers p", "--tiles t",
+        "--occluders o", "--powers p", "--tiles t --powers p",
     ]  # fmt: skip
     assert (options.samples(CHUNK, none), options.samples(CHUNK, every)) == ("--index i", "--views v w")
 

@@ -38,6 +38,18 @@ def write_settings(kind):
     return json.dumps(block)
 
 
+def write_options(folder, group, kind):
+    """What a shard of a kind is packed from; the noiseless level stands for the clean echoes."""
+    if kind == "recipe":
+        clean = np.load(folder / f"{group}.npy")[:, -1]
+        paths = [f"{folder}/{group}.{name}.npy" for name in NETWORK["stations"]]
+        for place, path in enumerate(paths):
+            np.save(path, clean[:, place])
+        return ["--echoes", *paths]
+    tiles = ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
+    return ["--signals", f"{folder}/{group}.npy", *tiles]
+
+
 def build(folder, kind, inputs=True):
     """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group.
 
@@ -55,8 +67,7 @@ def build(folder, kind, inputs=True):
         files.write(folder / f"{group}.tiles.npz", pngs)
         for name in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{name}-00000.tar"))
-            given = ["--motion", f"{folder}/{group}.csv", "--signals", f"{folder}/{group}.npy"]
-            given += ["--tiles", f"{folder}/{group}.tiles.npz"] if kind == "image" else []
+            given = ["--motion", f"{folder}/{group}.csv", *write_options(folder, group, kind)]
             main(["write", "--settings", write_settings(kind), *given, "--fold", name, "--out", shards[-1]])
     main(["index", "--settings", json.dumps(RENDER), "--shards", *shards, "--out", str(folder / "index.json")])
     for path in [] if inputs else [*folder.glob("seen.*"), *folder.glob("unseen.*")]:

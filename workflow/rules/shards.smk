@@ -1,5 +1,5 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples beside it, and one index.
-# REQUIRED INPUTS: motion table and noisy signals of a chunk; its tiles, unless the shards hold signals
+# REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals, or its clean echoes
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json,
 #          and beside them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
 #          SHA256SUMS
@@ -7,10 +7,9 @@
 
 rule shard:
     input:
-        unpack(products.shard_tiles),
+        unpack(products.shard_content),
         code=code("lowalt.shards"),
         motion="results/{run}/motion/{group}-{part}.csv",
-        signals="results/{run}/noisy/{group}-{part}.npy",
     output:
         tar="results/{run}/shards/{group}-{fold}-{part}.tar",
         table="results/{run}/shards/{group}-{fold}-{part}.npz",
@@ -22,10 +21,10 @@ rule shard:
         "../../envs/environment.yaml"
     params:
         settings=settings.shard,
-        tiles=options.tiles,
+        content=options.content,
     shell:
         "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
-        " --signals {input.signals:q} {params.tiles} --fold {wildcards.fold} --out {output.tar:q} 2> {log:q}"
+        " {params.content} --fold {wildcards.fold} --out {output.tar:q} 2> {log:q}"
 
 
 rule index:

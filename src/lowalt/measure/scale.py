@@ -85,7 +85,9 @@ def estimate(
     models, samples = samples_of(config)
     core_hours = sum(seconds[rule] for rule in DATA_RULES) / measured * samples / 3600
     signal = 8 * config["network"]["symbols"] * len(config["network"]["stations"])
-    disk = float(stages[0]["sample_bytes"]) if config["shards"]["kind"] == "image" else signal
+    levels = len(config["noise"]["snr_db"])
+    by_kind = {"image": float(stages[0]["sample_bytes"]), "signal": signal, "recipe": signal / levels}
+    disk = by_kind[config["shards"]["kind"]]
     trainings, hours, hardware = training_hours(costs, config)
     row = (
         name, models, samples, round(core_hours, 2), round(disk * samples / 1e9, 1), round(signal * samples / 1e9, 1),

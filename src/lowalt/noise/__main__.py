@@ -11,6 +11,33 @@ from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
 
 
+def load_echoes(paths: list[str], stations: list[str], models: int) -> list[np.ndarray]:
+    """Return the clean echoes of a chunk as memory maps, one (models, symbols) a station.
+
+    Raises: InputError naming the file that is missing, or that does not fit stations, models or the other files.
+    """
+    if len(paths) != len(stations):
+        raise InputError(f"--echoes: {len(paths)} files, expected one for each station of {stations}")
+    echoes = [np.load(existing(path, "echo"), mmap_mode="r") for path in paths]
+    for path, echo in zip(paths, echoes, strict=True):
+        if echo.ndim != 2 or len(echo) != models or echo.shape != echoes[0].shape:
+            raise InputError(f"{path}: shape {echo.shape}, expected ({models}, symbols) as the motion table and others")
+    return echoes
+
+
+def load_powers(paths: list[str], stations: list[str], models: int) -> np.ndarray:
+    """Return the powers (W) that SNRs refer to, (stations, models) float64.
+
+    Raises: InputError naming the file that is missing, or where files and stations or models do not fit.
+    """
+    if len(paths) != len(stations):
+        raise InputError(f"--powers: {len(paths)} files, expected one for each station of {stations}")
+    powers = np.stack([np.load(existing(path, "power")) for path in paths])
+    if powers.shape != (len(stations), models):
+        raise InputError(f"--powers: shape {powers.shape}, expected ({len(stations)}, {models})")
+    return powers
+
+
 def main(arguments: list[str]) -> None:
     """Add noise to one chunk's echoes and write one array file."""
     options = parser("lowalt.noise", __doc__)
@@ -21,19 +48,8 @@ def main(arguments: list[str]) -> None:
     given = options.parse_args(arguments)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
     rows = read_table(given.motion)
-    if len(given.echoes) != len(stations):
-        raise InputError(f"--echoes: {len(given.echoes)} files, expected one for each station of {stations}")
-    echoes = [np.load(existing(path, "echo"), mmap_mode="r") for path in given.echoes]
-    for path, echo in zip(given.echoes, echoes, strict=True):
-        if echo.ndim != 2 or len(echo) != len(rows) or echo.shape != echoes[0].shape:
-            raise InputError(f"{path}: shape {echo.shape}, expected ({len(rows)}, symbols) as in {given.motion}")
-    powers = None
-    if given.powers:
-        if len(given.powers) != len(stations):
-            raise InputError(f"--powers: {len(given.powers)} files, expected one for each station of {stations}")
-        powers = np.stack([np.load(existing(path, "power")) for path in given.powers])
-        if powers.shape != (len(stations), len(rows)):
-            raise InputError(f"--powers: shape {powers.shape}, expected ({len(stations)}, {len(rows)})")
+    echoes = load_echoes(given.echoes, stations, len(rows))
+    powers = load_powers(given.powers, stations, len(rows)) if given.powers else None
     result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers)
     with replacing(given.out, result.nbytes) as temporary:
         np.save(temporary, result)

@@ -8,12 +8,11 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.motion import read_table
+from lowalt.shards.content import clean_content, noisy_content
 from lowalt.shards.index import build
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
-from lowalt.shards.write import npy, write_shard
-from lowalt.tiles.files import Tiles
-from lowalt.tiles.signals import load_signals
+from lowalt.shards.write import write_shard
 
 
 def write(arguments: list[str]) -> None:
@@ -23,8 +22,14 @@ def write(arguments: list[str]) -> None:
     """
     options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--signals", required=True, help="the chunk's noisy signals (.npy, complex64)")
-    options.add_argument("--tiles", help="the chunk's tiles (.npz); needed for image shards")
+    options.add_argument("--signals", help="the chunk's noisy signals (.npy, complex64); image and signal shards")
+    options.add_argument("--tiles", help="the chunk's tiles (.npz); image shards")
+    options.add_argument(
+        "--echoes", nargs="+", help="the chunk's clean echoes (.npy), one file a station; recipe shards"
+    )
+    options.add_argument(
+        "--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station; recipe shards"
+    )
     options.add_argument("--fold", required=True, help="train, val or test")
     options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz beside it")
     given = options.parse_args(arguments)
@@ -33,19 +38,11 @@ def write(arguments: list[str]) -> None:
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
     rows, snrs, network = read_table(given.motion), [float(snr) for snr in snrs], Network.from_settings(network)
-    signals = load_signals(given.signals, network)
-    if signals.shape[:2] != (len(rows), len(snrs)):
-        raise InputError(f"{given.signals}: shape {signals.shape}, expected {len(rows)} models and {len(snrs)} SNRs")
-    if kind == "image":
-        if given.tiles is None:
-            raise InputError("--tiles: missing, image shards are packed from them")
-        tiles = Tiles(given.tiles)
-        if len(tiles) != len(rows) * len(snrs):
-            raise InputError(f"{given.tiles}: {len(tiles)} images, expected {len(rows) * len(snrs)}")
-        content = lambda number, level: tiles[number * len(snrs) + level]  # noqa: E731
+    if kind == "recipe":
+        content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:
-        content = lambda number, level: npy(signals[number, level])  # noqa: E731
-    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content)
+        content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
+    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, powers)
 
 
 def index(arguments: list[str]) -> None:

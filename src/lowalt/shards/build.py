@@ -8,6 +8,8 @@ import functools
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from lowalt.common.command import run
 from lowalt.common.config import merge
 from lowalt.common.files import slug
@@ -15,7 +17,6 @@ from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import write_table
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
-from lowalt.shards.table import EXTENSIONS
 from lowalt.shards.write import npy, write_shard
 from lowalt.targets.cloud import write as write_cloud
 
@@ -24,7 +25,7 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
     """Write the shards of all groups and folds of a data set, its motion tables and clouds below `folder`, as the
     workflow does; return the index.
 
-    kind: "image" or "signal"; clouds: whether cloud files are written too.
+    kind: "image", "signal" or "recipe"; clouds: whether cloud files are written too.
     Raises: InputError naming the sample that cannot be computed.
     """
     folder, plan = Path(folder), dataset.plan
@@ -54,13 +55,19 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> bytes:
+        if kind == "recipe":
+            return npy(maker.heard(rows[number])[0])
         signal = maker.signal(rows[number], plan.snrs[level])
-        return npy(signal) if EXTENSIONS[kind] == "npy" else maker.png(signal)
+        return npy(signal) if kind == "signal" else maker.png(signal)
+
+    powers = None
+    if kind == "recipe" and maker.echo["effects"]:
+        powers = np.concatenate([maker.heard(row)[1] for row in rows], axis=1)
 
     paths = []
     for name in plan.folds(chunk):
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
-        write_shard(paths[-1], rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
+        write_shard(paths[-1], rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content, powers)
     return paths
 
 

@@ -21,6 +21,7 @@ from lowalt.common.files import existing, replacing, sha256
 from lowalt.common.network import station_names
 from lowalt.common.splits import FOLDS
 from lowalt.shards import sums
+from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.read import ShardSet
 
@@ -30,14 +31,6 @@ LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://c
 
 AUTHORS = "The lowalt authors"
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
-
-MEMBERS = {
-    "image": ("png", "the tile, 8-bit indices with their colour map; rows are the stations, columns VRP, TRP and VT"),
-    "signal": (
-        "npy",
-        "the noisy signals, float32 (stations, symbols, 2: real and imaginary part), which make the tiles",
-    ),
-}
 
 ODDITIES = """\
 - Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
@@ -109,12 +102,11 @@ def write_samples(shards: ShardSet, path: Path) -> None:
 def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
     stations = station_names(shards.index["render"]["network"])
-    what = "3 x 3 tiles of time-frequency images" if shards.kind == "image" else "complex symbol-domain signals"
     return (
         f"Simulated echoes of low-altitude targets (UAVs, birds, vehicles, pedestrians) at the base stations "
-        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {what}, with motion parameters "
-        "and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target Recognition Towards "
-        "Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
+        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {WHAT[shards.kind]}, "
+        "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
+        "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
     )
 
 
@@ -168,7 +160,6 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
         "configs": configs(shards),
         "tags": TAGS,
     }  # fmt: skip
-    member, meaning = MEMBERS[shards.kind]
     return f"""---
 {yaml.safe_dump(front, sort_keys=False).strip()}
 ---
@@ -181,11 +172,7 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
 {_counts(shards)}
 ## How to read it
 
-Each shard is a plain tar in the WebDataset layout. A sample has two members:
-
-- `KEY.{member}`: {meaning};
-- `KEY.json`: class, subtype, motion parameters, what each station sees, SNR, seed, versions.
-
+{READING[shards.kind]}
 `samples.csv` lists all samples, `index.json` the shards with their SHA-256, and the `.npz` beside a shard the offset,
 size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
 
@@ -195,7 +182,7 @@ samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
 
 import webdataset
 for sample in webdataset.WebDataset("seen-train-00000.tar", shardshuffle=False).decode("pil"):
-    print(sample["__key__"], sample["json"]["category"], sample["{member}"])
+    print(sample["__key__"], sample["json"]["category"], sample["{MEMBERS[shards.kind]}"])
 
 from lowalt.shards import ShardSet
 shards = ShardSet("index.json", groups=["seen"], folds=["train"])

@@ -72,7 +72,14 @@ MEDIA = {
         "sc:Text",
         "Signals (stations, symbols, re and im), float32, as an .npy file.",
     ),
+    "recipe": (
+        "application/octet-stream",
+        "sc:Text",
+        "Echoes without noise of a motion model (stations, symbols, re and im), float32, as an .npy file.",
+    ),
 }
+OF = {"image": "sample", "signal": "sample", "recipe": "motion model"}
+"""What one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
 
 
 def metadata(index: dict, table: dict, facts: dict) -> dict:
@@ -94,8 +101,10 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     meaning = meaning.format(len(VIEWS) * size, stations * size)
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
     sets = [
-        _files("records", inside, "application/json", "*.json", "JSON record of every sample: motion, geometry, seed."),
-        _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", f"The {kind} of every sample."),
+        _files(
+            "records", inside, "application/json", "*.json", f"JSON record of every {OF[kind]}: motion, geometry, seed."
+        ),
+        _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", f"The {kind} of every {OF[kind]}."),
     ]
     return {
         "@context": CONTEXT,
@@ -138,7 +147,7 @@ def _samples(path: str) -> dict:
 
 
 def _media(kind: str, data_type: str, meaning: str) -> dict:
-    """One row a sample: the name of its member and the member itself."""
+    """One row a member: its name and the member itself."""
     name = f"{kind}s"
     parts = {"file": ("sc:Text", "filename", "Name of the member: KEY and its extension."),
              "content": (data_type, "content", meaning)}  # fmt: skip
@@ -151,5 +160,5 @@ def _media(kind: str, data_type: str, meaning: str) -> dict:
     ]  # fmt: skip
     return {
         "@type": "cr:RecordSet", "@id": "members", "name": "members",
-        "description": f"The {kind} of every sample, from the shards.", "field": fields,
+        "description": f"The {kind} of every {OF[kind]}, from the shards.", "field": fields,
     }  # fmt: skip

@@ -184,10 +184,11 @@ class Dataset:
         return json.loads(self.made_record(self.place(number)))
 
     def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
-        """Return record and data of a sample, byte for byte as a shard of a kind ("image" or "signal") stores them."""
+        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", or "signal" and
+        "recipe", which hold the same)."""
         place = self.place(number)
         signal = self.made_signal(place)
-        return self.made_record(place), npy(signal) if kind == "signal" else self.maker.png(signal)
+        return self.made_record(place), self.maker.png(signal) if kind == "image" else npy(signal)
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""

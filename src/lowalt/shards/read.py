@@ -17,20 +17,15 @@ from lowalt.common.files import existing, sha256
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
+from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.write import npy
 from lowalt.spectra import Spectra
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import VIEWS, Renderer, split
 from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
-
-
-def complex_signals(stored: np.ndarray) -> np.ndarray:
-    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version 0.1 wrote them."""
-    if stored.dtype == np.complex64:
-        return stored
-    return np.ascontiguousarray(stored).view(np.complex64)[..., 0]
 
 
 class ShardSet:
@@ -139,41 +134,56 @@ class ShardSet:
         return self._column("snr_db").astype(float)
 
     def members(self, number: int) -> tuple[bytes, bytes]:
-        """Return record and data of a sample as they are stored.
+        """Return record and data of a sample as they are stored; of recipe shards, as signal shards would store them.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
+        if self.kind == "recipe":
+            return self._record(number), npy(self.signal(number))
         return self._bytes(number, "record"), self._bytes(number, "data")
+
+    def _snr_db(self, number: int) -> float:
+        shard, place = self._locate(number)
+        return float(self._table(shard)[place]["snr_db"])
+
+    def _record(self, number: int) -> bytes:
+        """The JSON record of a sample."""
+        stored = self._bytes(number, "record")
+        return unpacked(json.loads(stored), self._snr_db(number)) if self.kind == "recipe" else stored
 
     def record(self, number: int) -> dict:
         """Return the JSON record of a sample.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
-        return json.loads(self._bytes(number, "record"))
+        return json.loads(self._record(number))
 
     def png(self, number: int) -> bytes:
         """Return the PNG file of a sample of an image shard.
 
-        Raises: InputError where these are signal shards, or naming shard and sample where it is damaged.
+        Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
         """
         self._need("image")
         return self._bytes(number, "data")
 
     def signal(self, number: int) -> np.ndarray:
-        """Return the signals of a sample of a signal shard, (stations, symbols) complex64.
+        """Return the signals of a sample of a signal or recipe shard, (stations, symbols) complex64.
 
         Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
         """
-        self._need("signal")
-        return complex_signals(np.lib.format.read_array(io.BytesIO(self._bytes(number, "data"))))
+        self._need("signal", "recipe")
+        stored = complex_signals(np.lib.format.read_array(io.BytesIO(self._bytes(number, "data"))))
+        if self.kind == "signal":
+            return stored
+        stations = station_names(self.index["render"]["network"])
+        return noisy(json.loads(self._bytes(number, "record")), stored, stations, self._snr_db(number))
 
     def tile(self, number: int) -> np.ndarray:
-        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered: the same pixels from both kinds.
+        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered: the same pixels from all kinds.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
-        if self.kind == "signal":
+        if self.kind != "image":
             return self.renderer.tile(self.signal(number))
         return decode(self.png(number))[0]
 
@@ -187,11 +197,11 @@ class ShardSet:
         """Return the images of a sample, (9, S, S) uint8: station by station, VRP, TRP, VT.
 
         size: pixels a side, by the project's one resampling kernel; stations, views: names to keep, in their own
-        order (signal shards then compute nothing else). Raises: InputError naming an unknown station or view, or
-        shard and sample where it is damaged.
+        order (signal and recipe shards then compute nothing else).
+        Raises: InputError naming an unknown station or view, or shard and sample where it is damaged.
         """
         numbers = self.columns(stations, views)
-        if self.kind == "signal":
+        if self.kind != "image":
             images = self.renderer.some(self.signal(number), numbers)
         else:
             images = split(self.tile(number))[numbers]
@@ -208,6 +218,7 @@ class ShardSet:
             raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(VIEWS)}")
         return [len(VIEWS) * known.index(station) + VIEWS.index(view) for station in stations for view in views]
 
-    def _need(self, kind: str) -> None:
-        if self.kind != kind:
-            raise InputError(f"{self.index_path}: shards of kind {self.kind!r}, expected {kind!r}")
+    def _need(self, *kinds: str) -> None:
+        if self.kind not in kinds:
+            wanted = " or ".join(map(repr, kinds))
+            raise InputError(f"{self.index_path}: shards of kind {self.kind!r}, expected {wanted}")

@@ -27,9 +27,14 @@ def snr_label(snr_db: float) -> str:
     return "snr" + text.replace(".", "p")
 
 
+def model_key(subtype: str, model: int) -> str:
+    """Return the key of a motion model, {slug}-{model, six digits}."""
+    return f"{slug(subtype)}-{model:06d}"
+
+
 def sample_key(subtype: str, model: int, snr_db: float) -> str:
     """Return the key of a sample, {slug}-{model, six digits}-{SNR}: unique, no dots, sorts by subtype and model."""
-    return f"{slug(subtype)}-{model:06d}-{snr_label(snr_db)}"
+    return f"{model_key(subtype, model)}-{snr_label(snr_db)}"
 
 
 def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:

@@ -69,7 +69,7 @@ class Remaker:
             self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)
         maker = self._makers[seed]
         signal = maker.signal(row, snr_db)
-        data = npy(signal) if self.shards.kind == "signal" else maker.png(signal)
+        data = maker.png(signal) if self.shards.kind == "image" else npy(signal)
         return record(row, snr_db, entry["fold"], seed, self.network), data
 
     def faults(self, number: int) -> list[str]:

@@ -67,8 +67,8 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
 
     Raises: InputError where the shards hold images, or naming a damaged sample.
     """
-    if shards.kind != "signal":
-        raise InputError(f"{shards.index_path}: shards of kind {shards.kind!r}, expected 'signal'")
+    if shards.kind == "image":
+        raise InputError(f"{shards.index_path}: shards of kind 'image', expected 'signal' or 'recipe'")
     network = Network.from_settings(shards.index["render"]["network"])
     written = []
     for place, station in enumerate(network.stations):

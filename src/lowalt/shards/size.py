@@ -15,10 +15,13 @@ IMAGE_BYTES = 300_000
 """Space allowed for a sample's tile; the measured averages are in results/benchmarks/images.csv."""
 
 
-def sample_bytes(kind: str, stations: int, symbols: int) -> int:
-    """Return about how many bytes a sample takes in a shard of a kind ("image" or "signal"), all padding included."""
+def sample_bytes(kind: str, stations: int, symbols: int, snrs: int = 1) -> int:
+    """Return about how many bytes a sample takes in a shard of a kind, all padding included.
+
+    kind: "image", "signal" or "recipe"; snrs: SNRs of each motion model, which share one echo in a recipe shard.
+    """
     data = IMAGE_BYTES if kind == "image" else 128 + 8 * stations * symbols
-    return 2 * BLOCK + RECORD_BYTES + data + -data % BLOCK
+    return (2 * BLOCK + RECORD_BYTES + data + -data % BLOCK) // (snrs if kind == "recipe" else 1)
 
 
 def models_per_chunk(target_bytes: float, sample: int, subtypes: int, snrs: int, split: dict) -> int:
@@ -46,8 +49,8 @@ def main(arguments: list[str]) -> None:
     given = options.parse_args(arguments)
     config = load_yaml(given.config)
     network = Network.from_settings(config["network"])
-    sample = sample_bytes(config["shards"]["kind"], len(network.stations), network.symbols)
     snrs = len(config["noise"]["snr_db"])
+    sample = sample_bytes(config["shards"]["kind"], len(network.stations), network.symbols, snrs)
     print(models_per_chunk(1e6 * given.target_mb, sample, given.subtypes, snrs, config["split"]))
 
 

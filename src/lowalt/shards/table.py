@@ -31,8 +31,9 @@ SAMPLE = np.dtype(
         ("sha256", "u1", (32,)),
     ]
 )
-KINDS = ("image", "signal")
-EXTENSIONS = {"image": "png", "signal": "npy"}
+KINDS = ("image", "signal", "recipe")
+"""Tiles as PNG files, noisy signals, or clean echoes from which noisy signals are made (`lowalt.shards.clean`)."""
+EXTENSIONS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
 
 
 def table_path(shard: str | Path) -> Path:

@@ -9,10 +9,11 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
 from lowalt.common.splits import FOLDS, fold
-from lowalt.shards.record import rank, record, sample_key
+from lowalt.shards.clean import packed
+from lowalt.shards.record import model_key, rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
-from lowalt.shards.tar import Writer
+from lowalt.shards.tar import Span, Writer
 from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles.files import npy_header
 
@@ -40,12 +41,14 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
 
 def write_shard(
     path: str | Path, rows: list[dict], snrs: list[float], split: dict, seed: int, network: Network, wanted: str,
-    kind: str, content: Callable[[int, int], bytes],
+    kind: str, content: Callable[[int, int], bytes], powers: np.ndarray | None = None,
 ) -> dict:  # fmt: skip
     """Write `path` (.tar) and its table beside it; return the table's header.
 
     rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
-    sample's .png (kind "image") or .npy (kind "signal").
+    sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); powers
+    (stations, rows) W: what SNRs refer to, where not to the echoes' own power (kind "recipe").
+    A recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:
@@ -55,14 +58,26 @@ def write_shard(
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
     chosen = select(rows, snrs, split, seed, wanted)
     table = np.zeros(len(chosen), SAMPLE)
+    levels: dict[int, list[float]] = {}
+    for number, level in chosen:
+        levels.setdefault(number, []).append(snrs[level])
     with replacing(path) as temporary:
         with temporary.open("wb") as file:
             tar = Writer(file)
+            spans: dict[int, Span] = {}
             for place, (number, level) in enumerate(chosen):
                 row, snr_db = rows[number], snrs[level]
                 key = sample_key(row["subtype"], row["model"], snr_db)
-                text = record(row, snr_db, wanted, seed, network)
-                span = tar.add(key, text, EXTENSIONS[kind], content(number, level))
+                span = spans.get(number)
+                if span is None:
+                    name, text = key, record(row, snr_db, wanted, seed, network)
+                    if kind == "recipe":
+                        name = model_key(row["subtype"], row["model"])
+                        power_w = None if powers is None else powers[:, number]
+                        text = packed(text, name, sorted(levels[number]), power_w)
+                    span = tar.add(name, text, EXTENSIONS[kind], content(number, level))
+                    if kind == "recipe":
+                        spans[number] = span
                 label = CATEGORIES.index(row["category"])
                 digest = np.frombuffer(span.sha256, np.uint8)
                 table[place] = (

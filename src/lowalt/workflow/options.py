@@ -17,9 +17,10 @@ def powers(wildcards: Any, input: Any) -> str:
     return f"--powers {input.powers}" if input.powers else ""
 
 
-def tiles(wildcards: Any, input: Any) -> str:
-    """The tiles of a chunk, where shards hold images."""
-    return f"--tiles {input.tiles}" if input.get("tiles") else ""
+def content(wildcards: Any, input: Any) -> str:
+    """What a shard is packed from, by its kind."""
+    found = {name: input.get(name) for name in ("signals", "tiles", "echoes", "powers")}
+    return " ".join(f"--{name} {paths}" for name, paths in found.items() if paths)
 
 
 def reduced(wildcards: Any, output: Any) -> str:

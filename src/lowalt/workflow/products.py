@@ -80,11 +80,14 @@ class Products:
         stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
-    def shard_tiles(self, wildcards: Any) -> dict[str, str]:
-        """The tiles of a chunk where shards hold images; signal shards need none, so none are rendered."""
-        if self._config["shards"]["kind"] == "signal":
-            return {}
-        return {"tiles": f"results/{wildcards.run}/tiles/{wildcards.group}-{wildcards.part}.npz"}
+    def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """What shards are packed from: noisy signals, for images their tiles too, or clean echoes; no more is made."""
+        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
+        kind = self._config["shards"]["kind"]
+        if kind == "recipe":
+            return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
+        tiles = {"tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else {}
+        return {"signals": f"{base}/noisy/{chunk}.npy", **tiles}
 
     def reduced(self, wildcards: Any) -> dict[str, str]:
         """Reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
@@ -209,7 +212,7 @@ class Products:
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""
         run, plan = self._run, self._run.plan
-        images = self._config["shards"]["kind"] == "image"
+        kind = self._config["shards"]["kind"]
         cached = self._config["recognition"]["cache"]
         sizes = sorted({run.pixels(scheme) for scheme in run.trained}) if cached else []
         echoes = [f"{chunk}-{station}" for chunk in plan.chunks for station in run.stations]
@@ -217,8 +220,8 @@ class Products:
             *(f"cloud/{subtype}" for subtype in run.subtypes),
             *(f"motion/{chunk}" for chunk in plan.chunks),
             *(f"echo/{name}" for name in (echoes if run.echo_per_station else plan.chunks)),
-            *(f"noise/{chunk}" for chunk in plan.chunks),
-            *(f"tiles/{chunk}" for chunk in plan.chunks if images),
+            *(f"noise/{chunk}" for chunk in plan.chunks if kind != "recipe"),
+            *(f"tiles/{chunk}" for chunk in plan.chunks if kind == "image"),
             *(f"shard/{shard}" for shard in plan.shards),
             "index",
             *(f"views/{size}/{shard}" for size in sizes for shard in plan.shards),

@@ -74,15 +74,16 @@ def read(path: str | Path) -> dict[str, Figures]:
 def units(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> float:
     """Return the size of a job in the units of its rule.
 
-    echo, noise and shards of signals: complex values; tiles and shards of images: pixels of tiles; views, training and
-    evaluation: pixels of views, where these are cached; everything else: samples.
+    echo, noise and shards of signals or clean echoes: complex values; tiles and shards of images: pixels of tiles;
+    views, training and evaluation: pixels of views, where these are cached; everything else: samples.
     """
     samples = _samples(wildcards, plan)
     stations, symbols = len(config["network"]["stations"]), config["network"]["symbols"]
     if rule == "echo":
         return samples / len(plan.snrs) * symbols * (1 if "station" in wildcards else stations)
-    if rule == "noise" or (rule == "shard" and config["shards"]["kind"] == "signal"):
-        return samples * stations * symbols
+    kind = config["shards"]["kind"]
+    if rule == "noise" or (rule == "shard" and kind != "image"):
+        return samples * stations * symbols / (len(plan.snrs) if (rule, kind) == ("shard", "recipe") else 1)
     if rule in ("tiles", "shard"):
         return samples * stations * 3 * config["images"]["size"] ** 2
     if rule in TRAINING and not config["recognition"]["cache"]:

@@ -1,0 +1,42 @@
+"""What the data card says of each kind of shards."""
+
+MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
+"""Extension of the member beside the record."""
+
+WHAT = {
+    "image": "3 x 3 tiles of time-frequency images",
+    "signal": "complex symbol-domain signals",
+    "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
+}
+"""Name of the data in the description."""
+
+_SAMPLE = """\
+Each shard is a plain tar in the WebDataset layout. A sample has two members:
+
+- `KEY.{extension}`: {meaning};
+- `KEY.json`: class, subtype, motion parameters, what each station sees, SNR, seed, versions.
+"""
+
+READING = {
+    "image": _SAMPLE.format(
+        extension="png",
+        meaning="the tile, 8-bit indices with their colour map; rows are the stations, columns VRP, TRP and VT",
+    ),
+    "signal": _SAMPLE.format(
+        extension="npy",
+        meaning="the noisy signals, float32 (stations, symbols, 2: real and imaginary part), which make the tiles",
+    ),
+    "recipe": """\
+Each shard is a plain tar in the WebDataset layout. A motion model, with the samples of all its SNRs, has two members:
+
+- `KEY.clean.npy`: its echoes without noise, float32 (stations, symbols, 2: real and imaginary part);
+- `KEY.json`: class, subtype, motion parameters, what each station sees, the SNRs (where `noise` is false, 300 stands
+  for no noise), seed, versions.
+
+The noise of a sample follows from seed, subtype, motion model, station and SNR. lowalt adds it while it reads:
+`ShardSet` below gives the signals and images of the other kinds of shards, equal in every byte, and
+`webdataset.WebDataset(PATH, shardshuffle=False).compose(lowalt.shards.clean.samples)` gives the samples of signal
+shards. A tool without lowalt reads the clean echoes and can add noise of its own.
+""",
+}
+"""How a shard is read."""

@@ -1,0 +1,89 @@
+"""Shards of kind `recipe`: a motion model's clean echoes once, and one record of all its SNRs; noise is drawn anew.
+
+A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without noise, and the record of
+the same key has lists at `snr_db` and `noise`. In a scene with effects the record also names the powers that the SNRs
+refer to. From these follow record and signals of each sample, equal in every byte to those of a shard of signals.
+"""
+
+import io
+import json
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.noise.__main__ import noisy_signals
+from lowalt.shards.record import NO_NOISE_DB, sample_key
+
+POWER = "power_w"
+"""Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""
+
+
+def packed(record: bytes, key: str, snrs_db: Iterable[float], power_w: Iterable[float] | None = None) -> bytes:
+    """Return the record of a motion model, made from the record of one of its samples.
+
+    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w: see POWER.
+    """
+    snrs = [float(snr) for snr in snrs_db]
+    entry = json.loads(record)
+    entry |= {"key": key, "snr_db": [NO_NOISE_DB if math.isinf(snr) else snr for snr in snrs]}
+    entry["noise"] = [not math.isinf(snr) for snr in snrs]
+    if power_w is not None:
+        entry[POWER] = [float(power) for power in power_w]
+    return json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
+
+
+def snrs_of(entry: dict) -> list[float]:
+    """Return the SNRs (dB) of a motion model's samples by its parsed record, +inf for no noise.
+
+    Raises: InputError where the record is not one of a shard of kind `recipe`.
+    """
+    if not isinstance(entry.get("snr_db"), list):
+        raise InputError(f"record of {entry.get('key')}: one SNR, expected a list of them as recipe shards have")
+    return [snr if noisy else math.inf for snr, noisy in zip(entry["snr_db"], entry["noise"], strict=True)]
+
+
+def unpacked(entry: dict, snr_db: float) -> bytes:
+    """Return the record of one sample of a motion model as a shard of signals stores it.
+
+    Raises: InputError where the model has no sample of this SNR.
+    """
+    if snr_db not in snrs_of(entry):
+        raise InputError(f"record of {entry['key']}: SNRs {snrs_of(entry)} dB, expected {snr_db} dB among them")
+    kept = {name: value for name, value in entry.items() if name != POWER}
+    kept |= {"key": sample_key(entry["subtype"], entry["model"], snr_db), "noise": not math.isinf(snr_db)}
+    kept["snr_db"] = NO_NOISE_DB if math.isinf(snr_db) else snr_db
+    return json.dumps(kept, separators=(",", ":"), allow_nan=False).encode()
+
+
+def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:
+    """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols) complex64."""
+    powers = np.array(entry[POWER])[:, None] if POWER in entry else None
+    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers)[0, 0]
+
+
+def complex_signals(stored: np.ndarray) -> np.ndarray:
+    """Return the signals of a stored array: (stations, symbols, 2) float32, or complex64 as version 0.1 wrote them."""
+    if stored.dtype == np.complex64:
+        return stored
+    return np.ascontiguousarray(stored).view(np.complex64)[..., 0]
+
+
+def samples(models: Iterable[dict]) -> Iterator[dict]:
+    """Yield all samples of motion models that another tool reads from recipe shards, in the form of signal shards.
+
+    models: dicts with `json` and `clean.npy`, as bytes or decoded, as webdataset's pipelines hand them on. Yields dicts
+    with `__key__`, `json` (parsed) and `npy`, (stations, symbols, 2) float32. For example
+    `webdataset.WebDataset(path, shardshuffle=False).compose(lowalt.shards.clean.samples)`.
+    """
+    for model in models:
+        entry, stored = model["json"], model["clean.npy"]
+        entry = json.loads(entry) if isinstance(entry, (bytes, str)) else entry
+        stored = np.lib.format.read_array(io.BytesIO(stored)) if isinstance(stored, bytes) else np.asarray(stored)
+        clean, stations = complex_signals(stored), list(entry["geometry"])
+        for snr_db in snrs_of(entry):
+            record = json.loads(unpacked(entry, snr_db))
+            signal = noisy(entry, clean, stations, snr_db)
+            parts = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, 2)
+            yield {**model, "__key__": record["key"], "json": record, "npy": parts}
