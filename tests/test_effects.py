@@ -184,7 +184,9 @@ NOTHING = {
     "clutter": {"gamma": 0}, "receiver_noise": {"temperature_k": 0}, "timing_offset": {"sigma_s": 0},
     "clock_offset": {"sigma_ppm": 0}, "carrier_offset": {"sigma_ppm": 0}, "phase_noise": {"points": []},
     "iq_imbalance": {"gain_db": 0, "phase_deg": 0}, "adc": {"bits": 0}, "canceller": {"kind": "none"},
-    "cell_error": {"probability": 0},
+    "cell_error": {"probability": 0}, "slow_time": {"downlink": 1}, "data_symbols": {"order": 4},
+    "power_amplifier": {"backoff_db": None}, "comb_pilots": {"spacing": 1}, "pointing_error": {"sigma_deg": 0},
+    "transmit_leakage": {"isolation_db": None},
 }  # fmt: skip
 """Every effect that has a strength, without any."""
 

@@ -98,7 +98,7 @@ def test_data_is_qpsk_of_unit_modulus():
 # All effects
 
 
-@pytest.mark.parametrize("name", [entry.partition("/")[2] for entry in ORDER if entry[:3] in ("rec", "det")])
+@pytest.mark.parametrize("name", [entry.partition("/")[2] for entry in ORDER if entry[:3] in ("rec", "det", "tra")])
 def test_defaults_are_what_the_schema_describes_and_allows(name):
     text = (Path(__file__).parent.parent / "workflow/schemas/config.schema.yaml").read_text()
     block = yaml.safe_load(text)["properties"]["effects"]["properties"][name]

@@ -15,6 +15,11 @@ from lowalt.common.errors import InputError
 LISTED = (
     "motion/rotor_spread",
     "motion/gusts",
+    "transmitter/slow_time",
+    "transmitter/data_symbols",
+    "transmitter/power_amplifier",
+    "transmitter/comb_pilots",
+    "channel/pointing_error",
     "channel/element_pattern",
     "channel/mean_cross_section",
     "channel/fluctuation",
@@ -31,6 +36,7 @@ LISTED = (
     "receiver/clock_offset",
     "receiver/carrier_offset",
     "receiver/phase_noise",
+    "receiver/transmit_leakage",
     "receiver/iq_imbalance",
     "receiver/adc",
     "detection/canceller",
@@ -42,7 +48,7 @@ LISTED = (
 def _every_effect() -> tuple[str, ...]:
     """LISTED, each place followed by the effects in its folder that are not listed, in alphabetical order."""
     found = list(LISTED)
-    for place in ("motion", "channel", "receiver", "detection"):
+    for place in ("motion", "transmitter", "channel", "receiver", "detection"):
         paths = sorted((Path(__file__).parent / place).glob("*.py"))
         last = max(index for index, entry in enumerate(found) if entry.startswith(f"{place}/"))
         new = [f"{place}/{path.stem}" for path in paths if f"{place}/{path.stem}" not in found]
@@ -52,7 +58,7 @@ def _every_effect() -> tuple[str, ...]:
 
 
 ORDER = _every_effect()
-"""Place and name of every effect, in the order of the chain: motion, channel, receiver, detection."""
+"""Place and name of every effect, in the order of the chain: motion, transmitter, channel, receiver, detection."""
 PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
 """Place of every effect by its name."""
 BY_NEED = ("squint", "wavefront", "symbol_motion", "cyclic_prefix")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import need, waveform
+from lowalt.effects import need, steering, waveform
 from lowalt.effects.catalogue import NamedEffect, placed, providing, stream_name
 from lowalt.effects.interface import (
     AddsEchoes,
@@ -17,9 +17,11 @@ from lowalt.effects.interface import (
     BoundsItself,
     ChoosesCells,
     FiltersCells,
+    SamplesTime,
     WeighsPoints,
 )
-from lowalt.effects.response import ImagePath, response
+from lowalt.effects.response import ImagePath
+from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
 
@@ -55,12 +57,14 @@ class Chain:
         self.view, self.draws, self.power, self.error = view, draws, power, EXACT
         self.names = frozenset(effect.name for effect in effects)
         self.by_need = {effect.name: effect for effect in providing(effects, BoundsItself)}
-        self.channel, self.receiver, self.detection = (
-            placed(effects, place) for place in ("channel", "receiver", "detection")
+        self.transmitter, self.channel, self.receiver, self.detection = (
+            placed(effects, place) for place in ("transmitter", "channel", "receiver", "detection")
         )
+        self.sending = Sending(self.transmitter, view.network, draws)
+        self.timing = next(iter(providing(self.transmitter, SamplesTime)), None)
         self.amplification = math.prod(
             effect.module.amplifies(effect.settings)
-            for effect in providing((*self.receiver, *self.detection), Amplifies)
+            for effect in providing((*self.transmitter, *self.receiver, *self.detection), Amplifies)
         )
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
@@ -75,10 +79,7 @@ class Chain:
     @cached_property
     def direct(self) -> np.ndarray:
         """The target's subcarriers (N, M) on the direct path alone, without physics by need, to rounding."""
-        view = self.view
-        return response(
-            view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, factor=self.factor, error=EXACT
-        )  # fmt: skip
+        return steering.echo(self.view, factor=self.factor, error=EXACT)
 
     def interpolation(self) -> float:
         """Return how far interpolation over frequencies and instants may put a range cell off (units of the signal)."""
@@ -114,33 +115,43 @@ class Chain:
             spectrum = self._echo(view, on, factor)
             if self._clutter is not None:
                 spectrum = spectrum + self._clutter[rows]
-            if not self.receiver:
-                return np.fft.ifft(spectrum, axis=1)
-            samples = waveform.transmit(spectrum, self._sent)
+            if not self.receiver and not self.sending.distorts:
+                return self.sending.cells(spectrum)
+            samples = waveform.transmit(spectrum, self.sending.aired[rows])
         for effect in self.receiver:
             draws = self.draws(stream_name(effect.name))
             samples = effect.module.receive(effect.settings, samples, self._frame, draws)
-        return np.fft.ifft(waveform.demodulate(samples, self._sent[rows]), axis=1)
+        return self.sending.cells(self.sending.received(samples, rows))
 
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
         cells = self.cells(on, chosen)
+        if self.timing is not None:
+            cells = cells[self.view.sampling.present]
         for effect in providing(self.detection, FiltersCells):
             cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
         size = abs(cells)
         best, lead = size.argmax(axis=1), need.gap(size) if leads else np.full(len(cells), np.nan)
         for effect in providing(self.detection, ChoosesCells):
             best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
-        return Outcome(cells[np.arange(len(cells)), best], best, lead)
+        outcome = Outcome(cells[np.arange(len(cells)), best], best, lead)
+        return outcome if self.timing is None else self._evenly(outcome)
+
+    def _evenly(self, outcome: Outcome) -> Outcome:
+        """The outcome of the received symbols, as all N evenly spaced ones; cell -1 where none was received."""
+        view, effect = self.view, self.timing
+        cell, gap = np.full(len(view.times_s), -1), np.full(len(view.times_s), np.inf)
+        cell[view.sampling.present], gap[view.sampling.present] = outcome.cell, outcome.gap
+        return Outcome(effect.module.regridded(effect.settings, outcome.signal, view.sampling, view.network), cell, gap)
 
     def patched(self, outcome: Outcome, contested: np.ndarray, everything: frozenset[str]) -> Outcome:
         """Return the outcome with contested symbols computed with everything on.
 
-        Interpolation is then to rounding. Receiver and detection effects reach over symbols, so with any of them the
-        whole sample is computed again.
+        Interpolation is then to rounding. Transmitter, receiver and detection effects reach over symbols, so with any
+        of them the whole sample is computed again.
         """
         self.error = EXACT
-        if self.receiver or self.detection:
+        if self.transmitter or self.receiver or self.detection:
             return self.run(everything)
         whole = self.run(everything, contested)
         merged = Outcome(*(np.array(values) for values in outcome))
@@ -156,10 +167,8 @@ class Chain:
             paths = self._paths if view is self.view else self._paths_of(view)
         if view is self.view and factor is self.factor and not paths and not on & {"squint", "wavefront"}:
             return self.direct
-        return response(
-            view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m,
-            paths=paths, factor=factor, squint="squint" in on,
-            wavefront="wavefront" in on, error=self.error,
+        return steering.echo(
+            view, paths, factor, squint="squint" in on, wavefront="wavefront" in on, error=self.error
         )  # fmt: skip
 
     def _samples(self, view: View, on: frozenset[str], factor: np.ndarray | float, rows) -> np.ndarray:
@@ -185,18 +194,18 @@ class Chain:
             paths = [ImagePath(new.places, old.coefficient) for new, old in zip(moved, held, strict=True)]
             for count, strength in groups:
                 spectrum = self._echo(later, on, strength, paths)
-                echo = waveform.transmit(spectrum, self._sent[rows])
+                echo = waveform.transmit(spectrum, self.sending.aired[rows])
                 if count:
-                    echo[:, :count] = waveform.transmit(spectrum * turned, self._before[rows])[:, :count]
+                    echo[:, :count] = waveform.transmit(spectrum * turned, self.sending.aired_before[rows])[:, :count]
                 samples += weight * echo
         return samples
 
     def _clutter_samples(self, cut: bool) -> np.ndarray:
         """Time samples (N, M) of the echoes of everything but the target, cut by the cyclic prefix or not."""
         if not cut:
-            return waveform.transmit(self._clutter, self._sent)
-        effect, whole = self.by_need["cyclic_prefix"], np.ones_like(self._sent)
-        sent = waveform.transmit(whole, self._sent), waveform.transmit(whole, self._before)
+            return waveform.transmit(self._clutter, self.sending.aired)
+        effect, whole = self.by_need["cyclic_prefix"], np.ones_like(self.sending.aired)
+        sent = waveform.transmit(whole, self.sending.aired), waveform.transmit(whole, self.sending.aired_before)
         # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
         cells = np.fft.ifft(np.fft.ifftshift(self._clutter, axes=1), axis=1)
         return effect.module.convolved(effect.settings, self.view.network, cells, sent)
@@ -222,18 +231,12 @@ class Chain:
         return sum(added[1:], added[0]) if added else None
 
     @cached_property
-    def _sent(self) -> np.ndarray:
-        """The data (N, M) that all symbols carry."""
-        return waveform.sent(self.draws("waveform"), self.view.network.symbols, self.view.network.subcarriers)
-
-    @cached_property
-    def _before(self) -> np.ndarray:
-        """The data (N, M) of the symbol before each symbol of the look."""
-        return waveform.sent(self.draws("previous waveform"), *self._sent.shape)
-
-    @cached_property
     def _frame(self) -> Frame:
         """The look as receiver and detection effects know it."""
         view = self.view
         range_m = float(np.linalg.norm(view.aim_m - np.asarray(view.station.position_m)))
-        return Frame(view.network, view.station, self._sent, self.power, 2.0 * range_m / SPEED_OF_LIGHT)
+        aired = self.sending.aired if self.sending.distorts else None
+        starts = None if view.sampling is None else view.sampling.times_s
+        return Frame(
+            view.network, view.station, self.sending.known, self.power, 2.0 * range_m / SPEED_OF_LIGHT, aired, starts
+        )  # fmt: skip

@@ -7,6 +7,9 @@ from lowalt.common.network import Network
 from lowalt.effects.catalogue import called, providing
 from lowalt.effects.interface import Checks
 
+STILL = ("clutter", "transmit_leakage")
+"""Effects that add something that stands still."""
+
 
 class CheckedScene(NamedTuple):
     """The part of a scene's configuration that an effect's `check` may look at.
@@ -36,8 +39,10 @@ def check(config: dict) -> CheckedScene:
             f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
             "or set SNRs, not both"
         )
-    if "canceller" in scene.effects and "clutter" not in scene.effects:
-        raise InputError("effects.canceller: there is no clutter to cancel, expected effects.clutter in the same scene")
+    if "canceller" in scene.effects and not set(STILL) & set(scene.effects):
+        raise InputError(
+            f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"
+        )
     for effect in providing(effects, Checks):
         effect.module.check(effect.settings, scene)
     return scene

@@ -15,10 +15,12 @@ from typing import TYPE_CHECKING, Protocol, runtime_checkable
 if TYPE_CHECKING:
     import numpy as np
 
+    from lowalt.common.network import Network
     from lowalt.effects.antenna import Element as AntennaElement
     from lowalt.effects.checks import CheckedScene
     from lowalt.effects.response import ImagePath
-    from lowalt.effects.view import View
+    from lowalt.effects.transmitter.slow_time import Sampling
+    from lowalt.effects.view import Beams, View
     from lowalt.effects.waveform import Frame
     from lowalt.motion.poses import Perturbation
     from lowalt.targets.cloud import Cloud
@@ -47,10 +49,10 @@ class Checks(Protocol):
 
 @runtime_checkable
 class Amplifies(Protocol):
-    """Optional, receiver and detection: an effect that can make an error of its input larger."""
+    """Optional, not motion or channel: an effect that can make an error of its input larger."""
 
     def amplifies(self, settings: dict) -> float:
-        """Return the largest factor on an error: on its 2-norm (receiver), or summed over symbols (detection).
+        """Return the largest factor on an error: on its 2-norm (transmitter, receiver), or summed over symbols.
 
         math.inf where the effect is not continuous. An effect without this function has the factor 1.
         """
@@ -64,6 +66,49 @@ class PerturbsMotion(Protocol):
         self, settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator
     ) -> Perturbation:
         """Return the angles, offsets (m) and tilts (rad) added to the motion of `row` at `times_s` (N,)."""
+
+
+@runtime_checkable
+class DrawsData(Protocol):
+    """Transmitter: an effect that chooses the data."""
+
+    def data(self, settings: dict, symbols: int, subcarriers: int, rng: np.random.Generator) -> np.ndarray:
+        """Return the data (symbols, subcarriers) of mean power one."""
+
+
+@runtime_checkable
+class ChangesWaveform(Protocol):
+    """Transmitter: an effect between the data and the air."""
+
+    def aired(self, settings: dict, sent: np.ndarray) -> np.ndarray:
+        """Return the subcarriers (N, M) on the air for the data `sent` (N, M), their 2-norm no larger."""
+
+
+@runtime_checkable
+class PicksSubcarriers(Protocol):
+    """Transmitter: an effect that leaves the receiver some of the subcarriers."""
+
+    def range_cells(self, settings: dict, response: np.ndarray) -> np.ndarray:
+        """Return the range cells of responses (N, M)."""
+
+
+@runtime_checkable
+class SamplesTime(Protocol):
+    """Transmitter: an effect on the instants of the symbols."""
+
+    def sampling(self, settings: dict, network: Network, rng: np.random.Generator) -> Sampling:
+        """Return the instants of a look, and which symbols are received."""
+
+    def regridded(self, settings: dict, signal: np.ndarray, given: Sampling, network: Network) -> np.ndarray:
+        """Return the evenly spaced signal (N,) made of the received symbols."""
+
+
+@runtime_checkable
+class PointsBeams(Protocol):
+    """Channel: an effect on where the beams point."""
+
+    def beams(self, settings: dict, view: View, rng: np.random.Generator) -> Beams:
+        """Return where both beams point in the look, and from when on."""
 
 
 @runtime_checkable
@@ -143,7 +188,8 @@ class ChoosesCells(Protocol):
 
 WORK = {
     "motion": (PerturbsMotion,),
-    "channel": (SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
+    "transmitter": (DrawsData, ChangesWaveform, PicksSubcarriers, SamplesTime),
+    "channel": (PointsBeams, SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
     "receiver": (ChangesSamples,),
     "detection": (FiltersCells, ChoosesCells),
 }

@@ -64,6 +64,9 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
         result.append(Level("loss beyond the cyclic prefix", kept, "dB"))
     if "clutter" in effects:
         result += _clutter(view, effects["clutter"], range_m)
+    if "transmit_leakage" in effects:
+        leaked = sent - effects["transmit_leakage"].settings["isolation_db"]
+        result.append(Level("transmit leakage, one subcarrier", leaked, "dBm"))
     if "receiver_noise" in effects:
         noisy = effects["receiver_noise"]
         noise = dbm(noisy.module.variance(noisy.settings, network.subcarrier_spacing_hz))

@@ -17,11 +17,20 @@ from lowalt.echo import echo_signal
 from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
-from lowalt.effects.interface import AddsPaths, SetsCrossSections, ShapesElements, WeighsPoints
+from lowalt.effects.interface import (
+    AddsPaths,
+    PointsBeams,
+    SamplesTime,
+    SetsCrossSections,
+    ShapesElements,
+    WeighsPoints,
+)
 from lowalt.effects.need import Decision
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
+BEYOND_MOTION = "transmitter", "channel", "receiver", "detection"
+"""Places of the effects that the chain computes."""
 INTERPOLATION = 0.04
 """Share of what may be left out that interpolation over frequencies and instants may err by."""
 
@@ -62,7 +71,7 @@ def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occ
     """
     sample = f"{row['subtype']}, model {row['model']}, station {station.name}"
     fixed = providing(scene.effects, SetsCrossSections)
-    beyond = [one for one in placed(scene.effects, "channel", "receiver", "detection") if one not in fixed]
+    beyond = [one for one in placed(scene.effects, *BEYOND_MOTION) if one not in fixed]
     asked = [effect.name for effect in beyond if effect.name in BY_NEED]
     # Half the tolerance is for physics that is left out, the other half for the echo engine's approximations.
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
@@ -75,7 +84,7 @@ def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occ
     if not beyond:
         return Received(own.signal, own.cell, power, [])
     chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
-    if providing(beyond, WeighsPoints):
+    if providing(beyond, WeighsPoints) or view.beams is not None:
         chain.power = power = rms(seen_alone(chain).astype(np.complex64)) ** 2
     if share is None or math.isinf(chain.amplification):
         outcome = chain.run(frozenset(asked), leads=False)
@@ -116,6 +125,12 @@ def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: 
     """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station."""
     times_s = scene.network.times_s
     grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
+    sampling = None
+    for effect in providing(scene.effects, SamplesTime):
+        sampling = effect.module.sampling(
+            effect.settings, scene.network, scene.stream(effect.name, row, station.name)
+        )  # fmt: skip
+        times_s = sampling.times_s
     moved = tuple(
         effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))
         for effect in placed(scene.effects, "motion")
@@ -123,7 +138,13 @@ def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: 
     reflected = bool(providing(scene.effects, AddsPaths))
     shaped = [effect.module.element(effect.settings) for effect in providing(scene.effects, ShapesElements)]
     element = shaped[0] if shaped else None
-    return View(scene.network, station, cloud, row, times_s, grid_s, moved, occluders, element, reflected)
+    view = View(
+        scene.network, station, cloud, row, times_s, grid_s, moved, occluders, element, reflected, sampling=sampling
+    )  # fmt: skip
+    for effect in providing(scene.effects, PointsBeams):
+        draws = scene.stream(effect.name, row, station.name)
+        view = replace(view, beams=effect.module.beams(effect.settings, view, draws))
+    return view
 
 
 def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tuple[Outcome, list[Decision]]:

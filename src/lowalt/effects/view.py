@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -11,6 +12,16 @@ from lowalt.effects.antenna import Element, gain
 from lowalt.effects.rigid_loops import carry
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.targets.cloud import Cloud
+
+if TYPE_CHECKING:
+    from lowalt.effects.transmitter.slow_time import Sampling
+
+
+class Beams(NamedTuple):
+    """Where both beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from 0."""
+
+    starts_s: np.ndarray
+    aims_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -33,6 +44,10 @@ class View:
     """The antenna elements' pattern, None for isotropic ones."""
     reflected: bool = False
     """Whether the station also sees images of the points; their directions are then not bounded by the target's."""
+    beams: Beams | None = None
+    """Where both beams point, None for the target's origin at the first symbol."""
+    sampling: "Sampling | None" = None
+    """Instants of all symbols and which are received, None for all at n T_r."""
 
     @cached_property
     def motion(self) -> Rigid:
@@ -61,8 +76,16 @@ class View:
 
     @property
     def aim_m(self) -> np.ndarray:
-        """Where both beams point: the target's origin at the first symbol, (3,) m."""
+        """Where both beams point at first, (3,) m: without pointing errors the target's origin at the first symbol."""
+        if self.beams is not None:
+            return self.beams.aims_m[0]
         return np.array([self.row["x_m"], self.row["y_m"], self.row["z_m"]])
+
+    def beam_rows(self) -> list[tuple[int, np.ndarray]]:
+        """Return the number of every beam in use and the symbols it lights, as indices."""
+        # An instant that is a multiple of the update must not fall before it by rounding.
+        number = np.searchsorted(self.beams.starts_s, self.times_s + 1e-9, side="right") - 1
+        return [(int(one), np.flatnonzero(number == one)) for one in np.unique(number)]
 
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""

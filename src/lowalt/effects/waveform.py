@@ -57,11 +57,20 @@ class Frame:
     network: Network
     station: Station
     sent: np.ndarray
-    """(N, M) complex128, unit-modulus data."""
+    """(N, M) complex128, the data, of mean power one."""
     reference: float = 0.0
     """The target echo's mean |Y_bin|^2 (W)."""
     delay_s: float = 0.0
     """Two-way delay of the target's reference point at n = 0, 2 r / c (s)."""
+    aired: np.ndarray | None = None
+    """(N, M) subcarriers on the air where an amplifier distorts them, None for the data themselves."""
+    starts_s: np.ndarray | None = None
+    """(N,) s, start of each symbol's useful part where it is not n T_r."""
+
+    @property
+    def waveform(self) -> np.ndarray:
+        """Subcarriers (N, M) on the air."""
+        return self.sent if self.aired is None else self.aired
 
     @property
     def sample_s(self) -> float:
@@ -70,7 +79,9 @@ class Frame:
 
     @cached_property
     def symbol_times_s(self) -> np.ndarray:
-        """Start n T_r of each symbol's useful part (s), shape (N,)."""
+        """Start of each symbol's useful part (s), n T_r without jitter, shape (N,)."""
+        if self.starts_s is not None:
+            return self.starts_s
         return np.arange(len(self.sent)) * self.network.symbol_interval_s
 
     @cached_property

@@ -1,0 +1,70 @@
+"""What a station sends in one look, and how its receiver removes the data again.
+
+Without transmitter effects the data are QPSK, the amplifier is linear, and all subcarriers are pilots.
+"""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from lowalt.common.network import Network
+from lowalt.effects import waveform
+from lowalt.effects.catalogue import NamedEffect, providing
+from lowalt.effects.interface import ChangesWaveform, DrawsData, PicksSubcarriers
+
+
+class Sending:
+    """The data of a look of one station, what is on the air, and range cells by the pilots.
+
+    effects: the scene's transmitter effects; draws: as in `chain.Chain`.
+    """
+
+    def __init__(self, effects: list[NamedEffect], network: Network, draws: Callable[[str], np.random.Generator]):
+        self.network, self.draws = network, draws
+        self.source = next(iter(providing(effects, DrawsData)), None)
+        self.amplifiers = providing(effects, ChangesWaveform)
+        self.pilots = next(iter(providing(effects, PicksSubcarriers)), None)
+
+    @property
+    def distorts(self) -> bool:
+        """Whether the waveform on the air is not that of the data."""
+        return bool(self.amplifiers)
+
+    @cached_property
+    def known(self) -> np.ndarray:
+        """The data (N, M) that all symbols carry, as the receiver knows them."""
+        return self._drawn("waveform")
+
+    @cached_property
+    def aired(self) -> np.ndarray:
+        """The subcarriers (N, M) on the air."""
+        return self._amplified(self.known)
+
+    @cached_property
+    def aired_before(self) -> np.ndarray:
+        """The subcarriers (N, M) on the air in the symbol before each symbol of the look."""
+        return self._amplified(self._drawn("previous waveform"))
+
+    def cells(self, spectrum: np.ndarray) -> np.ndarray:
+        """Return the range cells of responses (N, M): all M, or those of the pilots' comb."""
+        if self.pilots is None:
+            return np.fft.ifft(spectrum, axis=1)
+        return self.pilots.module.range_cells(self.pilots.settings, spectrum)
+
+    def received(self, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
+        """Return the responses of the time samples of the symbols `rows`, the known data divided out."""
+        if self.source is None:
+            return waveform.demodulate(samples, self.known[rows])
+        return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) / self.known[rows]
+
+    def _drawn(self, name: str) -> np.ndarray:
+        shape = self.network.symbols, self.network.subcarriers
+        if self.source is None:
+            return waveform.sent(self.draws(name), *shape)
+        return self.source.module.data(self.source.settings, *shape, self.draws(name))
+
+    def _amplified(self, data: np.ndarray) -> np.ndarray:
+        for effect in self.amplifiers:
+            data = effect.module.aired(effect.settings, data)
+        return data
