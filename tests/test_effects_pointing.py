@@ -10,7 +10,7 @@ from lowalt.effects import steering
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import pointing_error
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.view import Beams
 from test_effects import network, target
 
@@ -41,7 +41,7 @@ def pattern(count, cosine):
 def test_a_beam_off_its_target_loses_both_arrays_pattern(point, azimuth, elevation):
     station = RADIO.stations[0]
     off = {"pointing_error": {"sigma_deg": 0.0, "fixed_deg": [azimuth, elevation]}}
-    best, missed = (abs(hear(scene(one), station, *point).signal) for one in ({}, off))
+    best, missed = (abs(received_signal(scene(one), station, *point).signal) for one in ({}, off))
     a, e = np.radians([azimuth, elevation])
     across, up = np.cos(e) * np.sin(a), np.sin(e)
     loss = pattern(16, across) * pattern(8, across) * pattern(4, up) * pattern(2, up)
@@ -86,8 +86,8 @@ def exact(update):
 def test_updates_do_not_turn_the_phase_of_the_arrays_middles(point):
     station, cloud, row = RADIO.stations[0], *point
     row = {**row, "vx_mps": -20.0 * np.sin(0.3), "vy_mps": 20.0 * np.cos(0.3)}
-    still = hear(scene({}), station, cloud, row).signal
-    followed = hear(scene(exact(0.02)), station, cloud, row).signal
+    still = received_signal(scene({}), station, cloud, row).signal
+    followed = received_signal(scene(exact(0.02)), station, cloud, row).signal
     # A single point's phase is that of the arrays' middles, whichever way the beams point.
     assert abs(np.angle(followed * still.conj())).max() < 1e-9
     assert (abs(followed) >= abs(still) * (1 - 1e-12)).all() and abs(followed[-1]) > 1.04 * abs(still[-1])
@@ -112,8 +112,8 @@ def test_a_beam_turned_to_where_it_points_changes_no_bit():
 def test_pointing_is_kept_while_physics_is_left_out_by_need(point):
     station, (cloud, row) = RADIO.stations[0], target(np.random.default_rng(4))
     given = {**exact(0.02), "pointing_error": {"sigma_deg": 1.0, "update_s": 0.02}, "squint": {}, "wavefront": {}}
-    full = hear(scene(given), station, cloud, row)
-    some = hear(scene(given, tolerance=0.05), station, cloud, row)
+    full = received_signal(scene(given), station, cloud, row)
+    some = received_signal(scene(given, tolerance=0.05), station, cloud, row)
     assert abs(some.signal - full.signal).max() <= 0.05 * abs(full.signal).max()
     assert any(not decision.computed for decision in some.decisions)
 

@@ -10,7 +10,7 @@ from lowalt.common.errors import InputError
 from lowalt.echo import echo_signal
 from lowalt.effects.catalogue import called
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.transmitter import slow_time
 from lowalt.effects.transmitter.slow_time import Sampling
 from test_effects import network, target
@@ -89,23 +89,23 @@ def test_the_chain_hears_the_target_at_its_true_instants():
     given = {"tdd_period_s": 0.01, "downlink": 0.75, "jitter_s": 1e-3}
     effects = tuple(called({"slow_time": given}))
     station, scene = radio.stations[0], Scene(radio, 5, None, effects)
-    heard = hear(scene, station, cloud, row)
+    found = received_signal(scene, station, cloud, row)
     at = effects[0].module.sampling(effects[0].settings, radio, scene.stream("slow_time", row, "A"))
-    assert (heard.signal[~at.present] == 0).all() and (heard.cell[~at.present] == -1).all()
-    assert at.present.sum() == 18 and (heard.cell[at.present] >= 0).all()
+    assert (found.signal[~at.present] == 0).all() and (found.cell[~at.present] == -1).all()
+    assert at.present.sum() == 18 and (found.cell[at.present] >= 0).all()
     # The engine at the same instants, one symbol after the other.
     view = replace(observe(Scene(radio, 5, None, ()), station, cloud, row), times_s=at.times_s)
     truth = echo_signal(radio, station, view.motion, cloud.rcs_m2, view.aim_m).signal
-    assert abs(heard.signal - truth)[at.present].max() < 1e-10 * abs(truth).max()
+    assert abs(found.signal - truth)[at.present].max() < 1e-10 * abs(truth).max()
 
 
 def test_a_canceller_works_on_received_symbols_alone():
     cloud, row = target(np.random.default_rng(2))
     radio = network(symbols=24, place=(0.0, 0.0, 10.0))
     given = {"slow_time": {"downlink": 0.5}, "clutter": {"gamma": 1e4, "wind_mps": 0.0}, "canceller": {"kind": "mean"}}
-    found = hear(Scene(radio, 5, None, tuple(called(given))), radio.stations[0], cloud, row)
+    found = received_signal(Scene(radio, 5, None, tuple(called(given))), radio.stations[0], cloud, row)
     # Still land of any strength is gone, where a mean over zeros would have left half of it.
-    weak = hear(Scene(radio, 5, None, tuple(called({**given, "clutter": {"gamma": 1e-6, "wind_mps": 0.0}}))),
+    weak = received_signal(Scene(radio, 5, None, tuple(called({**given, "clutter": {"gamma": 1e-6, "wind_mps": 0.0}}))),
                 radio.stations[0], cloud, row)  # fmt: skip
     assert abs(found.signal - weak.signal).max() < 1e-6 * abs(weak.signal).max()
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from effects_frames import frame, heard, point
+from effects_frames import frame, point, received
 from effects_frames import network as plain_network
 from lowalt.common.errors import InputError
 from lowalt.echo import echo_matrix
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.hear import Scene, hear, observe
+from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.receiver import adc, receiver_noise, transmit_leakage
 from lowalt.effects.sending import Sending
 from lowalt.effects.transmitter import comb_pilots, data_symbols, power_amplifier
@@ -58,10 +58,10 @@ def test_16_qam_has_2_8_db_more_noise_than_qpsk_after_the_receiver(rng):
 def test_qam_without_noise_is_the_echo_itself(rng):
     cloud, row = target(rng)
     station = network().stations[0]
-    plain = hear(scene({}), station, cloud, row)
+    plain = received_signal(scene({}), station, cloud, row)
     # An imperfect mixer makes the chain send the data; one so slight changes nothing else.
     slight = {"data_symbols": {"order": 256}, "iq_imbalance": {"gain_db": 1e-13, "phase_deg": 0.0}}
-    mixed = hear(scene(slight), station, cloud, row)
+    mixed = received_signal(scene(slight), station, cloud, row)
     assert abs(mixed.signal - plain.signal).max() < 1e-11 * abs(plain.signal).max()
     assert data_symbols.amplifies({"order": 16}) == pytest.approx(3.0)
 
@@ -120,7 +120,7 @@ def test_echoes_are_those_of_the_amplified_waveform(rng):
     cloud, row = target(rng)
     station = network().stations[0]
     plain, effects = scene({}), {"power_amplifier": {"backoff_db": 1.0}}
-    loud = hear(scene(effects), station, cloud, row)
+    loud = received_signal(scene(effects), station, cloud, row)
     view = observe(plain, station, cloud, row)
     response = echo_matrix(network(), station, view.motion, cloud.rcs_m2, view.aim_m, "subcarriers")
     known = waveform.sent(plain.stream("waveform", row, "A"), 24, 32)
@@ -162,8 +162,8 @@ def test_an_impossible_comb_is_refused(given, word):
 def test_echoes_through_a_comb_are_those_of_its_subcarriers(rng):
     cloud, row = target(rng)
     station = network().stations[0]
-    found = hear(scene({"comb_pilots": {"spacing": 2}}), station, cloud, row)
-    plain = hear(scene({}), station, cloud, row)
+    found = received_signal(scene({"comb_pilots": {"spacing": 2}}), station, cloud, row)
+    plain = received_signal(scene({}), station, cloud, row)
     assert (found.cell == plain.cell % 16).all()
     assert abs(found.signal - plain.signal).max() < 0.1 * abs(plain.signal).max()
 
@@ -173,11 +173,11 @@ def test_echoes_through_a_comb_are_those_of_its_subcarriers(rng):
 
 def test_leakage_stands_in_the_first_cell_at_its_level():
     look = frame(plain_network(30, 64))
-    found = np.fft.ifft(heard(transmit_leakage, {"isolation_db": 40.0}, look, np.zeros((30, 64))), axis=1)
+    found = np.fft.ifft(received(transmit_leakage, {"isolation_db": 40.0}, look, np.zeros((30, 64))), axis=1)
     np.testing.assert_allclose(found[:, 0], found[0, 0], atol=1e-14)
     assert abs(found[0, 0]) == pytest.approx(0.01) and abs(found[:, 1:]).max() < 1e-15
     late = {"isolation_db": 40.0, "delay_s": 2 / (64 * 120e3)}
-    found = np.fft.ifft(heard(transmit_leakage, late, look, np.zeros((30, 64))), axis=1)
+    found = np.fft.ifft(received(transmit_leakage, late, look, np.zeros((30, 64))), axis=1)
     assert (abs(found).argmax(axis=1) == 2).all()
 
 
