@@ -56,13 +56,13 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
 
     def content(number: int, level: int) -> bytes:
         if kind == "recipe":
-            return npy(maker.heard(rows[number])[0])
+            return npy(maker.received(rows[number])[0])
         signal = maker.signal(rows[number], plan.snrs[level])
         return npy(signal) if kind == "signal" else maker.png(signal)
 
     powers = None
     if kind == "recipe" and maker.echo["effects"]:
-        powers = np.concatenate([maker.heard(row)[1] for row in rows], axis=1)
+        powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
     paths = []
     for name in plan.folds(chunk):
