@@ -28,7 +28,7 @@ def recogniser(stations="ABC", spectra="VRP+TRP+VT", fusion="attention", **chang
         "backbone": "",
         "protocols": "seen",
     }
-    return network.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, **changes}, SIZE, PALETTES).eval()
+    return network.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, **changes}, SIZE, PALETTES, 4).eval()
 
 
 def images(samples, views, seed=0):
@@ -147,7 +147,9 @@ def test_a_row_of_the_table_chooses_its_own_backbone():
         "backbone": "test_vit",
         "protocols": "seen",
     }
-    model = network.Recogniser(schemes.scheme(row, "test", "ABC"), {**BLOCK, "backbone": "test_resnet"}, SIZE, PALETTES)
+    model = network.Recogniser(
+        schemes.scheme(row, "test", "ABC"), {**BLOCK, "backbone": "test_resnet"}, SIZE, PALETTES, 4
+    )
     assert type(model.backbone).__name__ == "VisionTransformer"
 
 

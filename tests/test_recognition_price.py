@@ -149,7 +149,8 @@ def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(mo
     }  # fmt: skip
     block = {"backbone": "test_vit", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
              "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
-    given = {"seed": 1, "size": 32, "colour_map": "gray", "network": block, "training": training, "augmentation": {}}
+    given = {"seed": 1, "size": 32, "colour_map": "gray", "network": block, "training": training, "augmentation": {},
+             "classes": ["a", "b", "c", "d"]}  # fmt: skip
     nine = network_speed.measure(schemes.Scheme("nine", (0, 1, 2), (0, 1, 2)), given, 0.3)
     one = network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.3)
     for times in (nine, one):

@@ -9,6 +9,7 @@ import pytest
 import torch
 
 from dataset import RENDER, SNRS, build
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.recognition import checkpoint, network, predictions, runs, samples, schemes, score, views
@@ -34,7 +35,7 @@ def dataset(tmp_path_factory):
 def model(tmp_path_factory):
     torch.manual_seed(1)
     palettes = np.zeros((3, 256, 3), np.uint8)
-    weights = network.Recogniser(SCHEME, BLOCK, SIZE, palettes).state_dict()
+    weights = network.Recogniser(SCHEME, BLOCK, SIZE, palettes, 4).state_dict()
     path = tmp_path_factory.mktemp("model") / "model.pt"
     # The palettes are part of the weights: a model keeps the colours it was trained on.
     about = {
@@ -142,7 +143,7 @@ def test_scores_come_from_the_shards_labels_not_from_the_file(dataset, model, tm
     assert found["accuracy_percent"] == pytest.approx(100 * np.mean(shares))
     with (tmp_path / "p.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    short = [{name: row[name] for name in ("key", *predictions.CLASSES)} for row in rows]
+    short = [{name: row[name] for name in ("key", *predictions.probability_columns(CATEGORIES))} for row in rows]
 
     def written(rows):
         with (tmp_path / "q.csv").open("w", newline="") as file:

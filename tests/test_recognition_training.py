@@ -30,6 +30,7 @@ SETTINGS = {
     "network": {"backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
                 "feed_forward": 1, "dropout": 0.1, "hidden": 8},
     "training": TRAINING,
+    "classes": ["UAV", "Bird", "Vehicle", "Pedestrian"],
     "augmentation": {"mirror": 0.5, "shift_doppler": 0.1, "shift_time": 0.2, "contrast": 0.0, "mask_doppler": 0.1,
                      "mask_time": 0.1, "drop_view": 0.1},
 }  # fmt: skip

@@ -302,7 +302,7 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
     block = {"backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
              "feed_forward": 1, "dropout": 0.0, "hidden": 0}  # fmt: skip
     torch.manual_seed(1)
-    weights = network.Recogniser(scheme, block, 32, np.zeros((3, 256, 3), np.uint8)).state_dict()
+    weights = network.Recogniser(scheme, block, 32, np.zeros((3, 256, 3), np.uint8), 4).state_dict()
     weights["palettes.table"] = torch.randn(2, 256, 3)
     about = {"scheme": vars(scheme), "protocol": "seen", "network": block, "size": 32, "seed": 0, "colour_map": "gray"}
     checkpoint.save(tmp_path / "model.pt", "{}", {"weights": weights, **about})

@@ -17,7 +17,7 @@ def test_accuracy_and_confusion_count_what_a_loop_counts():
     counts = np.zeros((4, 4), dtype=int)
     for true, guess in zip(labels, guesses, strict=True):
         counts[true, guess] += 1
-    assert (statistics.confusion(labels, guesses) == counts).all()
+    assert (statistics.confusion(labels, guesses, 4) == counts).all()
     for group, (share, number) in statistics.accuracy_by(groups, labels == guesses).items():
         chosen = [a == b for a, b, g in zip(labels, guesses, groups, strict=True) if g == group]
         assert number == len(chosen)
@@ -143,7 +143,7 @@ def test_threshold_is_the_largest_that_detects_enough(detection, uavs):
 def test_alarm_rates_are_shares_of_each_class():
     scores = np.array([0.9, 0.2, 0.8, 0.1, 0.7, 0.7, 0.0])
     labels = np.array([0, 0, 1, 1, 2, 2, 3])
-    detected, alarms = statistics.alarm_rates(scores, labels, 0.7)
+    detected, alarms = statistics.alarm_rates(scores, labels, 0.7, 4)
     assert detected == 0.5
     assert alarms.tolist() == [0.5, 1.0, 0.0]
 
@@ -161,8 +161,8 @@ def test_alarm_intervals_hold_the_rates_and_narrow_with_the_samples():
     for models in (80, 800):
         parts = [[alarm_part(stream(seed, name), models, name)] for seed, name in ((1, "v"), (2, "t"))]
         level = statistics.threshold(parts[0][0].scores, parts[0][0].labels, 0.9)
-        detected, alarms = statistics.alarm_rates(parts[1][0].scores, parts[1][0].labels, level)
-        bounds = statistics.alarm_intervals(*parts, 0.9, False, stream(3, "a"), 200)
+        detected, alarms = statistics.alarm_rates(parts[1][0].scores, parts[1][0].labels, level, 4)
+        bounds = statistics.alarm_intervals(*parts, 0.9, False, stream(3, "a"), 4, 200)
         for rate, (low, high) in zip([detected, *alarms], bounds, strict=True):
             assert low <= rate <= high
         assert bounds[2:].tolist() == [[0, 0], [0, 0]]

@@ -21,7 +21,7 @@ from lowalt.effects.checks import check
 from lowalt.effects.levels import levels, table
 from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
 from lowalt.motion.sample import draw, region_polygon
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 
@@ -52,7 +52,7 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
         firsts = {}
         for name, record in records.items():
             firsts.setdefault(record["published"]["category"], (name, 0))
-        named = [firsts[category] for category in CATEGORIES if category in firsts]
+        named = list(firsts.values())
     masts = np.array([place["position_m"][:2] for place in config["network"]["stations"].values()], dtype=float)
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
     result = []

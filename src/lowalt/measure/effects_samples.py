@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.classes import label
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
@@ -27,7 +28,7 @@ from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, received_signal
 from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
-from lowalt.targets.cloud import CATEGORIES, Cloud, cloud_of, read
+from lowalt.targets.cloud import Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
 
 STEP = 8
@@ -127,9 +128,10 @@ def views(tiles: Renderer, signals: np.ndarray, size: int) -> np.ndarray:
 
 def measure(
     scenes: tuple[Scene, Scene], tiles: Renderer, clouds: dict[str, Cloud], rows: list[dict],
-    occluders: dict[str, dict], snrs: list[float], size: int,
+    occluders: dict[str, dict], snrs: list[float], size: int, classes: tuple[str, ...],
 ) -> dict[str, np.ndarray]:  # fmt: skip
-    """Return ARRAYS for the samples `rows` in a scene without and one with effects; snrs in dB.
+    """Return ARRAYS for the samples `rows` in a scene without and one with effects; snrs in dB;
+    classes: in the order of their labels.
 
     Noise is drawn as the noise stage does, so that without effects the images are the run's own.
     Raises: InputError as `takes` does.
@@ -139,7 +141,7 @@ def measure(
     power = after.power.T if scenes[1].effects else None
     noisy = noisy_signals(after.signal.swapaxes(0, 1), rows, names, snrs, scenes[1].seed, power)
     changed, difference = np.empty(len(rows)), np.empty(len(rows))
-    shown = next((index for index, row in enumerate(rows) if row["category"] == "UAV"), 0)
+    shown = next((index for index, row in enumerate(rows) if row["category"] == classes[0]), 0)
     for index in range(len(rows)):
         pair = [tiles.tile(take.signal[index]) for take in (before, after)]
         changed[index], difference[index] = pixel_change(*pair)
@@ -147,7 +149,7 @@ def measure(
             example = np.stack([split(tile) for tile in pair])
     return {
         "subtype": np.array([row["subtype"] for row in rows]), "model": np.array([row["model"] for row in rows]),
-        "label": np.array([CATEGORIES.index(row["category"]) for row in rows]), "snr_db": np.array(snrs, float),
+        "label": np.array([label(classes, row) for row in rows]), "snr_db": np.array(snrs, float),
         "base_ms": before.ms, "total_ms": after.ms, "signal_change": signal_change(before.signal, after.signal),
         "cells_changed": np.mean(before.cell != after.cell, axis=2), "pixels_changed": changed,
         "pixel_difference": difference, "views": views(tiles, noisy, size), "example": example,
@@ -176,7 +178,8 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--occluders", nargs="*", default=[], help="surface files of their subtypes")
     options.add_argument("--out", required=True, help="file to write (.npz)")
     given = options.parse_args(arguments)
-    keys = ("name", "effects", "network", "spectra", "images", "split", "seed", "tolerance", "snr_db", "size", "models")
+    keys = ("name", "effects", "network", "spectra", "images", "split", "seed", "tolerance", "snr_db", "size", "models",
+            "classes")  # fmt: skip
     block = dict(zip(keys, pick(given.settings, *keys), strict=True))
     network = Network.from_settings(block["network"])
     tiles = Renderer.from_settings({key: block[key] for key in ("network", "spectra", "images")})
@@ -191,7 +194,7 @@ def main(arguments: list[str]) -> None:
     base = Scene(network, block["seed"], block["tolerance"], ())
     scene = Scene(network, block["seed"], block["tolerance"], tuple(called(block["effects"])))
     snrs = [float(snr) for snr in block["snr_db"]]
-    found = measure((base, scene), tiles, clouds, rows, occluders, snrs, block["size"])
+    found = measure((base, scene), tiles, clouds, rows, occluders, snrs, block["size"], tuple(block["classes"]))
     header = {"name": block["name"], "effects": list(block["effects"]), "hardware": describe()}
     with replacing(given.out) as temporary:
         np.savez_compressed(temporary, header=np.array(json.dumps(header, sort_keys=True)), **found)

@@ -49,18 +49,19 @@ def _images(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
 def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
     """Return the times of a scheme's network on one machine, in ms a sample, and its size.
 
-    settings: {seed, size, colour_map, network, training, augmentation}, as for a training; limit_s: seconds spent on
-    one figure. A batch that one call cannot do within the limit is left out (None); the training step takes the largest
-    power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at least.
+    settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
+    spent on one figure. A batch that one call cannot do within the limit is left out (None); the training step takes
+    the largest power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at
+    least.
     Where the settings compile, the training step is that of the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
-    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")
+    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block = recipe.check(settings["training"])
     recipe.seeded(settings["seed"], ("speed",), block["threads"])
     machine = Machine.here(block["precision"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
-    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes)
+    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes, len(settings["classes"]))
     layout = torch.channels_last if block["channels_last"] else torch.contiguous_format
     model, clock = model.to(machine.device, memory_format=layout), _clock(machine, block["threads"])
     times: dict[str, float | None] = {}
@@ -76,7 +77,10 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
     # Forward and backward cost about three times a forward.
     most = max(1.0, min(block["batch"], limit_s / 4 / (3 * one)))
     batch = 1 << int(np.log2(most))
-    images, labels = _images(batch, scheme, settings["size"]).to(machine.device), torch.arange(batch) % 4
+    images, labels = (
+        _images(batch, scheme, settings["size"]).to(machine.device),
+        torch.arange(batch) % len(settings["classes"]),
+    )
     labels, steps = labels.to(machine.device), recipe.optimiser(model, block)
     model.train()
     trained = torch.compile(model) if block["compile"] else model

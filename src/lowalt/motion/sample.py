@@ -10,11 +10,10 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from lowalt.common import portable
+from lowalt.common.classes import AIRBORNE
 from lowalt.common.errors import InputError
 from lowalt.motion.table import NUMBERS, PHASES, SCALE
 from lowalt.targets.cloud import Cloud, extent
-
-AIRBORNE = ("UAV", "Bird")
 
 
 def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
@@ -55,15 +54,23 @@ def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, cle
     raise InputError(f"motion: no place in the region is {clearance_m} m away from every mast")
 
 
+def heights(settings: dict, subtype: str, category: str, like: str) -> list[float]:
+    """Return lowest and highest flight (m) in `height_m`: of the subtype, of its class, or of what it is like."""
+    block = settings["height_m"]
+    return next(block[name] for name in (subtype, category, like) if name in block)
+
+
 def _rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
     """Fill in rate, phases and the place in a recording."""
-    if cloud.category == "Vehicle":
+    if cloud.like == "Vehicle":
         row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
-    elif cloud.category in AIRBORNE:
+    elif cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
         row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])
     moving = len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
     if moving > PHASES:
         raise InputError(f"motion of {cloud.subtype}: {moving} moving parts, expected at most {PHASES}")
+    if moving and math.isnan(row["rate_hz"]):
+        raise InputError(f"motion of {cloud.subtype}: the table of targets has no freq_lo_hz, expected a rate in hertz")
     for index in range(moving):
         row[f"phase_{index}_rad"] = rng.uniform(0.0, 2 * math.pi)
     if "node" in cloud.kinds:
@@ -83,7 +90,7 @@ def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float,
     low, high = map(float, portable.log(np.array([low_m, high_m])))
     scale = row[SCALE] = float(portable.exp(rng.uniform(low, high))) / extent(cloud)
     row["rate_hz"] /= scale
-    if cloud.category not in AIRBORNE:
+    if cloud.like not in AIRBORNE:
         row["z_m"] *= scale
 
 
@@ -108,8 +115,8 @@ def draw(
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     row["pitch_rad"] = row["roll_rad"] = 0.0
     speed = 0.0
-    if cloud.category in AIRBORNE:
-        row["z_m"] = rng.uniform(*settings["height_m"][cloud.category])
+    if cloud.like in AIRBORNE:
+        row["z_m"] = rng.uniform(*heights(settings, cloud.subtype, cloud.category, cloud.like))
         tilt = math.radians(settings["tilt_deg"])
         row["pitch_rad"], row["roll_rad"] = rng.uniform(-tilt, tilt), rng.uniform(-tilt, tilt)
         for axis in "xyz":

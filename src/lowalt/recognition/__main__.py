@@ -70,7 +70,8 @@ def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
 
 
 def _train(arguments: list[str]) -> None:
-    """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation."""
+    """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
+    classes."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
     from lowalt.recognition.samples import ViewSamples, first_models, joined_views
@@ -88,7 +89,7 @@ def _train(arguments: list[str]) -> None:
     for sums in given.frozen:
         verify(sums)
     scheme = named(given.schemes, given.scheme, given.stations)
-    pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation")
+    pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     settings = scheme.settled(given.settings)
     samples = {
         part: _open(given, folds(given.protocol, part), scheme, settings["size"], placed=False)
@@ -180,7 +181,7 @@ def _score(arguments: list[str]) -> None:
     from lowalt.recognition.score import score
 
     line = parser("lowalt.recognition score", _score.__doc__)
-    line.add_argument("--predictions", required=True, help="prediction file: key and four probabilities are enough")
+    line.add_argument("--predictions", required=True, help="prediction file: key and class probabilities are enough")
     line.add_argument("--index", required=True, help="index of the shards")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--out", required=True, help="scores to write (.json)")

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import stated
 from lowalt.common.command import parser, pick, run
 from lowalt.common.config import merge
 from lowalt.common.csv_tables import write_csv
@@ -28,7 +29,6 @@ from lowalt.recognition import predictions
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.statistics import accuracy_by, model_shares, strict_difference
-from lowalt.targets.cloud import CATEGORIES
 
 TABLE = "config/choices/default.yaml"
 PAIRS = folds("unseen", "train") | folds("unseen", "validation")
@@ -139,7 +139,7 @@ class Trial:
         lacking = {"candidate", "fold", "seed", "held", "train_processor_s"} - set(self.about)
         if lacking:
             raise InputError(f"{path}: its record lacks {sorted(lacking)}")
-        found = predictions.read(path)
+        found = predictions.read(path, stated(self.about))
         rows = np.argsort(found.key, kind="stable")
         held = np.isin(found.subtype, self.about["held"])[rows]
         self.held, self.kept = found.take(rows[held]), found.take(rows[~held])
@@ -196,9 +196,10 @@ def _subtypes(name: str, trials: list[Trial]) -> list[list]:
     for part in ("held", "kept"):
         found = [getattr(trial, part) for trial in trials]
         by_part.append(accuracy_by(*(np.concatenate([getattr(p, n) for p in found]) for n in ("subtype", "correct"))))
+    classes = stated(trials[0].about)
     labels = {s: int(label) for t in trials for s, label in zip(t.held.subtype.tolist(), t.held.label, strict=True)}
     return [
-        [name, CATEGORIES[label], subtype, *(f"{100 * table[subtype][0]:.2f}" for table in by_part)]
+        [name, classes[label], subtype, *(f"{100 * table[subtype][0]:.2f}" for table in by_part)]
         for subtype, label in sorted(labels.items(), key=lambda item: (item[1], item[0]))
     ]
 

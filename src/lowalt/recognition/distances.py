@@ -22,7 +22,7 @@ from scipy.spatial.distance import cdist
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.motion import positions
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 
 COLUMNS = (
     "category", "subtype", "group", "nearest", "distance", "size_ratio", "nearest_trained", "trained_distance",
@@ -85,7 +85,7 @@ def rows(clouds: list[Cloud], motion: list[dict]) -> list[list]:
         raise InputError(f"distances: no motion row of {lacking}")
     forms = {cloud.subtype: form(swept(cloud, first[cloud.subtype])) for cloud in clouds}
     found = []
-    for category in CATEGORIES:
+    for category in dict.fromkeys(cloud.category for cloud in clouds):
         names = sorted(cloud.subtype for cloud in clouds if cloud.category == category)
         apart = {(a, b): energy_distance(forms[a][0], forms[b][0]) for a in names for b in names if a < b}
         for name in names:

@@ -11,7 +11,7 @@ from lowalt.recognition.runs import Trained
 
 
 class Probabilities(nn.Module):
-    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B, 4)."""
+    """The network with its softmax: index images (B, views, size, size) uint8 -> probabilities (B, classes)."""
 
     def __init__(self, model: nn.Module) -> None:
         """model: a Recogniser in evaluation mode."""

@@ -62,14 +62,14 @@ class Machine:
 def probabilities(
     model: nn.Module, samples: ViewSamples, numbers: np.ndarray, machine: Machine, batch: int, mirror: bool = False
 ) -> np.ndarray:
-    """Return class probabilities (len(numbers), 4) float64 of the samples `numbers`.
+    """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
     mirror: average with the probabilities of the same images turned around along Doppler, which are those of the
     target seen from behind. Whole batches are dealt to the ranks, never parts of one, so that sums do not depend on the
     number of ranks.
     """
     model.eval()
-    result = torch.zeros(len(numbers), 4, dtype=torch.float64)
+    result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)
     for index, start in enumerate(range(0, len(numbers), batch)):
         if index % machine.ranks != machine.rank:
             continue

@@ -1,4 +1,4 @@
-"""The fusion network of the paper on any timm backbone: images of several stations and spectra to four classes.
+"""The fusion network of the paper on any timm backbone: images of several stations and spectra to classes.
 
 Axes of every tensor: B samples, K stations, V spectra of a station, then channels, rows, columns. The same code
 serves any subset of stations and spectra; a view is a (station, spectrum) pair, station-major.
@@ -26,9 +26,7 @@ from torch import nn
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import SPECTRA, Scheme
-from lowalt.targets.cloud import CATEGORIES
 
-CLASSES = len(CATEGORIES)
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
 
 
@@ -118,10 +116,11 @@ class MeanFusion(nn.Module):
 
 
 class Recogniser(nn.Module):
-    """Index images of a scheme's views to four logits: palettes, shared backbone, fusion, classifier."""
+    """Index images of a scheme's views to a logit for each class: palettes, shared backbone, fusion, classifier."""
 
-    def __init__(self, scheme: Scheme, block: dict, size: int, palettes: np.ndarray) -> None:
-        """scheme: views and fusion; block: `recognition.network`; size: pixels; palettes (3, 256, 3) uint8.
+    def __init__(self, scheme: Scheme, block: dict, size: int, palettes: np.ndarray, classes: int) -> None:
+        """scheme: views and fusion; block: `recognition.network`; size: pixels; palettes (3, 256, 3) uint8; classes:
+        their number.
 
         Raises: InputError for an unknown or missing key, a backbone timm does not have, or heads that do not fit.
         """
@@ -135,15 +134,15 @@ class Recogniser(nn.Module):
         pre = self.backbone.pretrained_cfg
         self.palettes = Palettes(palettes, scheme.spectra, pre["mean"], pre["std"])
         self.shape = (len(scheme.stations), len(scheme.spectra))
-        mean = scheme.fusion == "mean"
+        self.classes, mean = classes, scheme.fusion == "mean"
         self.fusion = MeanFusion() if mean else AttentionFusion(width, len(scheme.spectra), block)
         if block["hidden"]:
             self.classifier = nn.Sequential(
                 nn.Linear(width, block["hidden"]), nn.GELU(), nn.Dropout(block["dropout"]),
-                nn.Linear(block["hidden"], CLASSES),
+                nn.Linear(block["hidden"], classes),
             )  # fmt: skip
         else:
-            self.classifier = nn.Linear(width, CLASSES)
+            self.classifier = nn.Linear(width, classes)
 
     def tokens(self, index: torch.Tensor) -> torch.Tensor:
         """Index images (B, K * V, rows, columns) uint8 -> tokens (B, K, V, features)."""
@@ -155,9 +154,10 @@ class Recogniser(nn.Module):
         return features.view(samples, stations, spectra, -1)
 
     def forward(self, index: torch.Tensor, alone: bool = False) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
-        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, 4).
+        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, classes).
 
-        alone: return as well the logits (B * K, 4) of each station as if it were the only one; the backbone runs once.
+        alone: return as well the logits (B * K, classes) of each station as if it were the only one; the backbone runs
+        once.
         """
         tokens = self.tokens(index)
         logits = self.classifier(self.fusion(tokens))

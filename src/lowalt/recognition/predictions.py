@@ -6,7 +6,7 @@ from the data set. Probabilities are not negative and sum to one within 1e-3.
     key            the sample's key in the shards
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
     range_m        distance of the nearest station the model used, aspect_deg the aspect seen from it; may be empty
-    p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities
+    p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names and in the order of the classes
 """
 
 import csv
@@ -17,19 +17,24 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES, word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.recognition.samples import Facts
-from lowalt.targets.cloud import CATEGORIES
 
-CLASSES = tuple(f"p_{name.lower()}" for name in CATEGORIES)
-COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg", *CLASSES)
+COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")
+"""Columns before the class probabilities."""
+
+
+def probability_columns(classes: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the columns of class probabilities."""
+    return tuple(f"p_{word(name)}" for name in classes)
 
 
 @dataclass(frozen=True)
 class Predictions:
-    """Columns of a prediction file; `probabilities` (samples, 4), everything else (samples,)."""
+    """Columns of a prediction file; `probabilities` (samples, classes), everything else (samples,)."""
 
     key: np.ndarray
     subtype: np.ndarray
@@ -100,7 +105,7 @@ def _number(value: float) -> str:
     return "" if math.isnan(value) else repr(float(value))
 
 
-def write(path: str | Path, found: Predictions) -> None:
+def write(path: str | Path, found: Predictions, classes: tuple[str, ...] = CATEGORIES) -> None:
     """Write a prediction file; equal predictions give equal bytes."""
     rows = (
         [
@@ -110,25 +115,25 @@ def write(path: str | Path, found: Predictions) -> None:
         ]
         for row in range(len(found))
     )  # fmt: skip
-    write_csv(path, COLUMNS, rows)
+    write_csv(path, (*COLUMNS, *probability_columns(classes)), rows)
 
 
-def read(path: str | Path) -> Predictions:
-    """Read and check a prediction file.
+def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions:
+    """Read and check a prediction file of these classes.
 
     Raises: InputError naming the file, the line and what is wrong.
     """
-    rows = []
+    rows, shares = [], probability_columns(classes)
     with existing(path, "predictions").open(newline="") as file:
         reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != COLUMNS:
-            raise InputError(f"{path}: columns {reader.fieldnames}, expected {list(COLUMNS)}")
+        if tuple(reader.fieldnames or ()) != (*COLUMNS, *shares):
+            raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *shares]}")
         for line, row in enumerate(reader, start=2):
             try:
                 rows.append((
                     row["key"], row["subtype"], row["group"], row["fold"], int(row["model"]), float(row["snr_db"]),
                     int(row["label"]), float(row["range_m"] or "nan"), float(row["aspect_deg"] or "nan"),
-                    [float(row[name]) for name in CLASSES],
+                    [float(row[name]) for name in shares],
                 ))  # fmt: skip
             except (TypeError, ValueError) as error:
                 raise InputError(f"{path} line {line}: {error}") from error
@@ -140,7 +145,9 @@ def read(path: str | Path) -> Predictions:
     bad = ~((found.probabilities >= 0).all(1) & (np.abs(sums - 1) <= 1e-3))
     if bad.any():
         line = int(np.argmax(bad))
-        raise InputError(f"{path} line {line + 2}: probabilities {rows[line][-1]}, expected four >= 0 with sum 1")
+        raise InputError(
+            f"{path} line {line + 2}: probabilities {rows[line][-1]}, expected {len(classes)} >= 0 with sum 1"
+        )
     if len(np.unique(found.key)) != len(found):
         raise InputError(f"{path}: a key stands twice, expected one row a sample")
     return found

@@ -14,6 +14,7 @@ import numpy as np
 import timm
 import torch
 
+from lowalt.common.classes import stated
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
@@ -24,7 +25,6 @@ from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import SPECTRA, Scheme
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles import colour_map, resize
 
 Samples = ViewSamples | ShardSamples
@@ -35,12 +35,15 @@ def train(
 ) -> None:
     """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
 
-    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training, augmentation};
-    events: whether to write the metrics for TensorBoard too, into `events/` of the folder.
+    samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training,
+    augmentation, classes}, the classes by label; events: whether to write the metrics for TensorBoard too,
+    into `events/` of the folder.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
-    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation")
-    block = recipe.check(settings["training"])
+    pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
+    block, classes = recipe.check(settings["training"]), settings["classes"]
+    if len(classes) < 2:
+        raise InputError(f"training: classes {classes}, expected two or more to tell apart")
     augment.check(settings["augmentation"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
     machine = Machine.here(block["precision"])
@@ -52,7 +55,7 @@ def train(
     )  # fmt: skip
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
-    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes)
+    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes, len(classes))
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
     resumed = trainer.resume()
     if resumed and machine.rank == 0:
@@ -64,7 +67,7 @@ def train(
     seconds, busy = time.monotonic() - start, time.process_time() - busy
     trainer.finish({
         "scheme": asdict(scheme), "protocol": protocol, "network": settings["network"], "size": settings["size"],
-        "seed": settings["seed"], "colour_map": settings["colour_map"],
+        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes),
     })  # fmt: skip
     if machine.rank == 0:
         _record(folder / "run.json", {
@@ -76,7 +79,7 @@ def train(
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
             "precision": machine.precision,
             "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
-            "torch": torch.__version__, "timm": timm.__version__,
+            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes),
         })  # fmt: skip
 
 
@@ -95,6 +98,7 @@ class Trained:
     size: int
     seed: int
     path: Path
+    classes: tuple[str, ...]
 
 
 def load(path: str | Path) -> Trained:
@@ -107,11 +111,11 @@ def load(path: str | Path) -> Trained:
         block = {**state["network"], "weights": "none"}
         scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
         palettes = np.stack([colour_map(state["colour_map"])] * len(SPECTRA))
-        model = network.Recogniser(scheme, block, state["size"], palettes)
+        model = network.Recogniser(scheme, block, state["size"], palettes, len(stated(state)))
         model.load_state_dict(state["weights"])
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
-    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path))
+    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
 
 
 def check_size(samples: Samples, size: int) -> None:
@@ -141,13 +145,14 @@ def evaluate(
     seconds = time.monotonic() - start
     if machine.rank:
         return
-    predictions.write(out, predictions.from_facts(samples.facts, trained.scheme.stations, found))
+    told = predictions.from_facts(samples.facts, trained.scheme.stations, found)
+    predictions.write(out, told, trained.classes)
     side = trained.path.with_name("run.json")
     known = json.loads(side.read_text()) if side.exists() else {}
     _record(Path(out).with_suffix(".json"), {
         **known, "protocol": trained.protocol, "scheme": trained.scheme.name, "seed": trained.seed,
         "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
-        "trained_on": trained_on, "mirror": mirror, **(more or {}),
+        "trained_on": trained_on, "mirror": mirror, "classes": list(trained.classes), **(more or {}),
     })  # fmt: skip
 
 
@@ -184,4 +189,4 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     views = resize(images, trained.size)[trained.scheme.columns]
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]
-    return dict(zip(CATEGORIES, found.tolist(), strict=True))
+    return dict(zip(trained.classes, found.tolist(), strict=True))

@@ -7,27 +7,27 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
-from lowalt.recognition.predictions import CLASSES
+from lowalt.recognition.predictions import probability_columns
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 
 
-def _probabilities(path: str | Path) -> dict[str, list[float]]:
+def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
     with existing(path, "predictions").open(newline="") as file:
         reader = csv.DictReader(file)
-        missing = {"key", *CLASSES} - set(reader.fieldnames or ())
+        missing = {"key", *columns} - set(reader.fieldnames or ())
         if missing:
             raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
         for line, row in enumerate(reader, start=2):
             try:
-                values = [float(row[name]) for name in CLASSES]
+                values = [float(row[name]) for name in columns]
             except (TypeError, ValueError) as error:
                 raise InputError(f"{path} line {line}: {error}") from error
             if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
-                raise InputError(f"{path} line {line}: probabilities {values}, expected four >= 0 with sum 1")
+                raise InputError(f"{path} line {line}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
             if row["key"] in found:
                 raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
             found[row["key"]] = values
@@ -37,13 +37,14 @@ def _probabilities(path: str | Path) -> dict[str, list[float]]:
 def score(path: str | Path, index: str | Path, protocol: str) -> dict:
     """Return accuracies, confusion and calibration of a prediction file on a protocol's test part.
 
-    The file needs the columns `key` and the four probabilities; rows of other samples are ignored.
+    The file needs the columns `key` and a probability for each class of the data set. Rows of other samples are
+    ignored.
     Raises: InputError where a test sample has no prediction, or a row is malformed.
     """
     pairs = folds(protocol, "test")
     shards = ShardSet(index, sorted({group for group, _ in pairs}), sorted({fold for _, fold in pairs}), check=False)
     facts = facts_of(shards, np.arange(len(shards)), placed=False)
-    given = _probabilities(path)
+    given = _probabilities(path, probability_columns(shards.classes))
     missing = [key for key in facts.key.tolist() if key not in given]
     if missing:
         raise InputError(f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}")
@@ -56,6 +57,6 @@ def score(path: str | Path, index: str | Path, protocol: str) -> dict:
         "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
         "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
         "by_subtype_percent": {name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()},
-        "confusion": confusion(facts.label, probabilities.argmax(1)).tolist(),
+        "confusion": confusion(facts.label, probabilities.argmax(1), len(shards.classes)).tolist(),
         **calibration(probabilities, facts.label),
     }

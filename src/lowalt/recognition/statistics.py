@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.targets.cloud import CATEGORIES
-
-CLASSES = len(CATEGORIES)
-UAV = CATEGORIES.index("UAV")
+LOOKED_FOR = 0
+"""Label of the class whose detection and false alarms are counted: the first, of the default the UAVs."""
 FEWEST_MISSED = 10
-"""UAVs of the validation samples that a threshold must leave undetected: their number varies by a third then."""
+"""Validation samples of the class looked for that a threshold must leave undetected: their number varies by a
+third then."""
 
 
 class AlarmPart(NamedTuple):
-    """What false alarms are counted from, each (samples,): UAV probability, class, motion model, subtype."""
+    """What false alarms are counted from, each (samples,): probability of the class looked for, label, motion model,
+    subtype."""
 
     scores: np.ndarray
     labels: np.ndarray
@@ -40,9 +40,9 @@ def accuracy_by(groups: np.ndarray, correct: np.ndarray) -> dict:
     return {name.item(): (float(h / n), int(n)) for name, h, n in zip(names, hits, count, strict=True)}
 
 
-def confusion(labels: np.ndarray, guesses: np.ndarray) -> np.ndarray:
-    """Counts (4, 4), true class by row, guessed class by column."""
-    return np.bincount(labels * CLASSES + guesses, minlength=CLASSES**2).reshape(CLASSES, CLASSES)
+def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarray:
+    """Counts (classes, classes), true class by row, guessed class by column."""
+    return np.bincount(labels * classes + guesses, minlength=classes**2).reshape(classes, classes)
 
 
 class Interval(NamedTuple):
@@ -167,26 +167,27 @@ def reliability(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
 
 
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
-    """Largest threshold on the UAV probability at which at least `detection` of the UAVs are called UAV.
+    """Largest threshold on the probability of the class looked for at which at least `detection` of it is detected.
 
-    scores (samples,), labels (samples,); a sample is called UAV where its score is at least the threshold. To be set on
+    scores (samples,), labels (samples,); a sample is detected where its score is at least the threshold. To be set on
     validation samples, never on those it is then judged by.
     """
-    uavs = np.sort(scores[labels == UAV])[::-1]
-    needed = int(np.ceil(detection * len(uavs) - 1e-9))
-    return float(uavs[max(needed, 1) - 1])
+    wanted = np.sort(scores[labels == LOOKED_FOR])[::-1]
+    needed = int(np.ceil(detection * len(wanted) - 1e-9))
+    return float(wanted[max(needed, 1) - 1])
 
 
 def measurable(labels: np.ndarray, detection: float) -> bool:
-    """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` UAVs lie below it.
+    """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` samples of the
+    class looked for lie below it.
 
     labels (samples,) of the validation samples. With fewer the threshold is the score of a handful of them.
     """
-    return (1 - detection) * np.sum(labels == UAV) >= FEWEST_MISSED - 1e-9
+    return (1 - detection) * np.sum(labels == LOOKED_FOR) >= FEWEST_MISSED - 1e-9
 
 
 def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: float) -> float:
-    """`threshold` of UAV scores (n,) of which the i-th stands weights[i] times."""
+    """`threshold` of scores (n,) of which the i-th stands weights[i] times."""
     order = np.argsort(-scores, kind="stable")
     reached = np.cumsum(weights[order])
     return float(scores[order][np.searchsorted(reached, detection * reached[-1] - 1e-9)])
@@ -194,9 +195,9 @@ def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: floa
 
 def alarm_intervals(
     validation: list["AlarmPart"], test: list["AlarmPart"], detection: float, whole_subtypes: bool,
-    generator: np.random.Generator, repeats: int = 400,
+    generator: np.random.Generator, classes: int, repeats: int = 400,
 ) -> np.ndarray:  # fmt: skip
-    """Bounds (4, 2) of the 95 % intervals of detection and of the false alarm rates of birds, vehicles, pedestrians.
+    """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the other classes.
 
     validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
     models of both parts and, where `whole_subtypes`, subtypes of the test part; thresholds are set on what it draws.
@@ -208,28 +209,28 @@ def alarm_intervals(
         return _model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
 
     judged, set_on = sample_weights(test[0], whole_subtypes), sample_weights(validation[0], False)
-    uavs = validation[0].labels == UAV
-    of_class = [test[0].labels == label for label in range(CLASSES)]
+    wanted = validation[0].labels == LOOKED_FOR
+    of_class = [test[0].labels == label for label in range(classes)]
     drawn = generator.integers(0, len(test), (repeats, len(test)))
-    found = np.full((repeats, CLASSES), np.nan)
+    found = np.full((repeats, classes), np.nan)
     for repeat in range(repeats):
         rates = []
         for seed in drawn[repeat]:
-            level = _weighted_threshold(validation[seed].scores[uavs], set_on[repeat, uavs], detection)
+            level = _weighted_threshold(validation[seed].scores[wanted], set_on[repeat, wanted], detection)
             called = test[seed].scores >= level
             totals = [judged[repeat, mine].sum() for mine in of_class]
             hits = [judged[repeat, mine] @ called[mine] for mine in of_class]
             rates.append([hit / total if total else np.nan for hit, total in zip(hits, totals, strict=True)])
         found[repeat] = np.mean(rates, axis=0)
     kept = found[~np.isnan(found).any(1)]
-    return np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((CLASSES, 2), np.nan)
+    return np.quantile(kept, [0.025, 0.975], axis=0).T if len(kept) else np.full((classes, 2), np.nan)
 
 
-def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float) -> tuple[float, np.ndarray]:
-    """UAV detection rate at a threshold, and the false alarm rates (3,) of birds, vehicles and pedestrians."""
+def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float, classes: int) -> tuple[float, np.ndarray]:
+    """Detection rate at a threshold, and the false alarm rates (classes - 1,) of the other classes."""
     called = scores >= level
-    return float(called[labels == UAV].mean()), np.array(
-        [called[labels == other].mean() if (labels == other).any() else np.nan for other in range(1, CLASSES)]
+    return float(called[labels == LOOKED_FOR].mean()), np.array(
+        [called[labels == other].mean() if (labels == other).any() else np.nan for other in range(1, classes)]
     )
 
 

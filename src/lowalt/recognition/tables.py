@@ -9,9 +9,9 @@ Files written, each with the columns `protocol, scheme` first:
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples
     aspects.csv      band of the aspect seen from that station, accuracy_percent, samples
-    alarms.csv       UAV detection asked for, its threshold (set on validation), detection and false alarms on test with
-                     95 % intervals; each model at its own threshold, means over the seeds; "not measurable" where
-                     fewer than ten validation samples would lie below the threshold
+    alarms.csv       detection of the first class asked for, its threshold (set on validation), detection and false
+                     alarms of the other classes on test with 95 % intervals; each model at its own threshold, means
+                     over the seeds; "not measurable" where fewer than ten validation samples would lie below it
     calibration.csv  calibration error, Brier score, cross entropy on test, means over the seeds
     reliability.csv  band of confidence: mean confidence, accuracy and samples in it; all seeds together
     comparisons.csv  over: the scheme compared with; difference with its 95 % interval, and what the interval resamples:
@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import stated, word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
@@ -35,6 +36,7 @@ from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import (
+    LOOKED_FOR,
     AlarmPart,
     accuracy_by,
     alarm_intervals,
@@ -47,7 +49,6 @@ from lowalt.recognition.statistics import (
     strict_difference,
     threshold,
 )
-from lowalt.targets.cloud import CATEGORIES
 
 DETECTIONS = (0.9, 0.95, 0.99)
 TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
@@ -68,9 +69,10 @@ class Run:
             self.about = about = json.loads(side.read_text())
             self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
             self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
+            self.classes = stated(about)
         except (ValueError, KeyError, TypeError) as error:
             raise InputError(f"{side}: not a run record ({error!r})") from error
-        self.all = predictions.read(path)
+        self.all = predictions.read(path, self.classes)
         self.test = self.part("test")
         if not len(self.test):
             raise InputError(f"{path}: no predictions for the test part of the {self.protocol} protocol")
@@ -113,19 +115,20 @@ def seed_rows(runs: list[Run]) -> Iterable[list]:
 
 def confusion_rows(runs: list[Run]) -> Iterable[list]:
     """Yield rows [category, predicted, samples], summed over the seeds."""
-    counts = sum(confusion(run.test.label, run.test.guesses) for run in runs)
-    for true, name in enumerate(CATEGORIES):
-        for guess, other in enumerate(CATEGORIES):
+    classes = runs[0].classes
+    counts = sum(confusion(run.test.label, run.test.guesses, len(classes)) for run in runs)
+    for true, name in enumerate(classes):
+        for guess, other in enumerate(classes):
             yield [name, other, counts[true, guess]]
 
 
 def subtype_rows(runs: list[Run]) -> Iterable[list]:
     """Yield rows [category, subtype, accuracy_percent, samples], the worst of each category first."""
-    test = runs[0].test
-    category = {name: CATEGORIES[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
+    test, classes = runs[0].test, runs[0].classes
+    category = {name: classes[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
     correct = np.mean([run.test.correct for run in runs], axis=0)
     table = accuracy_by(test.subtype, correct)
-    for name in sorted(table, key=lambda name: (CATEGORIES.index(category[name]), table[name][0], name)):
+    for name in sorted(table, key=lambda name: (classes.index(category[name]), table[name][0], name)):
         yield [category[name], name, _percent(table[name][0]), table[name][1]]
 
 
@@ -140,29 +143,30 @@ def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], widt
 
 
 def _alarm_part(found: Predictions) -> AlarmPart:
-    return AlarmPart(found.probabilities[:, 0], found.label, found.motion, found.subtype)
+    return AlarmPart(found.probabilities[:, LOOKED_FOR], found.label, found.motion, found.subtype)
 
 
 def alarm_rows(runs: list[Run], seed: int) -> Iterable[list]:
-    """Yield rows [asked, threshold, rate, low, high, ...]: detection, then false alarms of bird, vehicle, pedestrian.
+    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false alarms of others.
 
     In percent, with 95 % intervals; thresholds come from validation samples. A detection that too few validation
     samples can set a threshold for is "not measurable".
     """
+    classes = len(runs[0].classes)
     validations = [_alarm_part(run.part("validation")) for run in runs]
     tests = [_alarm_part(run.test) for run in runs]
-    for asked in DETECTIONS if all((found.labels == 0).any() for found in validations) else ():
+    for asked in DETECTIONS if all((found.labels == LOOKED_FOR).any() for found in validations) else ():
         if not measurable(validations[0].labels, asked):
-            yield [_percent(asked), *["not measurable"] * (1 + 3 * len(CATEGORIES))]
+            yield [_percent(asked), *["not measurable"] * (1 + 3 * classes)]
             continue
         levels = [threshold(found.scores, found.labels, asked) for found in validations]
         rates = []
         for found, level in zip(tests, levels, strict=True):
-            detected, alarms = alarm_rates(found.scores, found.labels, level)
+            detected, alarms = alarm_rates(found.scores, found.labels, level, classes)
             rates.append([detected, *alarms])
         whole = runs[0].protocol == "unseen"
         generator = stream(seed, "alarms", runs[0].protocol, runs[0].scheme, asked)
-        bounds = alarm_intervals(validations, tests, asked, whole, generator)
+        bounds = alarm_intervals(validations, tests, asked, whole, generator, classes)
         cells = [[_percent(rate), *map(_percent, pair)] for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)]
         yield [_percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
 
@@ -203,11 +207,19 @@ def _write(path: Path, columns: list[str], rows: list[list]) -> None:
     write_csv(path, ["protocol", "scheme", *columns], rows)
 
 
+def _one_set(runs: list[Run]) -> tuple[str, ...]:
+    """The classes of all runs; refuses runs of several sets."""
+    found = sorted({run.classes for run in runs})
+    if len(found) != 1:
+        raise InputError(f"predictions of the classes {' and '.join(map(str, found))}, expected one set of classes")
+    return found[0]
+
+
 def write(runs: list[Run], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
     """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
 
     published: as `orderings.read_published` gives it; seed: of the bootstrap.
-    Raises: InputError for a scheme outside `order` or the same run twice.
+    Raises: InputError for a scheme outside `order`, the same run twice, or runs with different classes.
     """
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
@@ -221,7 +233,7 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
     share = ["accuracy_percent", "samples"]
     measured = ["snr_db", *share, "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
-    rates = ("detected", "bird", "vehicle", "pedestrian")
+    rates = ("detected", *map(word, _one_set(runs)[1:]))
     alarm = ["asked_percent", "threshold", *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high"))]
     tables = {
         "accuracy": (measured, lambda group: accuracy_rows(group, "test")),

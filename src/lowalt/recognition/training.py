@@ -98,16 +98,18 @@ class Trainer:
     def __init__(self, model, samples, columns, settings, keys, name, folder, machine: Machine) -> None:
         """model: a Recogniser; samples: {"train": ..., "validation": ...} sources; columns: views of the scheme.
 
-        settings: {"seed", "training", "augmentation"}; keys: what names the run's random streams; name: the run's
-        identity, which its checkpoints carry; folder: where its files go.
+        settings: {"seed", "training", "augmentation", "classes"}; keys: what names the run's random streams; name: the
+        run's identity, which its checkpoints carry; folder: where its files go.
         """
         self.block = check(settings["training"])
         self.augmentation, self.seed = settings["augmentation"], settings["seed"]
         self.train, self.validation = samples["train"], samples["validation"]
         self.columns, self.keys, self.name, self.folder, self.machine = columns, keys, name, Path(folder), machine
-        missing = set(range(4)) - set(np.unique(self.train.facts.label).tolist())
+        classes = settings["classes"]
+        missing = set(range(len(classes))) - set(np.unique(self.train.facts.label).tolist())
         if missing:
-            raise InputError(f"training: no training sample of class {sorted(missing)}, expected all of 0..3")
+            names = [classes[label] for label in sorted(missing)]
+            raise InputError(f"training: no training sample of {names}, expected some of each class")
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
         self.model = shared.to(machine.device, memory_format=layout)

@@ -52,6 +52,8 @@ def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterab
     """
     test = own[0].test
     for run in (*own, *other):
+        if run.classes != own[0].classes:
+            raise InputError(f"transfer: {name} has the classes {run.classes}, expected {own[0].classes} as this run")
         if not np.array_equal(run.test.key, test.key):
             raise InputError(f"transfer: {run.scheme} of {name} was tested on other samples than this run's own")
     mine, theirs = (np.mean([run.test.correct for run in runs], axis=0) for runs in (own, other))

@@ -42,11 +42,11 @@ def trial(
 ) -> None:
     """Train a candidate in one fold and write `predictions.csv` and its record into the folder `out`.
 
-    settings: {seed, colour_map} and BLOCKS, as the configuration has them; views, extra: cache files of the candidate's
-    size, the latter of other runs whose samples are trained on too; held-out subtypes are left out of them.
+    settings: {seed, colour_map, classes} and BLOCKS, as the configuration has them; views, extra: cache files of the
+    candidate's size, the latter of other runs whose samples are trained on too; held-out subtypes are left out of them.
     Raises: InputError for an unknown candidate or fold, and as a training does.
     """
-    seed, colour_map, *_ = pick(settings, "seed", "colour_map", *BLOCKS)
+    seed, colour_map, classes, *_ = pick(settings, "seed", "colour_map", "classes", *BLOCKS)
     name = choices.named(candidate)
     block = choose.settled({key: settings[key] for key in BLOCKS}, choices.changes(name))
     source = ViewSamples(views, scheme.columns, choose.PAIRS)
@@ -59,14 +59,15 @@ def trial(
         parts["train"] = joined_views(parts["train"], more)
     evaluation = block.pop("evaluation")
     given = {"train": parts["train"], "validation": parts["validation"]}
-    runs.train(given, scheme, f"without fold {fold}", {"seed": seed, "colour_map": colour_map, **block}, out)
+    block |= {"seed": seed, "colour_map": colour_map, "classes": classes}
+    runs.train(given, scheme, f"without fold {fold}", block, out)
     asked = joined(parts["held"], parts["validation"])
     about = {"candidate": name, "fold": fold, "held": held}
     runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
 
 
 def main(arguments: list[str]) -> None:
-    """Try one candidate. Settings: seed, colour_map, size, network, training, augmentation, evaluation."""
+    """Try one candidate. Settings: seed, colour_map, classes, size, network, training, augmentation, evaluation."""
     line = parser("lowalt.recognition.trial", main.__doc__)
     line.add_argument(
         "--views", nargs="+", required=True, help="caches of views (.npz): group seen, folds train and val"

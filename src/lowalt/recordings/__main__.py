@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.command import run
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
@@ -18,7 +19,6 @@ from lowalt.recordings.pairs import pair_of
 from lowalt.recordings.recognise import settings
 from lowalt.recordings.record import read_record
 from lowalt.recordings.sets import at_carrier, present, recordings
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.targets.records import load_records
 
 FOLDER = "config/measured"

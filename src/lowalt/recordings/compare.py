@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import wasserstein_distance
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.common.streams import stream
 from lowalt.recordings.channel import symbol_rate
@@ -22,7 +23,6 @@ from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import simulated_stretch
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals
 from lowalt.recordings.twin import Twin
-from lowalt.targets.cloud import CATEGORIES
 
 FIGURES = (
     "pair", "set", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "scenes", "before",

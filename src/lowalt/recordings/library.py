@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.recordings.scenes import clouds_of, intervals
 from lowalt.recordings.twin import Twin
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import load_records
 
 

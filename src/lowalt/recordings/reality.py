@@ -7,11 +7,11 @@ measured-accuracy.csv: share of right windows of each class in each half, mean o
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.streams import stream
 from lowalt.recordings.library import Library
 from lowalt.recordings.recognise import Windows, facts, guesses, rendered, simulated, train
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles.settings import Images
 
 RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")

@@ -9,13 +9,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load_yaml, merge
 from lowalt.common.errors import InputError
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import named
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles.render import VIEWS, Renderer, split
 from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
@@ -90,7 +90,9 @@ def recogniser(block: dict):
 
     scheme = named(block["table"], block["scheme"], ["A"])
     palette = Images.from_settings(block["images"]).palette
-    return Recogniser(scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS))), scheme
+    return Recogniser(
+        scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS)), len(CATEGORIES)
+    ), scheme
 
 
 def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path):
@@ -107,7 +109,7 @@ def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder
     seeded(block["seed"], keys, block["training"]["threads"])
     model, scheme = recogniser(block)
     Path(folder).mkdir(parents=True, exist_ok=True)
-    own = {key: block[key] for key in ("seed", "training", "augmentation")}
+    own = {key: block[key] for key in ("seed", "training", "augmentation")} | {"classes": CATEGORIES}
     machine, run = Machine.here(block["training"]["precision"]), identity(twin=name, seed=seed, settings=block)
     trainer = Trainer(model, windows, scheme.columns, own, keys, run, folder, machine)
     trainer.fit()

@@ -18,9 +18,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.targets.cloud import CATEGORIES
 
 CHANNELS = ("complex", "real")
 MOVES = ("towards", "away")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
@@ -17,7 +18,6 @@ from lowalt.recordings.twin import Twin
 from lowalt.shards.index import build
 from lowalt.shards.write import write_shard
 from lowalt.spectra import trp, vrp, vt
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
+from lowalt.common.classes import stated
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
@@ -33,6 +34,7 @@ def write(arguments: list[str]) -> None:
     options.add_argument("--fold", required=True, help="train, val or test")
     options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz beside it")
     given = options.parse_args(arguments)
+    classes = _classes(given.settings)
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
     (kind,) = pick(shards, "kind")
     if kind not in KINDS:
@@ -42,21 +44,30 @@ def write(arguments: list[str]) -> None:
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:
         content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
-    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, powers)
+    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, classes, powers)
+
+
+def _classes(settings: dict) -> tuple[str, ...]:
+    """Take the classes out of the settings of a command: the published ones where they do not stand there."""
+    found = stated(settings)
+    settings.pop("classes", None)
+    return found
 
 
 def index(arguments: list[str]) -> None:
     """Write the index of shards.
 
-    Settings: network, spectra, images (how a loader renders signals), and echo {tolerance, effects} where it is known.
+    Settings: network, spectra, images (how a loader renders signals), echo {tolerance, effects} where it is known, and
+    the classes in the order of their labels where they are not the published ones.
     """
     options = parser("lowalt.shards index", "List shards with counts and checksums.")
     options.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables beside them")
     options.add_argument("--out", required=True, help="index to write (.json)")
     given = options.parse_args(arguments)
     echo = given.settings.pop("echo", None)
+    classes = _classes(given.settings)
     pick(given.settings, "network", "spectra", "images")
-    build(given.shards, given.settings, given.out, echo)
+    build(given.shards, given.settings, given.out, echo, classes)
 
 
 def _clouds_option(options: argparse.ArgumentParser) -> None:

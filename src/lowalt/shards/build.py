@@ -38,7 +38,7 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
         written += write_chunk(dataset, folder, chunk, kind)
         print(f"{chunk}: written", file=sys.stderr)
     render = {key: dataset.config[key] for key in ("network", "spectra", "images")}
-    return build(written, render, folder / "shards" / "index.json", dataset.maker.echo)
+    return build(written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes)
 
 
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
@@ -67,7 +67,8 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     paths = []
     for name in plan.folds(chunk):
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
-        write_shard(paths[-1], rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content, powers)
+        given = (rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
+        write_shard(paths[-1], *given, dataset.classes, powers)
     return paths
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import yaml
 
 from lowalt import __version__
+from lowalt.common.classes import plural
 from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
@@ -103,7 +104,7 @@ def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
     stations = station_names(shards.index["render"]["network"])
     return (
-        f"Simulated echoes of low-altitude targets (UAVs, birds, vehicles, pedestrians) at the base stations "
+        f"Simulated echoes of low-altitude targets ({', '.join(map(plural, shards.classes))}) at the base stations "
         f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {WHAT[shards.kind]}, "
         "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
         "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."

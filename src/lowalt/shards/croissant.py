@@ -3,8 +3,8 @@
 Source: Croissant format specification 1.1 (MLCommons).
 """
 
+from lowalt.common.classes import stated
 from lowalt.shards.table import EXTENSIONS
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles import VIEWS
 
 CONTEXT = {
@@ -54,7 +54,7 @@ CONTEXT = {
 
 FIELDS = {
     "key": ("sc:Text", "Unique name of the sample: subtype, motion model, SNR."),
-    "label": ("sc:Integer", f"Class: {', '.join(f'{n} {name}' for n, name in enumerate(CATEGORIES))}."),
+    "label": ("sc:Integer", "Class: {}."),
     "category": ("sc:Text", "The class by name."),
     "subtype": ("sc:Text", "Published name of the target's subtype."),
     "group": ("sc:Text", "Whether the unseen protocol trains on the subtype (seen) or only tests on it (unseen)."),
@@ -63,7 +63,7 @@ FIELDS = {
     "snr_db": ("sc:Float", "Signal-to-noise ratio in dB, or inf."),
     "shard": ("sc:Text", "Shard that holds the sample's members KEY.json and its image or signal."),
 }
-"""Columns of the table of all samples: data type and meaning."""
+"""Columns of the table of all samples: data type and meaning; the label's meaning names the classes."""
 
 MEDIA = {
     "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns VRP, TRP, VT."),
@@ -113,7 +113,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "isLiveDataset": False,
         "distribution": files + sets,
-        "recordSet": [_samples(table["path"]), _media(kind, data_type, meaning)],
+        "recordSet": [_samples(table["path"], stated(index)), _media(kind, data_type, meaning)],
     }
 
 
@@ -131,11 +131,13 @@ def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str)
     }  # fmt: skip
 
 
-def _samples(path: str) -> dict:
+def _samples(path: str, classes: tuple[str, ...]) -> dict:
     """One row a sample, from the table."""
+    named = ", ".join(f"{number} {name}" for number, name in enumerate(classes))
     fields = [
         {
-            "@type": "cr:Field", "@id": f"samples/{name}", "name": name, "description": meaning, "dataType": kind,
+            "@type": "cr:Field", "@id": f"samples/{name}", "name": name,
+            "description": meaning.format(named), "dataType": kind,
             "source": {"fileObject": {"@id": path}, "extract": {"column": name}},
         }
         for name, (kind, meaning) in FIELDS.items()

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.classes import classes_of, label
 from lowalt.common.errors import InputError
 from lowalt.common.plan import GROUPS, Plan
 from lowalt.common.splits import FOLDS, fold
@@ -23,7 +24,7 @@ from lowalt.shards.maker import Maker
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.remake import CloudFolder
 from lowalt.shards.write import npy
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import load_records
 
 
@@ -72,8 +73,8 @@ class Dataset:
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
         that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
-        surfaces, where the scene hides points behind them; published: each subtype's row of the published table, by
-        default from the records.
+        surfaces, where the scene hides points behind them; published: every row of the table of targets by subtype,
+        by default from the records; the classes follow from it.
         Raises: InputError naming the key, value or file that is wrong.
         """
         config = load_yaml(config) if isinstance(config, (str, Path)) else config
@@ -82,6 +83,7 @@ class Dataset:
         if published is None or clouds is None:
             records = load_records(config["targets"]["table"], config["targets"]["records"])
         self.published = published or {name: item["published"] for name, item in records.items()}
+        self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)
         for what, given, known in (("group", tuple(groups), GROUPS), ("fold", self.folds, FOLDS)):
             if set(given) - set(known):
@@ -151,7 +153,8 @@ class Dataset:
 
     def made_record(self, place: Place) -> bytes:
         """Return the JSON record of a sample."""
-        return record(self.row(place), place.snr_db, self._fold(place), self.plan.seed, self.maker.network)
+        row, told = self.row(place), self._fold(place)
+        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes)
 
     def made(self, place: Place) -> Sample:
         """Return a sample by its group, subtype, motion model and SNR.
@@ -171,8 +174,8 @@ class Dataset:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels 0 .. 3 of all samples, (n,) int64; nothing is made for them."""
-        numbers = {name: CATEGORIES.index(item["category"]) for name, item in self.published.items()}
+        """Labels of all samples, (n,) int64, places among `classes`; nothing is made for them."""
+        numbers = {name: label(self.classes, item | {"subtype": name}) for name, item in self.published.items()}
         return np.array([numbers[self.place(number).subtype] for number in range(len(self))], np.int64)
 
     def signal(self, number: int) -> np.ndarray:

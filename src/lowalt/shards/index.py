@@ -8,6 +8,7 @@ import hashlib
 import json
 from pathlib import Path
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
 from lowalt.shards.table import read_header, table_path
@@ -17,12 +18,16 @@ READABLE = ("lowalt-shards-1", FORMAT)
 """Formats that are read; records of the first have nulls, an SNR of \"inf\", and its signals are complex64."""
 
 
-def build(shards: list[str | Path], render: dict, out: str | Path, echo: dict | None = None) -> dict:
+def build(
+    shards: list[str | Path], render: dict, out: str | Path, echo: dict | None = None,
+    classes: tuple[str, ...] = CATEGORIES,
+) -> dict:  # fmt: skip
     """Write the index of these shards to `out` and return it.
 
     render: the settings that turn signals into tiles ({network, spectra, images}); echo: those that turn motion into
-    echoes ({tolerance, effects}), without which no sample can be made again. Paths in the index are relative to its
-    folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
+    echoes ({tolerance, effects}), without which no sample can be made again; classes: in the order
+    of their labels; the index states them where they are not the published ones. Paths in the index are relative
+    to its folder. Raises: InputError where a table is missing, a name stands twice or the kinds differ.
     """
     entries = []
     for shard in map(Path, shards):
@@ -46,6 +51,8 @@ def build(shards: list[str | Path], render: dict, out: str | Path, echo: dict | 
         "echo": echo,
         "shards": sorted(entries, key=lambda entry: entry["name"]),
     }
+    if classes != CATEGORIES:
+        index["classes"] = list(classes)
     index["sha256"] = _checksum(index)
     with replacing(out) as temporary:
         temporary.write_text(json.dumps(index, indent=1, sort_keys=True) + "\n")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import stated
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, sha256
 from lowalt.common.network import Network, station_names
@@ -46,7 +47,7 @@ class ShardSet:
             if set(given) - set(known):
                 raise InputError(f"{what}s {given}, expected some of {known}")
         self.index = load(index_path)
-        self.kind = self.index["kind"]
+        self.kind, self.classes = self.index["kind"], stated(self.index)
         self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
         self._ends = np.cumsum([0, *(shard["samples"] for shard in self.shards)])
         self._tables: dict[int, np.ndarray] = {}
@@ -120,7 +121,7 @@ class ShardSet:
 
     @property
     def labels(self) -> np.ndarray:
-        """Labels 0 .. 3 of all samples, (n,) int64, without reading a record."""
+        """Labels of all samples, (n,) int64, places among `classes`, without reading a record."""
         return self._column("label").astype(np.int64)
 
     @property

@@ -43,8 +43,7 @@ def pack(folder: str | Path, path: str | Path) -> int:
     kept = [line for line in lines if manifest.stage_of(line.partition("  ")[2]) in COVERED]
     if not any("  shards/" in line for line in kept):
         raise InputError(f"{folder}: has no shards, expected the folder of a finished run")
-    chosen = {name: dataset.published[name] for group in dataset.plan.groups.values() for name in group}
-    head = {"format": FORMAT, "lowalt": __version__, "config": plain(config), "published": chosen}
+    head = {"format": FORMAT, "lowalt": __version__, "config": plain(config), "published": dataset.published}
     members = {
         "recipe.json": json.dumps(head, sort_keys=True, indent=1).encode(),
         "manifest.sha256": "".join(kept).encode(),

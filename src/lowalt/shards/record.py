@@ -9,12 +9,12 @@ import math
 import numpy as np
 
 from lowalt import __version__
+from lowalt.common.classes import CATEGORIES, label
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.network import Network
 from lowalt.common.portable import dot, norm
 from lowalt.common.streams import digest
-from lowalt.targets.cloud import CATEGORIES
 
 
 def snr_label(snr_db: float) -> str:
@@ -73,19 +73,22 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
     return result
 
 
-def record(row: dict, snr_db: float, fold: str, seed: int, network: Network) -> bytes:
+def record(
+    row: dict, snr_db: float, fold: str, seed: int, network: Network, classes: tuple[str, ...] = CATEGORIES
+) -> bytes:
     """Return the JSON record of one sample: who it is, how it moves, what each station sees, what made it.
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Of a recorded target whose place nobody knows,
-    unknown numbers are null.
+    unknown numbers are null. classes: in the order of their labels.
+    Raises: InputError where the row's category is no class.
     """
     names = ("subtype", "category", "group", "model")
     motion = {name: value for name, value in row.items() if name not in (*names, "fold")}
     blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
-        "label": CATEGORIES.index(row["category"]),
+        "label": label(classes, row),
         **{name: row[name] for name in names},
         "fold": fold,
         "snr_db": NO_NOISE_DB if math.isinf(snr_db) else float(snr_db),

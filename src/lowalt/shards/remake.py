@@ -70,7 +70,7 @@ class Remaker:
         maker = self._makers[seed]
         signal = maker.signal(row, snr_db)
         data = maker.png(signal) if self.shards.kind == "image" else npy(signal)
-        return record(row, snr_db, entry["fold"], seed, self.network), data
+        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data
 
     def faults(self, number: int) -> list[str]:
         """Return one line for each member of a sample that comes out otherwise than it is stored.

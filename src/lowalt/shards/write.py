@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES, label
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
@@ -14,7 +15,6 @@ from lowalt.shards.record import model_key, rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Span, Writer
-from lowalt.targets.cloud import CATEGORIES
 from lowalt.tiles.files import npy_header
 
 
@@ -41,13 +41,15 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
 
 def write_shard(
     path: str | Path, rows: list[dict], snrs: list[float], split: dict, seed: int, network: Network, wanted: str,
-    kind: str, content: Callable[[int, int], bytes], powers: np.ndarray | None = None,
+    kind: str, content: Callable[[int, int], bytes], classes: tuple[str, ...] = CATEGORIES,
+    powers: np.ndarray | None = None,
 ) -> dict:  # fmt: skip
     """Write `path` (.tar) and its table beside it; return the table's header.
 
     rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
-    sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); powers
-    (stations, rows) W: what SNRs refer to, where not to the echoes' own power (kind "recipe").
+    sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); classes: in
+    the order of their labels; powers (stations, rows) W: what SNRs refer to, where not to the echoes' own power (kind
+    "recipe").
     A recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
@@ -70,7 +72,7 @@ def write_shard(
                 key = sample_key(row["subtype"], row["model"], snr_db)
                 span = spans.get(number)
                 if span is None:
-                    name, text = key, record(row, snr_db, wanted, seed, network)
+                    name, text = key, record(row, snr_db, wanted, seed, network, classes)
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]
@@ -78,11 +80,10 @@ def write_shard(
                     span = tar.add(name, text, EXTENSIONS[kind], content(number, level))
                     if kind == "recipe":
                         spans[number] = span
-                label = CATEGORIES.index(row["category"])
                 digest = np.frombuffer(span.sha256, np.uint8)
                 table[place] = (
                     key,
-                    label,
+                    label(classes, row),
                     row["model"],
                     snr_db,
                     span.offset,

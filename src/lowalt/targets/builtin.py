@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.targets import bird, uav, vehicle
@@ -53,7 +54,7 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    category = merged["category"]
+    category = like(merged)
     if category not in MODULES:
         raise InputError(f"{where}: source is 'builtin', which has no {category} model; expected gait or mocap")
     unknown = sorted(set(extra) - set(_KEYS[category]))
@@ -105,7 +106,7 @@ def builtin_cloud(record: dict, seed: int) -> Cloud:
 
     Raises: InputError where the record asks for fewer points than its parts need.
     """
-    parts, facts = MODULES[record["category"]].parts(record)
+    parts, facts = MODULES[like(record)].parts(record)
     full = record | facts | {"checksum": checksum(record), "seed": seed}
     cloud = assemble(parts, full, record["moving_share"], stream(seed, "cloud", record["subtype"]))
     assert np.isfinite(cloud.points).all()

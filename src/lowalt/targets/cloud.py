@@ -25,12 +25,11 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common import classes
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
-CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
-"""The four classes; their order is the label order everywhere."""
 MOST_TURNING_PARTS = 16
 """Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs has 16 rotors)."""
 
@@ -58,8 +57,13 @@ class Cloud:
 
     @property
     def category(self) -> str:
-        """One of CATEGORIES."""
+        """The target's class, a word of the table of targets."""
         return self.record["category"]
+
+    @property
+    def like(self) -> str:
+        """How the target is built, moves and reflects: one of the published classes."""
+        return classes.like(self.record)
 
     def parts_of(self, kind: str) -> list[int]:
         """Indices of the parts of one kind, in the cloud's order."""
@@ -118,7 +122,10 @@ def check(cloud: Cloud, where: str) -> Cloud:
     )
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     need(not missing, f"record lacks {sorted(missing)}")
-    need(cloud.category in CATEGORIES, f"record.category is {cloud.category!r}, expected one of {CATEGORIES}")
+    try:
+        classes.like(cloud.record)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
     if "node" in cloud.kinds:
         need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
              f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip

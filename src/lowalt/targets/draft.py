@@ -5,6 +5,7 @@ The draft is a YAML text with one record; it passes the checks of `mesh_record`,
 
 import numpy as np
 
+from lowalt.common.classes import like
 from lowalt.targets.inspection import Component, Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
 
@@ -60,7 +61,7 @@ def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
     `file` is the mesh's path inside the folder of inputs. Lines that end in CONFIRM hold guesses. Moving parts are the
     components that may be rotors or wheels, taken out of the body by boxes; a bird's wings are to be added by hand.
     """
-    category = row["category"]
+    category = like(row)
     kind = MOVING_KIND[category]
     groups = clusters([part for part in found.components if part.guess == kind])
     unit = "" if found.unit_from != "guessed from the size" else CONFIRM

@@ -10,6 +10,7 @@ import json
 import numpy as np
 
 from lowalt.common import portable
+from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.portable import product
 from lowalt.targets import gait_run, gait_walk
@@ -139,8 +140,8 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     unknown = sorted(set(extra) - set(KEYS))
     if unknown:
         raise InputError(f"{where}: unknown keys {unknown}, expected some of {sorted(KEYS)}")
-    if merged["category"] != "Pedestrian":
-        raise InputError(f"{where}: source is 'gait' for a {merged['category']}, expected builtin or mesh")
+    if like(merged) != "Pedestrian":
+        raise InputError(f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh")
     result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged, "points": len(NODES)}
     for key, (low, high) in _RANGES.items():
         value = result.get(key)

@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.common.command import run
 from lowalt.common.files import replacing
-from lowalt.targets.cloud import CATEGORIES, Cloud, read
+from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS
 
 COLUMNS = 5
@@ -20,9 +20,9 @@ FAINT = 0.3
 """Opacity of points that face away from the viewer."""
 
 
-def axes_of(category: str) -> np.ndarray:
-    """Return the rotation (3, 3) from body axes to right, up and toward the viewer, for the category's view."""
-    azimuth, elevation = np.radians(VIEWS[category])
+def axes_of(kind: str) -> np.ndarray:
+    """Return the rotation (3, 3) from body axes to right, up and toward the viewer, for targets like `kind`."""
+    azimuth, elevation = np.radians(VIEWS[kind])
     toward = np.array([np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     right = np.array([-np.cos(azimuth), np.sin(azimuth), 0.0])
     return np.stack([right, np.cross(toward, right), toward])
@@ -31,7 +31,7 @@ def axes_of(category: str) -> np.ndarray:
 def shown(cloud: Cloud) -> np.ndarray:
     """Return the points as seen (L, 3), right, up, toward (m): a recording's first frame, or the cloud at rest."""
     points = cloud.track[0] if len(cloud.track) else cloud.points
-    seen = points @ axes_of(cloud.category).T
+    seen = points @ axes_of(cloud.like).T
     return seen - [*((seen.max(0) + seen.min(0))[:2] / 2), 0]
 
 
@@ -43,7 +43,7 @@ def colours(cloud: Cloud) -> np.ndarray:
         BODY_COLOUR if kind == "body" else PART_COLOURS[i % len(PART_COLOURS)] for i, kind in enumerate(cloud.kinds)
     ]
     result = np.array([to_rgba(name) for name in names])[cloud.part]
-    toward = cloud.normals @ axes_of(cloud.category)[2]
+    toward = cloud.normals @ axes_of(cloud.like)[2]
     # Points without a normal compare false and stay full.
     result[toward < -0.05, 3] = FAINT
     return result
@@ -93,7 +93,8 @@ def figure(clouds: list[Cloud]):
     """Return the matplotlib figure: for each category a line-up at one scale, then every cloud filling its panel."""
     from matplotlib.figure import Figure
 
-    groups = [members for name in CATEGORIES if (members := [c for c in clouds if c.category == name])]
+    named = dict.fromkeys(cloud.category for cloud in clouds)
+    groups = [[cloud for cloud in clouds if cloud.category == name] for name in named]
     rows = [-(-len(members) // COLUMNS) for members in groups]
     spans = [np.array([np.ptp(shown(cloud), axis=0)[:2] for cloud in members]) for members in groups]
     # Every panel of a category has the same shape, that of its tallest cloud.

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common import portable
+from lowalt.common.classes import like
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import sha256
 from lowalt.common.streams import stream
@@ -233,9 +234,9 @@ def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[
     hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
     if hubs:
         middle[:2] = portable.mean(np.array(hubs), 0)
-    if record["category"] == "Vehicle":
+    if like(record) == "Vehicle":
         facts["origin_height_m"] = float(middle[2] - ground)
-    if record["category"] == "Bird":
+    if like(record) == "Bird":
         facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
     return {
         name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle) for name, pool in result.items()

@@ -31,6 +31,7 @@ licence, attribution, where (a user gets the files), note: words, kept in the cl
 
 import jsonschema
 
+from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
@@ -171,7 +172,7 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    category = merged["category"]
+    category = like(merged)
     if category not in MOVING_SHARE:
         raise InputError(f"{where}: source is 'mesh' for a {category}, expected mocap or gait")
     _schema_fault(extra, where)

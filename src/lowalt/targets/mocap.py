@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common import portable
+from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
 from lowalt.common.portable import applied, product
@@ -204,8 +205,8 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     unknown, missing = sorted(set(extra) - set(KEYS)), sorted({"skeleton", "motion"} - set(extra))
     if unknown or missing:
         raise InputError(f"{where}: unknown keys {unknown}, missing keys {missing}, expected some of {sorted(KEYS)}")
-    if merged["category"] != "Pedestrian":
-        raise InputError(f"{where}: source is 'mocap' for a {merged['category']}, expected builtin or mesh")
+    if like(merged) != "Pedestrian":
+        raise InputError(f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh")
     defaults = {
         "first_frame": 1,
         "last_frame": None,

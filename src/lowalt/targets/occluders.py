@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import like
 from lowalt.common.command import parser, pick, run
 from lowalt.common.environment import INPUTS
 from lowalt.common.errors import InputError
@@ -117,7 +118,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
     if source == "builtin":
         from lowalt.targets.builtin import MODULES
 
-        parts = MODULES[record["category"]].parts(record)[0]
+        parts = MODULES[like(record)].parts(record)[0]
         surfaces = [part_surface(part) for part in parts]
         # Clears a point's own triangle by more than rounding, and stays on it where a point stands by its corner.
         offset = 1e-9 * np.ptp(merged(surfaces).vertices, axis=0).max()

@@ -10,13 +10,13 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+from lowalt.common.classes import AIRBORNE, classes_of, like
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.common.yaml_files import load_yaml
-from lowalt.targets.cloud import CATEGORIES
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
-COMMON_KEYS = ("source", "points", "rcs_m2_per_point")
+COMMON_KEYS = ("source", "points", "rcs_m2_per_point", "like")
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
 MOST_POINTS = 20_000
@@ -46,10 +46,15 @@ def load_table(path: str | Path) -> dict[str, dict]:
         name, where = row["name"], f"{path}: {row['name']}"
         if name in table:
             raise InputError(f"{where}: named twice, expected one row a subtype")
-        if row["category"] not in CATEGORIES or row["unseen_protocol"] not in ("seen", "unseen"):
-            raise InputError(f"{where}: category {row['category']!r}, unseen_protocol {row['unseen_protocol']!r}, "
-                             f"expected one of {CATEGORIES} and seen or unseen")  # fmt: skip
+        if row["unseen_protocol"] not in ("seen", "unseen"):
+            raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, row[column]) for column in columns}
+    if not table:
+        raise InputError(f"{path}: no row, expected one row a subtype")
+    try:
+        classes_of(table)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     return table
 
 
@@ -113,6 +118,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
     merged |= {
         "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
     }  # fmt: skip
+    _check_like(merged, where)
     points, rcs = merged["points"], merged["rcs_m2_per_point"]
     if isinstance(points, bool) or not isinstance(points, int) or not 1 <= points <= MOST_POINTS:
         raise InputError(f"{where}: points is {points!r}, expected a whole number from 1 to {MOST_POINTS}")
@@ -120,6 +126,18 @@ def merge(row: dict, record: dict, where: str) -> dict:
         raise InputError(f"{where}: rcs_m2_per_point is {rcs!r}, expected square metres >= 0")
     extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}
     return _source(source).check_record(merged, extra, where)
+
+
+def _check_like(merged: dict, where: str) -> None:
+    """Refuse a record of which nobody knows how its target moves, or whose row lacks the speeds it needs."""
+    try:
+        kind = like(merged)
+    except InputError as error:
+        raise InputError(f"{where}: {str(error).removeprefix(merged['subtype'] + ': ')}") from None
+    needed = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if kind in AIRBORNE else ("speed_lo", "speed_hi")
+    empty = [column for column in needed if merged["published"][column] is None]
+    if empty:
+        raise InputError(f"{where}: the table of targets has no {empty}, expected m/s for a target like a {kind}")
 
 
 def _source(name: str) -> ModuleType:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import check, plain
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
@@ -15,7 +16,7 @@ from lowalt.common.plan import Plan
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, named
 from lowalt.spectra import Spectra
-from lowalt.targets.records import load_records, missing_inputs
+from lowalt.targets.records import load_records, load_table, missing_inputs
 from lowalt.tiles.settings import Images
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
@@ -24,12 +25,16 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 
 @dataclass(frozen=True)
 class Run:
-    """Records, plan and schemes of one run; `inputs` is the folder of the user's meshes and recordings, or None."""
+    """Records, classes, plan and schemes of one run; `inputs` is the folder of meshes and recordings, or None.
+
+    The classes are those of the whole table of targets, so that a label means the same however few are selected.
+    """
 
     config: dict
     schema: Path
     inputs: str | None
     records: dict[str, dict]
+    classes: tuple[str, ...]
     plan: Plan
     schemes: dict[str, Scheme]
 
@@ -41,7 +46,9 @@ class Run:
         """
         check(config, schema)
         records = load_records(config["targets"]["table"], config["targets"]["records"])
-        plan = Plan.of(config, {name: record["published"] for name, record in records.items()})
+        published = {name: record["published"] for name, record in records.items()}
+        classes, plan = classes_of(published), Plan.of(config, published)
+        _check_heights(config["motion"]["height_m"], published, classes)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
         Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
         Images.from_settings(config["images"])
@@ -62,8 +69,8 @@ class Run:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         _check_data(config)
         for name in block.get("extra", []):
-            _check_extra(config, name)
-        return cls(config, Path(schema), inputs, chosen, plan, schemes)
+            _check_extra(config, name, classes)
+        return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
 
     @property
     def name(self) -> str:
@@ -150,7 +157,7 @@ def _check_sizes(config: dict) -> None:
         raise InputError(f"motion.sizes_m: given beside effects {sorted(config['effects'])}, expected one or the other")
 
 
-def _check_extra(config: dict, name: str) -> None:
+def _check_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
     """Refuse a run to train on that is not there, whose samples differ in form, or that may hold tested samples."""
     made = Path("results") / name / "config.yaml"
     if name in (config["run"], config.get("data")) or not made.is_file():
@@ -161,11 +168,21 @@ def _check_extra(config: dict, name: str) -> None:
     differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
     if differ:
         raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
+    others = classes_of(load_table(other["targets"]["table"]))
+    if others != classes:
+        raise InputError(f"recognition.extra: run {name!r} has the classes {others}, expected {classes}")
     if own["seed"] == other["seed"]:
         raise InputError(
             f"recognition.extra: run {name!r} has this run's seed {own['seed']}, so its motion models would be those "
             "that are tested; expected another seed"
         )
+
+
+def _check_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
+    """Refuse flight heights of what is neither a subtype nor a class."""
+    unknown = sorted(set(heights) - {*published, *classes, *CATEGORIES})
+    if unknown:
+        raise InputError(f"motion.height_m: {unknown}, expected subtypes, classes {list(classes)} or {list(AIRBORNE)}")
 
 
 def _check_data(config: dict) -> None:

@@ -72,12 +72,15 @@ class Settings:
     def index(self, wildcards: Any) -> str:
         """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""
         echo = {"tolerance": self._config["echo"]["tolerance"], "effects": self._config["effects"]}
-        return self._text("index", **self._blocks("network", "spectra", "images"), echo=echo)
+        blocks = self._blocks("network", "spectra", "images")
+        return self._text("index", **blocks, echo=echo, classes=self._run.classes)
 
     def shard(self, wildcards: Any) -> str:
         """The fold of each sample, its name and its form."""
         snrs = self._config["noise"]["snr_db"]
-        return self._text("shard", **self._blocks("seed", "network", "split", "shards"), snr_db=snrs)
+        return self._text(
+            "shard", **self._blocks("seed", "network", "split", "shards"), snr_db=snrs, classes=self._run.classes
+        )
 
     def cost_table(self, wildcards: Any) -> str:
         """What the echo is timed with."""
@@ -98,13 +101,22 @@ class Settings:
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
-        return self._text("training", seed, seed=seed, colour_map=self._config["images"]["colour_map"], **kept)
+        return self._text(
+            "training",
+            seed,
+            seed=seed,
+            colour_map=self._config["images"]["colour_map"],
+            classes=self._run.classes,
+            **kept,
+        )
 
     def trial(self, wildcards: Any) -> str:
         """How a network is trained and asked where no candidate changes it, and the seed of a trial."""
         block, seed = self._config["recognition"], int(wildcards.train_seed)
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation", "evaluation")}
-        return self._text("trial", seed, seed=seed, colour_map=self._config["images"]["colour_map"], **kept)
+        return self._text(
+            "trial", seed, seed=seed, colour_map=self._config["images"]["colour_map"], classes=self._run.classes, **kept
+        )
 
     def evaluation(self, wildcards: Any) -> str:
         """How a network is asked."""
@@ -120,7 +132,14 @@ class Settings:
         models, size = self._config["report"]["effect_models"], self._run.pixels(self._run.asked)
         blocks = self._blocks("network", "spectra", "images", "split", "seed")
         return self._text(
-            "effect_samples", wildcards.call, **blocks, **call, name=wildcards.call, models=models, size=size
+            "effect_samples",
+            wildcards.call,
+            **blocks,
+            **call,
+            name=wildcards.call,
+            models=models,
+            size=size,
+            classes=self._run.classes,
         )
 
     def effects_table(self, wildcards: Any) -> str:

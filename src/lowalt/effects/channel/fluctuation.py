@@ -76,9 +76,9 @@ def large(cloud: Cloud) -> bool:
 
 def spread_db(cloud: Cloud) -> float:
     """Return the standard deviation of B2 in dB, by class and size."""
-    if cloud.category == "UAV" and large(cloud):
+    if cloud.like == "UAV" and large(cloud):
         return 2.50
-    return {"UAV": 3.74, "Bird": 3.74, "Pedestrian": 3.94, "Vehicle": 3.41}[cloud.category]
+    return {"UAV": 3.74, "Bird": 3.74, "Pedestrian": 3.94, "Vehicle": 3.41}[cloud.like]
 
 
 def pattern_dbsm(faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray) -> np.ndarray:
@@ -103,9 +103,9 @@ def pattern(view: View) -> np.ndarray:
     """Return B1 (N, 1), relative to the mean cross section, in the station's direction."""
     cloud = view.cloud
     faces = None
-    if cloud.category == "Vehicle":
+    if cloud.like == "Vehicle":
         faces, mean = VEHICLE, VEHICLE_DBSM
-    elif cloud.category == "UAV" and large(cloud):
+    elif cloud.like == "UAV" and large(cloud):
         faces, mean = LARGE_UAV, LARGE_UAV_DBSM
     if faces is None or "body" not in cloud.kinds:
         return np.ones((len(view.times_s), 1))

@@ -49,7 +49,7 @@ def cross_sections(settings: dict, cloud: Cloud) -> np.ndarray:
 
     settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together against the rest.
     """
-    total = 10 ** (settings["dbsm"].get(cloud.subtype, mean_dbsm(cloud.category, size_m(cloud))) / 10)
+    total = 10 ** (settings["dbsm"].get(cloud.subtype, mean_dbsm(cloud.like, size_m(cloud))) / 10)
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
     weight = np.asarray(cloud.rcs_m2, float)
     groups, shares = (~blades, blades), (1.0, 10 ** (settings["blades_db"] / 10))

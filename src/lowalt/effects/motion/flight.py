@@ -34,7 +34,7 @@ def length_m(cloud: Cloud) -> float:
 
 def mass_kg(cloud: Cloud) -> float:
     """Return the mass (kg) of a multirotor by its length, of a bird by its wing span."""
-    if cloud.category == "Bird":
+    if cloud.like == "Bird":
         return (float(cloud.record.get("wing_span_m") or 2 * length_m(cloud)) / 1.17) ** (1 / 0.39)
     slope = math.log(LARGE_UAV[1] / SMALL_UAV[1]) / math.log(LARGE_UAV[0] / SMALL_UAV[0])
     return SMALL_UAV[1] * (length_m(cloud) / SMALL_UAV[0]) ** slope
@@ -47,7 +47,7 @@ def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
     drag is its weight over its lift to drag; upwards its wing's lift answers, by rho S V C_L' / (2 m).
     """
     mass = mass_kg(cloud)
-    if cloud.category == "Bird":
+    if cloud.like == "Bird":
         area = 0.16 * mass**0.72
         up = AIR_KG_M3 * area * airspeed_mps * LIFT_SLOPE / (2 * mass)
         return LIFT_TO_DRAG * airspeed_mps / (2 * GRAVITY_MPS2), 1 / up

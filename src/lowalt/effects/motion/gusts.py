@@ -97,7 +97,7 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     The motion table's place is where the target is at the first of the times, wherever the wind has pushed it from.
     The wind's direction is drawn. Nothing for targets on the ground.
     """
-    if cloud.category not in ("UAV", "Bird"):
+    if cloud.like not in ("UAV", "Bird"):
         return Perturbation({})
     heading = rng.uniform(0.0, 2 * np.pi)
     first = rng.standard_normal((3, 5))
@@ -121,7 +121,7 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     offset = (found[..., 2] - found[:, :1, 2]).T @ wind * step
     acceleration = found[..., 3].T @ wind / step
     ahead = attitude(row["yaw_rad"], 0.0, 0.0)
-    return Perturbation({}, offset, tilt(acceleration @ ahead, pitches=cloud.category == "UAV"))
+    return Perturbation({}, offset, tilt(acceleration @ ahead, pitches=cloud.like == "UAV"))
 
 
 def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:

@@ -6,21 +6,22 @@ from matplotlib import pyplot as plt
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 
 VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
          "Pedestrian": (1, 2, "from the side")}  # fmt: skip
 
 
 def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
-    """Draw the first motion model of each category at `instants` equal steps of its cycle; returns PNG bytes."""
+    """Draw the first motion model of each class at `instants` equal steps of its cycle; returns PNG bytes."""
     named = {cloud.subtype: cloud for cloud in clouds}
-    chosen = [next((row for row in rows if row["category"] == name), None) for name in CATEGORIES]
-    chosen = [row for row in chosen if row is not None]
+    chosen = [
+        next(row for row in rows if row["category"] == name) for name in dict.fromkeys(row["category"] for row in rows)
+    ]
     figure, panels = plt.subplots(len(chosen), instants, figsize=(1.7 * instants, 1.8 * len(chosen)), squeeze=False)
     for line, row in zip(panels, chosen, strict=True):
         cloud = named[row["subtype"]]
-        across, up, view = VIEWS[row["category"]]
+        across, up, view = VIEWS[cloud.like]
         times = np.arange(instants) / instants * cycle_s(cloud, row)
         points = positions(cloud, still_row(row), times)
         low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))

@@ -6,13 +6,12 @@ import numpy as np
 from PIL import Image
 
 from lowalt.shards import ShardSet
-from lowalt.targets.cloud import CATEGORIES
 
 
 def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
     """Return (caption, PNG bytes) of the sample of highest SNR of each category's first motion model in the set."""
     chosen = []
-    for label, category in enumerate(CATEGORIES):
+    for label, category in enumerate(shards.classes):
         numbers = np.flatnonzero(shards.labels == label)
         if len(numbers):
             best = numbers[np.lexsort((shards.keys[numbers], -shards.snrs_db[numbers]))[0]]

@@ -6,10 +6,10 @@ measured-NAME.png a pair of pictures. `make measured` writes them.
 
 from pathlib import Path
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.csv_tables import read_csv
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
-from lowalt.targets.cloud import CATEGORIES
 
 FIGURES = (
     "pair", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "before", "before_low",

@@ -1,0 +1,86 @@
+"""The classes of a data set: the words in the column `category` of its table of targets.
+
+The classes stand in the order in which the table names them first, and a class's place in that order is its label. The
+order travels with the data: in the settings of the stages, in the index of the shards, in a trained model and in the
+record beside a prediction file. Where one of these says nothing of classes, it has the published four.
+
+The first class is the one that a detector looks for; false alarms are samples of the other classes that are given its
+name.
+
+How a target is built, moves and reflects follows from what it is `like`, one of the published four. A class of these
+names needs no more; a record of a user's own class names one of the four in its key `like`.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+
+from lowalt.common.errors import InputError
+
+CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
+"""The published classes in their label order, and what a target can be like."""
+
+AIRBORNE = ("UAV", "Bird")
+"""What flies; the other two stay on the ground."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9 _-]{0,39}")
+_PLURALS = {"UAV": "UAVs", "Bird": "birds", "Vehicle": "vehicles", "Pedestrian": "pedestrians"}
+
+
+def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:
+    """Return the classes of a table of targets by subtype, in the order of their first rows.
+
+    Raises: InputError for a name that is no word, or two names that differ only in capitals, spaces or hyphens.
+    """
+    names = tuple(dict.fromkeys(row["category"] for row in table.values()))
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise InputError(f"table of targets: category {name!r}, expected a letter, then letters, digits, - or _")
+    if len({word(name) for name in names}) < len(names):
+        raise InputError(f"table of targets: categories {list(names)}, expected names that differ in their letters")
+    return names
+
+
+def stated(content: Mapping) -> tuple[str, ...]:
+    """Return the classes that an index, a trained model or a run's record states: the published four where none."""
+    return tuple(content.get("classes", CATEGORIES))
+
+
+def label(classes: tuple[str, ...], row: Mapping) -> int:
+    """Return the label of a row of the motion table: the place of its category among the classes.
+
+    Raises: InputError naming the subtype and the category that is no class.
+    """
+    if row["category"] not in classes:
+        raise InputError(f"{row['subtype']}: category {row['category']!r}, expected one of {list(classes)}")
+    return classes.index(row["category"])
+
+
+def word(name: str) -> str:
+    """Return a class's name as columns of tables have it: small letters, with _ for spaces and hyphens."""
+    return re.sub(r"[ -]", "_", name.lower())
+
+
+def plural(name: str) -> str:
+    """Return a class's name for several targets: that of a published class in plural, others as they are written."""
+    return _PLURALS.get(name, name)
+
+
+def like(record: Mapping) -> str:
+    """Return what a record's or a cloud's target is built, moves and reflects like: one of CATEGORIES.
+
+    Raises: InputError naming the subtype where neither its key `like` nor its category says it.
+    """
+    found = record.get("like", record["category"])
+    if found not in CATEGORIES:
+        key = "like" if "like" in record else "category"
+        raise InputError(
+            f"{record.get('subtype', 'record')}: {key} is {found!r}, expected a key `like` with one of "
+            f"{list(CATEGORIES)}, which says how a target of another class is built, moves and reflects"
+        )
+    return found
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names as English lists them: "a", "a and b", "a, b and c"."""
+    *most, last = names
+    return f"{', '.join(most)} and {last}" if most else last

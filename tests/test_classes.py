@@ -1,0 +1,133 @@
+"""Classes are the words of the table of targets: two, five and others go from clouds to the page."""
+
+import json
+
+import numpy as np
+import pytest
+
+from chain import SNRS, TARGETS, WAVE, recognised, reported, simulated
+from lowalt.common import classes
+from lowalt.common.config import load
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.errors import InputError
+from lowalt.targets.records import load_table, merge
+
+STATIONS = {"A": {"position_m": [0.0, 0.0, 25.0], "normal_deg": 60.0}}
+NETWORK = WAVE | {"stations": STATIONS}
+FIVE = {**TARGETS, "Glider": "Fixed-wing", "DJI Avata": "UAV"}
+TWO = {"Heron": "Large bird", "Crow": "Small bird", "Eagle": "Large bird"}
+TABLE = "config/targets.csv"
+
+
+def rows(targets):
+    """Rows of a table of targets: those of the published craft under these names and classes."""
+    row = load_table(TABLE)["DJI Mini 2"]
+    return {name: row | {"name": name, "category": category} for name, category in targets.items()}
+
+
+@pytest.mark.parametrize("targets", [FIVE, TWO], ids=["five", "two"])
+def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
+    pytest.importorskip("torch")
+    names = tuple(dict.fromkeys(targets.values()))
+    schema = "workflow/schemas/config.schema.yaml"
+    config = load(["config/default.yaml"], schema) | {"run": "own", "network": NETWORK, "noise": {"snr_db": SNRS}}
+    clouds = simulated(tmp_path, NETWORK, targets)
+    from lowalt.recognition.runs import load as load_model
+    from lowalt.recognition.score import score
+    from lowalt.shards import ShardSet
+    from lowalt.shards.card import description
+    from lowalt.shards.croissant import metadata
+
+    shards = ShardSet(tmp_path / "index.json")
+    assert shards.classes == names
+    for number in range(len(shards)):
+        entry = shards.record(number)
+        assert names[entry["label"]] == entry["category"] == targets[entry["subtype"]]
+        assert shards.labels[number] == entry["label"]
+    table = {"name": "samples.csv", "path": "samples.csv", "bytes": 1, "sha256": "0"}
+    assert f"Class: {', '.join(f'{n} {name}' for n, name in enumerate(names))}." in json.dumps(
+        metadata(shards.index, table, {})
+    )
+    assert f"({', '.join(map(classes.plural, names))})" in description(shards)
+    recognised(tmp_path, NETWORK, config, clouds, targets)
+    trained = load_model(tmp_path / "model/model.pt")
+    assert trained.classes == names and trained.model.classifier.out_features == len(names)
+    predictions = read_csv(tmp_path / "p.csv")
+    columns = [f"p_{classes.word(name)}" for name in names]
+    assert [name for name in predictions[0] if name.startswith("p_")] == columns
+    assert len(score(tmp_path / "p.csv", tmp_path / "index.json", "seen")["confusion"]) == len(names)
+    confusion = read_csv(tmp_path / "confusion.csv")
+    assert {row["category"] for row in confusion} == {row["predicted"] for row in confusion} == set(names)
+    # Of each subtype one motion model of five is for the test, at every SNR.
+    for name in names:
+        of_class = sum(int(row["samples"]) for row in confusion if row["category"] == name)
+        assert of_class == len(SNRS) * list(targets.values()).count(name)
+    words = [classes.word(name) for name in names[1:]]
+    with (tmp_path / "alarms.csv").open() as file:
+        header = file.readline().strip().split(",")
+    ends = ("percent", "low", "high")
+    assert header[4:] == [f"{rate}_{end}" for rate in ("detected", *words) for end in ends]
+    text = reported(tmp_path, config, clouds, rows(targets))
+    for name in names:
+        assert any(f"{name}: {subtype}" in text for subtype, category in targets.items() if category == name)
+    assert f"is called {names[0]} where its {names[0]} probability" in text
+
+
+def test_labels_are_places_in_the_order_of_first_rows():
+    table = {name: {"category": category} for name, category in FIVE.items()}
+    assert classes.classes_of(table) == ("UAV", "Bird", "Vehicle", "Pedestrian", "Fixed-wing")
+    assert classes.classes_of(load_table(TABLE)) == classes.CATEGORIES
+    reverse = dict(reversed(table.items()))
+    assert classes.classes_of(reverse)[:2] == ("UAV", "Fixed-wing")
+    assert classes.label(("B", "A"), {"subtype": "x", "category": "A"}) == 1
+    with pytest.raises(InputError, match=r"x: category 'C', expected one of \['B', 'A'\]"):
+        classes.label(("B", "A"), {"subtype": "x", "category": "C"})
+
+
+def test_names_of_classes_stay_apart_as_columns():
+    for pair in (("Fixed wing", "fixed-wing"), ("UAV", "uav")):
+        with pytest.raises(InputError, match="differ in their letters"):
+            classes.classes_of({name: {"category": name} for name in pair})
+    for bad in ("", "3D", "a,b", "x" * 41):
+        with pytest.raises(InputError, match="expected a letter"):
+            classes.classes_of({"one": {"category": bad}})
+
+
+def test_a_class_of_its_own_needs_to_know_what_it_is_like():
+    row = load_table(TABLE)["DJI Mini 2"] | {"category": "Other"}
+    with pytest.raises(InputError, match="here: category is 'Other', expected a key `like`"):
+        merge(row, {"source": "builtin"}, "here")
+    with pytest.raises(InputError, match="here: like is 'Plane'"):
+        merge(row, {"source": "builtin", "like": "Plane"}, "here")
+    with pytest.raises(InputError, match=r"no \['speed_lo', 'speed_hi'\], expected m/s for a target like a Vehicle"):
+        merge(row, {"source": "builtin", "like": "Vehicle"}, "here")
+
+
+def test_heights_are_looked_up_by_subtype_then_class_then_what_it_is_like():
+    from lowalt.motion.sample import heights
+
+    block = {"height_m": {"UAV": [1, 2], "Plane": [3, 4], "Glider": [5, 6]}}
+    assert heights(block, "Glider", "Plane", "UAV") == [5, 6]
+    assert heights(block, "Cessna", "Plane", "UAV") == [3, 4]
+    assert heights(block, "Cessna", "Other", "UAV") == [1, 2]
+
+
+def test_a_training_names_the_class_without_samples_and_wants_two():
+    torch = pytest.importorskip("torch")
+    from lowalt.recognition import runs, training
+
+    class Source:
+        """Samples of the label 0 alone."""
+
+        facts = type("Facts", (), {"label": np.zeros(3, int)})
+
+    settings = {"seed": 1, "training": None, "augmentation": {}, "classes": ["Bat", "Bird"]}
+    block = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")["recognition"]["training"]
+    with pytest.raises(InputError, match=r"no training sample of \['Bird'\]"):
+        training.Trainer(
+            torch.nn.Linear(1, 2), {"train": Source, "validation": Source}, [0], settings | {"training": block}, (), "",
+            "", None,
+        )  # fmt: skip
+    given = settings | {"training": block, "size": 24, "colour_map": "gray", "network": {}, "classes": ["Bat"]}
+    with pytest.raises(InputError, match="expected two or more"):
+        runs.train({}, None, "seen", given, None)
