@@ -70,7 +70,7 @@ WRONG = {
     "is not finite": craft(hinges=np.full((2, 3), np.nan)),
     "length other than 1 or NaN": craft(normals=np.ones((5, 3))),
     "record lacks": craft(record={"subtype": "x", "category": "UAV"}),
-    "expected one of": craft(record=RECORD | {"category": "Boat"}),
+    "expected a key `like` with one of": craft(record=RECORD | {"category": "Boat"}),
     "track has shape": recording(1, track_rate_hz=120.0),
     "track_rate_hz is missing": recording(5),
 }

@@ -170,7 +170,7 @@ def test_files_that_hold_no_records_are_refused(tmp_path, text, message):
         ("size_m", "size", r"columns \['size', 'size_m'\] missing or unknown"),
         ("0.2192", "-1", r"DJI Mini 2: size_m is '-1', expected a positive number"),
         ("0.2192", "big", r"DJI Mini 2: size_m is 'big'"),
-        ("UAV,1,", "Boat,1,", r"DJI Mini 2: category 'Boat'"),
+        ("UAV,1,", "4x4,1,", r"table of targets: category '4x4', expected a letter"),
         ("DJI Mini 4 Pro", "DJI Mini 2", r"DJI Mini 2: named twice"),
     ],
 )
