@@ -7,9 +7,9 @@ import pytest
 
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
+from lowalt.common.normals import circular
 from lowalt.noise import add_noise
 from lowalt.noise.chunk import noisy_signals
-from lowalt.noise.normals import circular
 
 
 def measured_snr_db(snr_db: float, scale: float = 1.0) -> float:
@@ -73,6 +73,12 @@ def test_streams_do_not_depend_on_what_else_is_there():
     assert np.array_equal(full[1, 1, 2], some[0, 0, 0])
     assert np.array_equal(full[:, 2].transpose(1, 0, 2), echoes)
     assert not np.array_equal(full[0, 0], full[0, 1])
+
+
+def test_many_normals_drawn_at_once_are_those_drawn_few_at_a_time():
+    at_once, by_parts = (Draws(np.random.PCG64(5)) for _ in range(2))
+    parts = [by_parts.standard_normal((500, 2)) for _ in range(9)] + [by_parts.standard_normal(1)]
+    assert np.array_equal(at_once.standard_normal(9001), np.concatenate([part.ravel() for part in parts]))
 
 
 @pytest.mark.parametrize("count", [1, 2, 399, 1001])

@@ -24,6 +24,8 @@ from lowalt.common.portable import log, sine_cosine_turns
 
 Size = int | tuple[int, ...] | None
 _HALF = np.uint64(0xFFFFFFFF)
+COMPILED = 4096
+"""From this many normal numbers on, compiled code makes them: the same bits in a tenth of the time."""
 
 
 def _count(size: Size) -> int:
@@ -139,6 +141,11 @@ class Draws(np.random.Generator):
         if kwargs:
             raise InputError(f"standard_normal: arguments {sorted(kwargs)}, expected none besides size")
         count = _count(size)
+        if count >= COMPILED:
+            # Loaded here, since most commands draw few numbers and start in less time than the compiler needs.
+            from lowalt.common.normals import interleaved
+
+            return _shaped(interleaved(self.words(count + count % 2))[:count], size)
         first, second = (self.words(count + count % 2) >> np.uint64(11)).reshape(-1, 2).T
         radius = np.sqrt(-2.0 * log((first.astype(np.float64) + 1.0) * 2.0**-53))
         sine, cosine = sine_cosine_turns(second.astype(np.float64) * 2.0**-53)

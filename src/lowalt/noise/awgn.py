@@ -7,7 +7,7 @@ import numpy as np
 from lowalt.common import portable
 from lowalt.common.errors import InputError
 from lowalt.common.power import rms
-from lowalt.noise.normals import circular
+from lowalt.common.normals import circular
 
 
 def add_noise(

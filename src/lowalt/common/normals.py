@@ -64,6 +64,13 @@ def fill(words, scale, out):
         imaginary[i] = scale * (radius * (-y if turned >= 2 else y))
 
 
+def interleaved(words: np.ndarray) -> np.ndarray:
+    """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
+    out = np.empty((len(words) // 2, 2))
+    fill(words, 1.0, out.T)
+    return out.ravel()
+
+
 def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     """Return complex normals from raw words (2 N,) uint64 as (2, N) float64, real and imaginary parts.
 
