@@ -6,8 +6,8 @@ import numpy as np
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
-from lowalt.common.power import rms
 from lowalt.common.normals import circular
+from lowalt.common.power import rms
 
 
 def add_noise(
