@@ -6,6 +6,7 @@ folder of its place that defines DEFAULTS. One that the list below does not name
 
 import importlib
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
@@ -124,4 +125,10 @@ def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:
 
 def providing(effects: Iterable[NamedEffect], protocol: type) -> list[NamedEffect]:
     """Return the effects whose modules satisfy a protocol of `effects.interface`, order kept."""
-    return [effect for effect in effects if isinstance(effect.module, protocol)]
+    return [effect for effect in effects if _satisfies(effect.module, protocol)]
+
+
+@lru_cache(maxsize=256)
+def _satisfies(module: ModuleType, protocol: type) -> bool:
+    """Whether a module satisfies a protocol; asking Python each time took a third of a millisecond a sample."""
+    return isinstance(module, protocol)

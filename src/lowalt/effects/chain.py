@@ -52,7 +52,7 @@ class Chain:
         effects: list[NamedEffect],
         view: View,
         draws: Callable[[str], np.random.Generator],
-        power: float,
+        power: float = 0.0,
     ):
         self.view, self.draws, self.power, self.error = view, draws, power, EXACT
         self.names = frozenset(effect.name for effect in effects)
@@ -69,6 +69,11 @@ class Chain:
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
             self.factor = self.factor * effect.module.visible(effect.settings, view, draws(effect.name))
+
+    @property
+    def bent(self) -> bool:
+        """Whether the echo goes other ways than the direct path of Eq. 7, so that `direct` is no part of the result."""
+        return bool(self.by_need or providing(self.channel, AddsPaths))
 
     @cached_property
     def peaks(self) -> np.ndarray:

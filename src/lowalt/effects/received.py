@@ -77,16 +77,18 @@ def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occ
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
     cloud = with_cross_sections(scene, cloud)
     view = observe(scene, station, cloud, row, occluders)
-    own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
-    # Measure the power after rounding to complex64, as the echo stage does; the noise level is then the same with and
-    # without effects.
-    power = rms(own.signal.astype(np.complex64)) ** 2
     if not beyond:
-        return Received(own.signal, own.cell, power, [])
-    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name), power)
-    if providing(beyond, WeighsPoints) or view.beams is not None:
-        chain.power = power = rms(seen_alone(chain).astype(np.complex64)) ** 2
-    if share is None or math.isinf(chain.amplification):
+        own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
+        return Received(own.signal, own.cell, arriving(own.signal), [])
+    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name))
+    exact = share is None or math.isinf(chain.amplification)
+    weighed = bool(providing(beyond, WeighsPoints)) or view.beams is not None
+    own = None
+    # The engine is asked only where the chain does not compute the same echo anyway.
+    if not exact or (chain.bent and not weighed):
+        own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
+    chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
+    if exact:
         outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
         return Received(outcome.signal, outcome.cell, power, notes)
@@ -101,6 +103,14 @@ def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occ
         trial = chain.run(frozenset())
     outcome, notes = settle(chain, asked, share, trial)
     return Received(outcome.signal, outcome.cell, power, notes)
+
+
+def arriving(signal: np.ndarray) -> float:
+    """Return the mean |Y_bin|^2 (W) of a signal (N,), after rounding to complex64 as the echo stage rounds.
+
+    The noise level is then the same with and without effects.
+    """
+    return rms(signal.astype(np.complex64)) ** 2
 
 
 def seen_alone(chain: Chain) -> np.ndarray:

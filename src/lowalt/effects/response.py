@@ -60,7 +60,6 @@ def response(
     strength = np.atleast_2d(radio.scale * np.sqrt(rcs_m2) * factor)
     symmetric = network.transmit == network.receive
     pairs = _pairs(len(chosen), symmetric)
-    result = np.zeros((len(places), radio.subcarriers), np.complex128)
     own = np.exp(-2j * np.pi * refs[:, 4])
     # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
     # table. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
@@ -77,10 +76,9 @@ def response(
         response_loops.moments(
             strength, there, home, times, excess_a, excess_b, 0.5 * radio.cells, reach, sums
         )  # fmt: skip
-    for one, weight in zip(sums, weights, strict=True):
-        response_loops.spread(one, own, table, weight, result)
-    response_loops.shift(result, refs[:, 6])
-    return result * _whole_cells(refs[:, 5], radio.subcarriers)
+    result = np.empty((len(places), radio.subcarriers), np.complex128)
+    response_loops.spread(sums, own, refs[:, 5].astype(np.int64), refs[:, 6].copy(), table, weights, result)
+    return result
 
 
 class _PathFactors:
@@ -163,13 +161,6 @@ def _table(reach: float, count: int, error: float) -> np.ndarray:
     p = np.arange(order + 1)
     x = 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count
     return np.where(p == 0, 1.0, 2.0)[:, None] * jv(p[:, None], x)
-
-
-def _whole_cells(base: np.ndarray, count: int) -> np.ndarray:
-    """Phase (N, M) of the whole range cells `base` (N,) at every subcarrier, reduced in whole numbers."""
-    step = 2 * np.arange(count, dtype=np.int64) - (count - 1)
-    index = (base.astype(np.int64)[:, None] % (2 * count)) * step % (2 * count)
-    return np.exp(-1j * np.pi * np.arange(2 * count) / count)[index]
 
 
 def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> tuple[np.ndarray, np.ndarray]:

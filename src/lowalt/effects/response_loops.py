@@ -18,8 +18,8 @@ DEGREE = 11
 WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
 """Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
 COSINE, SINE = 0, 1
-STRIDE = 32
-"""Subcarriers after which a phase ramp starts anew."""
+STRIDE = 16
+"""Subcarriers that share one short phase ramp."""
 
 
 @lru_cache(maxsize=16)
@@ -226,42 +226,57 @@ def moments(strength, out, back, times, excess_a, excess_b, half_cells, reach, r
 
 
 @LOOPS
-def spread(sums, own, table, weight, result):
-    """Add own[n] sum_p (-j)^p sums[n, p] table[p, m] weight[m] to result (N, M); table is real."""
-    total = table.shape[1]
-    re, im = np.empty(total), np.empty(total)
-    for n in range(sums.shape[0]):
-        for m in range(total):
-            re[m], im[m] = 0.0, 0.0
-        for p in range(sums.shape[1]):
-            value = sums[n, p] * own[n]
-            a, b = value.real, value.imag
-            if p % 4 == 1:
-                a, b = b, -a
-            elif p % 4 == 2:
-                a, b = -a, -b
-            elif p % 4 == 3:
-                a, b = -b, a
-            for m in range(total):
-                re[m] += a * table[p, m]
-                im[m] += b * table[p, m]
-        for m in range(total):
-            result[n, m] += complex(re[m] * weight[m], im[m] * weight[m])
+def turned(whole, cells, half_steps, total):
+    """Phase factor of a delay by `whole` + `cells` range cells, `half_steps` halves of a subcarrier off the middle.
+
+    Whole cells turn by multiples of pi / M, which are reduced in whole numbers.
+    """
+    index = whole % (2 * total) * half_steps % (2 * total)
+    angle = math.pi * (cells * half_steps + index) / total
+    return complex(math.cos(angle), -math.sin(angle))
 
 
 @LOOPS
-def shift(result, cells):
-    """Delay result (N, M) by `cells` (N,) range cells about the middle subcarrier, in place.
+def spread(sums, own, whole, cells, table, weights, result):
+    """Fill result (N, M) with own[n] sum_q weights[q, m] sum_p (-j)^p sums[q, n, p] table[p, m], delayed.
 
-    A phase step from subcarrier to subcarrier is multiplied on; every STRIDE-th phase is computed anew.
+    sums: (Q, N, P); table: (P, M) real; weights: (Q, M); the delay about the middle subcarrier is `whole` (N,) int64
+    plus `cells` (N,) range cells.
     """
-    count = result.shape[1]
-    for n in range(result.shape[0]):
-        turn = cells[n] / count
-        step = complex(math.cos(2.0 * math.pi * turn), -math.sin(2.0 * math.pi * turn))
-        for first in range(0, count, STRIDE):
-            angle = 2.0 * math.pi * (turn * (first - 0.5 * (count - 1)))
-            phase = complex(math.cos(angle), -math.sin(angle))
-            for m in range(first, min(first + STRIDE, count)):
-                result[n, m] *= phase
-                phase *= step
+    nodes, symbols, orders = sums.shape
+    total = table.shape[1]
+    re, im, node_re, node_im = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
+    ramp_re, ramp_im = np.empty(STRIDE), np.empty(STRIDE)
+    for n in range(symbols):
+        re[:] = 0.0
+        im[:] = 0.0
+        for q in range(nodes):
+            node_re[:] = 0.0
+            node_im[:] = 0.0
+            for p in range(orders):
+                a, b = sums[q, n, p].real, sums[q, n, p].imag
+                if p % 4 == 1:
+                    a, b = b, -a
+                elif p % 4 == 2:
+                    a, b = -a, -b
+                elif p % 4 == 3:
+                    a, b = -b, a
+                for m in range(total):
+                    node_re[m] += a * table[p, m]
+                    node_im[m] += b * table[p, m]
+            for m in range(total):
+                re[m] += node_re[m] * weights[q, m]
+                im[m] += node_im[m] * weights[q, m]
+        step, wide = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
+        phase = 1.0 + 0.0j
+        for k in range(STRIDE):
+            ramp_re[k], ramp_im[k] = phase.real, phase.imag
+            phase *= step
+        phase = own[n] * turned(whole[n], cells[n], 1 - total, total)
+        for first in range(0, total, STRIDE):
+            a, b = phase.real, phase.imag
+            for k in range(min(STRIDE, total - first)):
+                x, y = re[first + k], im[first + k]
+                c, d = a * x - b * y, a * y + b * x
+                result[n, first + k] = complex(c * ramp_re[k] - d * ramp_im[k], c * ramp_im[k] + d * ramp_re[k])
+            phase *= wide

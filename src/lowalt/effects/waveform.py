@@ -31,7 +31,12 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
     response's. Source: 3GPP TS 38.211, 5.3.1.
     """
-    return np.fft.ifft(np.fft.ifftshift(response * data, axes=-1), axis=-1)
+    half = data.shape[-1] // 2
+    tones = np.empty(np.broadcast_shapes(response.shape, data.shape), np.complex128)
+    # The product is written in the transform's order at once: copies of whole looks cost more than the product.
+    np.multiply(response[..., half:], data[..., half:], out=tones[..., : tones.shape[-1] - half])
+    np.multiply(response[..., :half], data[..., :half], out=tones[..., tones.shape[-1] - half :])
+    return np.fft.ifft(tones, axis=-1, out=tones)
 
 
 def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
@@ -39,7 +44,12 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
-    return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) * np.conj(data)
+    half = data.shape[-1] // 2
+    tones = np.fft.fft(samples, axis=-1)
+    result = np.conj(np.broadcast_to(data, tones.shape))
+    result[..., half:] *= tones[..., : tones.shape[-1] - half]
+    result[..., :half] *= tones[..., tones.shape[-1] - half :]
+    return result
 
 
 def turned(angle_rad: np.ndarray) -> np.ndarray:
