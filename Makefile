@@ -1,9 +1,13 @@
 # Two commands do everything: `make` (set up, then the embedded default) and `make test` (set up, then the tests).
-# Set-up happens once: it is a file that depends on the pins and the package's metadata.
+# Each step of set-up happens once: it is a file that depends on the pins and the package's metadata.
 PYTHON ?= python3
 CORES ?= all
 BIN := .venv/bin
+comma := ,
+# Packages that make data; those of training as well, which are most of the bytes; those of tests and linters as well.
+BASE := .venv/set-up-data
 SETUP := .venv/set-up
+TESTING := .venv/set-up-tests
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
@@ -15,20 +19,41 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 all: default
 
+# Bytecode is kept even where the caller's environment says otherwise: a job of training spends 7 s on compiling torch's
+# modules without it, a short job 1 s.
+unexport PYTHONDONTWRITEBYTECODE
+
 # uv installs the same pinned packages in less time than pip; pip does it where uv cannot (an index that only pip knows).
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-PACKAGES := -c envs/constraints.txt -e '.[workflow,cost,recognition,test,tools,lint]'
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt -e '.[$(1)]' || $(PIP) -c envs/constraints.txt -e '.[$(1)]'
 
-$(SETUP): pyproject.toml envs/constraints.txt
+$(BASE): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(PIP) -c envs/constraints.txt uv && $(BIN)/uv pip install --quiet --python $(BIN)/python $(PACKAGES) || $(PIP) $(PACKAGES)
+	$(PIP) -c envs/constraints.txt uv || true
+	$(call install,workflow$(comma)cost)
+	rm -f $(SETUP) $(TESTING)
 	touch $@
 
-default: $(SETUP)  ## the embedded default: data, training, evaluation, report in results/default
+$(SETUP): $(BASE)
+	$(call install,workflow$(comma)cost$(comma)recognition)
+	touch $@
+
+$(TESTING): $(SETUP)
+	$(call install,workflow$(comma)cost$(comma)recognition$(comma)test$(comma)tools$(comma)lint)
+	touch $@
+
+# Where the packages of training are not there yet, they come while the data are made.
+default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
+	@test -e $(SETUP) || $(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile
 	$(SNAKEMAKE)
 
-data: $(SETUP)  ## the default's data set only, no training
+# From a warm cache the packages are there in seconds; only a download is worth a Snakemake of its own.
+.PHONY: meanwhile
+meanwhile: $(BASE)
+	@for second in 1 2 3 4 5 6 7 8; do test -e $(SETUP) && exit; sleep 1; done; $(SNAKEMAKE) -- prepared
+
+data: $(BASE)  ## the default's data set only, no training
 	$(SNAKEMAKE) -- data
 
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
@@ -42,19 +67,19 @@ measured: $(SETUP)  ## recordings held against their radars' twins: make measure
 	cp results/measured/measured-*.csv results/measured/measured-vehicle.png results/reference/
 	cp results/measured/measured-short.png design/pictures/measured.png
 
-test: $(SETUP)  ## the test suite
+test: $(TESTING)  ## the test suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"
 
-test-slow: $(SETUP)  ## the slow checks
+test-slow: $(TESTING)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
 
-lint: $(SETUP)  ## ruff, snakefmt, snakemake --lint
+lint: $(TESTING)  ## ruff, snakefmt, snakemake --lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
-format: $(SETUP)
+format: $(TESTING)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 	$(BIN)/snakefmt Snakefile workflow
@@ -155,7 +180,7 @@ reference:  ## keep the small tables of the finished default and real runs
 pictures: $(SETUP)  ## the README's picture, from the finished default run
 	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
 
-pins: $(SETUP)  ## write the installed versions as the pins
+pins: $(TESTING)  ## write the installed versions as the pins
 	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
 
 help:

@@ -69,6 +69,13 @@ rule training_samples:
     localrule: True
 
 
+# What needs no torch before the first training: `make` has it made while torch is still on its way.
+rule prepared:
+    input:
+        products.prepared,
+    localrule: True
+
+
 rule choices:
     input:
         f"results/{RUN.name}/choices.csv",

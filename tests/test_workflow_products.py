@@ -1,6 +1,9 @@
 """The workflow's logic without Snakemake: names, files and settings that follow from a configuration."""
 
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -83,6 +86,30 @@ def test_an_echo_job_for_all_stations_hears_all():
     assert products.listening(CHUNK) == run.stations == ["A", "B", "C"]
     names = products.benchmarks(CHUNK)
     assert "results/default/benchmarks/echo/seen-00001.jsonl" in names and len(set(names)) == len(names)
+
+
+def test_what_is_prepared_is_all_that_trainings_and_the_page_wait_for():
+    run, products, _ = parts()
+    prepared = set(products.prepared(CHUNK))
+    samples = [products.samples(SimpleNamespace(scheme=scheme)) for scheme in run.schemes_by_slug]
+    trained = {name for read in samples for name in read["views"]}
+    assert trained | {"results/default/SHA256SUMS"} <= prepared
+    page = products.report(CHUNK)
+    assert {page[name] for name in ("gallery", "distances", "echo_cost_figure")} <= prepared
+    assert not {name for name in prepared if "/models/" in name or "/predictions/" in name}
+    _, without, _ = parts({"report": {"cost": False}, "recognition": {"cache": False}})
+    assert not {name for name in without.prepared(CHUNK) if "cost" in name or "/views/" in name}
+
+
+def test_stages_before_the_first_training_do_without_torch():
+    """In a process of its own: torch is not to be found there, as while `make` is still fetching it."""
+    stages = ["targets", "targets.gallery", "motion", "echo", "noise", "tiles", "shards", "shards.card", "recognition"]
+    stages += ["recognition.views", "recognition.freeze", "recognition.distances", "measure.echo_cost"]
+    stages += ["measure.echo_pixels", "report.figures.echo_cost", "common.config", "workflow.run"]
+    program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
+    program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    subprocess.run([sys.executable, "-c", program], env=environment, check=True)
 
 
 def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():

@@ -205,6 +205,16 @@ class Products:
             files["effects"], files["effects_figure"] = f"{base}/effects.csv", f"{base}/effects.png"
         return files
 
+    def prepared(self, wildcards: Any) -> list[str]:
+        """All that the run makes without torch before its first training; nothing where its data are another run's."""
+        run, base = self._run, f"results/{self._run.name}"
+        if run.data != run.name:
+            return []
+        names = ["SHA256SUMS", "distances.csv", "clouds.png", "shards/README.md"]
+        names += ["cost.png"] if self._config["report"]["cost"] else []
+        views = self.own_views(wildcards) if self._config["recognition"]["cache"] else []
+        return [*(f"{base}/{name}" for name in names), *views]
+
     def page_templates(self, wildcards: Any) -> list[str]:
         """The templates of the page and of its sections."""
         return [near(path) for path in sorted((PACKAGE / "report").rglob("*.html"))]
