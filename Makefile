@@ -15,7 +15,7 @@ TABLES := accuracy comparisons confusion subtypes stages alarms calibration reli
 NUMPYS := 2.0.0 2.4.6
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 
-.PHONY: all default data real measured test test-slow lint format bench bench-workflow status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
+.PHONY: all default data real measured test test-slow lint format bench bench-workflow bench-make status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
 all: default
 
@@ -25,22 +25,24 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # uv installs the same pinned packages in less time than pip; pip does it where uv cannot (an index that only pip knows).
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt -e '.[$(1)]' || $(PIP) -c envs/constraints.txt -e '.[$(1)]'
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt $(1) || $(PIP) -c envs/constraints.txt $(1)
+# The packages that an extra of pyproject.toml names, without this package: a Snakemake that runs would miss it for a moment.
+of_extra = $$($(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["$(1)"])')
 
 $(BASE): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(PIP) -c envs/constraints.txt uv || true
-	$(call install,workflow$(comma)cost)
+	$(call install,-e '.[workflow$(comma)cost]')
 	rm -f $(SETUP) $(TESTING)
 	touch $@
 
 $(SETUP): $(BASE)
-	$(call install,workflow$(comma)cost$(comma)recognition)
+	$(call install,$(call of_extra,recognition))
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,workflow$(comma)cost$(comma)recognition$(comma)test$(comma)tools$(comma)lint)
+	$(call install,$(call of_extra,test) $(call of_extra,tools) $(call of_extra,lint))
 	touch $@
 
 # Where the packages of training are not there yet, they come while the data are made.
@@ -96,8 +98,13 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
 
-bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 short jobs: results/benchmarks/workflow.csv
-	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/workflow.csv
+bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 short jobs: results/benchmarks/scheduling.csv
+	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/scheduling.csv
+
+# LABEL names the rows, for example a revision; COLD=--cold fetches all packages from their index.
+LABEL ?= this revision
+bench-make: $(SETUP)  ## wall and processor time of `make` from an empty clone, part by part: results/benchmarks/workflow.csv
+	$(BIN)/python benchmarks/from_clone.py --out results/benchmarks/workflow.csv --label '$(LABEL)' $(COLD)
 
 status: $(SETUP)  ## what a run in another terminal is doing
 	@$(BIN)/python -m lowalt.workflow.status

@@ -1,6 +1,6 @@
 """What Snakemake itself takes of a run: its processor time, and the time in which its cores have no job.
 
-    python benchmarks/workflow.py --out results/benchmarks/workflow.csv [--jobs 1000 10000] [--slots 20] [--seconds 1]
+    python benchmarks/workflow.py --out results/benchmarks/scheduling.csv [--jobs 1000 10000] [--slots 20] [--seconds 1]
 
 Runs `benchmarks/workflow/Snakefile`, whose jobs only sleep, with the rounds mended by `lowalt.workflow.scheduling`, and
 the smallest number of jobs also as Snakemake does it. Sleeping jobs leave the processor to Snakemake, so more of them
@@ -12,6 +12,7 @@ run at a time than there are cores (`--slots`), and 10 000 jobs do not take hour
     wall_s              duration of the whole command (s), with the start of Snakemake and the graph of jobs
     snakemake_s         processor time of Snakemake's own process (s)
     snakemake_percent   snakemake_s in percent of job_s
+    start_s             time from the command to the first job (s): modules, rules, graph of jobs
     empty_s             time in which no job ran (s)
     unused_percent      time of the slots in which they had no job, in percent of slots x wall_s
 """
@@ -29,8 +30,8 @@ from lowalt.common.hardware import describe
 FOLDER = Path(__file__).parent / "workflow"
 SOURCE = Path(__file__).parents[1] / "src"
 COLUMNS = (
-    "what", "jobs", "slots", "job_s", "wall_s", "snakemake_s", "snakemake_percent", "empty_s", "unused_percent",
-    "hardware",
+    "what", "jobs", "slots", "job_s", "wall_s", "snakemake_s", "snakemake_percent", "start_s", "empty_s",
+    "unused_percent", "hardware",
 )  # fmt: skip
 PROGRAM = """
 import atexit, pathlib, sys, time
@@ -51,12 +52,16 @@ def union(intervals: list[tuple[float, float]]) -> float:
     return covered
 
 
-def row(what: str, intervals: list[tuple[float, float]], slots: int, wall_s: float, own_s: float) -> dict:
-    """Return a line of the table from the jobs' intervals (s) and the whole command's duration and own time (s)."""
+def row(
+    what: str, intervals: list[tuple[float, float]], slots: int, command: tuple[float, float], own_s: float
+) -> dict:
+    """Return a line of the table from the intervals (begin, end) of jobs and command, and its own time (s)."""
+    wall_s = command[1] - command[0]
     job_s = sum(end - begin for begin, end in intervals)
     return {
         "what": what, "jobs": len(intervals), "slots": slots, "job_s": short(job_s), "wall_s": short(wall_s),
         "snakemake_s": short(own_s), "snakemake_percent": short(100 * own_s / job_s),
+        "start_s": short(min(begin for begin, _ in intervals) - command[0]),
         "empty_s": short(wall_s - union(intervals)),
         "unused_percent": short(100 * (1 - job_s / (slots * wall_s))), "hardware": describe(),
     }  # fmt: skip
@@ -76,7 +81,7 @@ def sleeping(jobs: int, slots: int, seconds: float, mended: bool) -> dict:
         files = [path for stage in ("first", "second") for path in (Path(folder) / stage).iterdir()]
         intervals = [tuple(map(float, path.read_text().split())) for path in files]
     rounds = "mended rounds" if mended else "rounds as installed"
-    return row(f"sleeping jobs of {seconds:g} s; {rounds}", intervals, slots, end - begin, own)
+    return row(f"sleeping jobs of {seconds:g} s; {rounds}", intervals, slots, (begin, end), own)
 
 
 def main() -> None:

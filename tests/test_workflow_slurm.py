@@ -62,9 +62,22 @@ def node_of(job):
     return found[1] if found else None
 
 
-def restarts(job):
-    """How often Slurm has begun a job anew."""
-    return int(re.search(r"Restarts=(\d+)", ask("scontrol", "show", "job", job))[1])
+def watched(run, folder):
+    """Wait for the run's end; node and restarts of every chunk job, asked for now: Slurm forgets jobs in minutes."""
+    seen, stop = {}, time.monotonic() + 1800
+    while True:
+        ended = run.poll() is not None
+        for job in chunk_jobs(folder):
+            text = ask("scontrol", "show", "job", job)
+            node = re.search(r"^\s*NodeList=(n\S+)", text, re.MULTILINE)
+            if node:
+                seen[job] = node[1], int(re.search(r"Restarts=(\d+)", text)[1])
+        if ended:
+            break
+        assert time.monotonic() < stop, (folder / "said.txt").read_text()[-3000:]
+        time.sleep(1)
+    assert run.returncode == 0, (folder / "said.txt").read_text()[-3000:]
+    return seen
 
 
 def chunk_jobs(folder):
@@ -74,8 +87,7 @@ def chunk_jobs(folder):
 @needs_slurm
 def test_two_nodes_make_the_local_bytes_in_few_jobs(local, tmp_path):
     run = start(tmp_path)
-    assert run.wait(900) == 0, (tmp_path / "said.txt").read_text()[-3000:]
-    assert {node_of(job) for job in chunk_jobs(tmp_path)} == set(NODES)
+    assert {node for node, _ in watched(run, tmp_path).values()} == set(NODES)
     # Clouds, half as many as there are chunks, and what describes the data set.
     assert len(submitted(tmp_path)) <= 1 + CHUNKS // 2 + 2
     assert checksums(tmp_path) == local
@@ -93,9 +105,9 @@ def test_a_lost_node_costs_its_jobs_only(local, tmp_path):
         # Its jobs end, as those of a node whose power fails; it must not come back before the run has ended.
         ask("scontrol", "update", f"nodename={NODES[-1]}", "state=down", "reason=lost")
         ask("scontrol", "update", f"nodename={NODES[-1]}", "state=drain", "reason=lost")
-        assert run.wait(900) == 0, (tmp_path / "said.txt").read_text()[-3000:]
+        seen = watched(run, tmp_path)
     finally:
         ask("scontrol", "update", f"nodename={NODES[-1]}", "state=resume")
-    again = {job: restarts(job) for job in chunk_jobs(tmp_path)}
-    assert again == {job: int(job == lost) for job in again} and node_of(lost) == NODES[0]
+    again = {job: begun for job, (_, begun) in seen.items()}
+    assert again == {job: int(job == lost) for job in chunk_jobs(tmp_path)} and seen[lost][0] == NODES[0]
     assert checksums(tmp_path) == local
