@@ -59,16 +59,16 @@ def load(run: Path, count: int) -> tuple[Network, Spectra, np.ndarray]:
 def usual_values(signal: np.ndarray, carrier_hz: float, network: Network, spectra: Spectra) -> list[np.ndarray]:
     """VRP, TRP and VT as one would first write them: scipy's STFT, and a matrix product for the matched speeds."""
     values = []
-    for setting in (spectra.vrp, spectra.trp):
+    for setting in (spectra["vrp"], spectra["trp"]):
         _, _, found = scipy.signal.stft(
             signal, window="boxcar", nperseg=setting.window, noverlap=setting.window - setting.hop,
             nfft=setting.points, return_onesided=False, boundary=None, padded=False,
         )  # fmt: skip
         values.append(np.abs(np.fft.fftshift(found, axes=0))[:, :-1])
-    length = spectra.vt.window
+    length = spectra["vt"].window
     segments = np.lib.stride_tricks.sliding_window_view(signal, length + 1)[: len(signal) - length]
     phase = 4 * np.pi * carrier_hz * network.symbol_interval_s / SPEED_OF_LIGHT
-    matched = np.exp(1j * phase * np.outer(spectra.vt.speeds_mps, np.arange(length + 1)))
+    matched = np.exp(1j * phase * np.outer(spectra["vt"].speeds_mps, np.arange(length + 1)))
     short, longer = matched[:, :length] @ segments[:, :length].T, matched @ segments.T
     values.append(np.abs(longer * length / (length + 1)) ** 2 - np.abs(short) ** 2)
     return values

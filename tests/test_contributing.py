@@ -1,5 +1,6 @@
 """What CONTRIBUTING.md promises: where it says that one new file is enough, one new file is enough."""
 
+import json
 import os
 import re
 import shutil
@@ -37,15 +38,105 @@ ENTRY = """      dc_offset:
 """
 
 
-def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(tmp_path):
+SPECTRUM = '''"""Power: the mean power of a window, the same in every row. For trying out a new spectrum."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lowalt.spectra.segments import segments
+
+TITLE = "mean power"
+SOURCE = "any textbook, ch. 3"
+SIGNED = True
+ZERO_FIRST = False
+
+
+@dataclass(frozen=True)
+class Settings:
+    """`window` and `hop` in symbols."""
+
+    window: int
+    hop: int
+
+
+DEFAULTS = Settings(32, 1)
+
+
+def rows(settings):
+    """Return the number of rows."""
+    return 16
+
+
+def speeds(settings, frequency_hz, symbol_interval_s):
+    """Return the speeds of the first and the last row."""
+    return -1.0, 1.0
+
+
+def definition(signals, settings, name, frequency_hz, symbol_interval_s):
+    """Return the power of every window, (..., symbols) -> (..., 16, windows)."""
+    power = np.mean(abs(segments(signals, settings.window, settings.hop, name)) ** 2, axis=-1)
+    return np.repeat(power[..., None, :], 16, axis=-2)
+
+
+def tables(settings, frequency_hz, symbol_interval_s):
+    """Return no tables."""
+    return ()
+
+
+def fill(re, im, settings, tables, out):
+    """Fill out (16, starts) float32."""
+    power = np.convolve(re * re + im * im, np.full(settings.window, 1 / settings.window), "valid")
+    out[:] = power[: out.shape[1]]
+'''
+SPECTRUM_ENTRY = """      power:
+        description: mean power of a window
+        type: object
+        additionalProperties: false
+        required: [window, hop]
+        properties: {window: {type: integer, minimum: 2}, hop: {type: integer, minimum: 1}}
+"""
+SPECTRUM_TRIAL = """
+import json, sys
+import numpy as np
+import torch
+from lowalt.common.config import load
+from lowalt.common.network import Network
+from lowalt.recognition.augment import augment
+from lowalt.recognition.schemes import columns_in, scheme
+from lowalt.spectra import Spectra, spectrum
+from lowalt.tiles.device import DeviceRenderer
+from lowalt.tiles.render import Renderer, split
+
+config = load(["config/default.yaml", *sys.argv[1:]], "workflow/schemas/config.schema.yaml")
+tiles = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
+rng = np.random.default_rng(1)
+signals = rng.standard_normal((3, 400, 2)).view(np.complex128)[..., 0].astype(np.complex64)
+tile = tiles.tile(signals)
+images = split(tile, len(tiles.spectra))
+device = DeviceRenderer(tiles).images(signals[None]).numpy()[0]
+row = {"scheme": "BC:VRP+POWER", "stations": "BC", "spectra": "VRP+POWER", "fusion": "mean"}
+row |= {"backbone": "", "protocols": "seen"}
+seen = scheme(row, "here", ["A", "B", "C"])
+facts = {"spectra": list(tiles.spectra), "shape": tile.shape, "device": bool((device == images).all())}
+if "power" in tiles.spectra:
+    facts["columns"] = columns_in(seen.columns, list(tiles.spectra), 3, "here")
+    blank = dict.fromkeys(("mirror", "shift_doppler", "shift_time", "contrast", "mask_time", "drop_view"), 0.0)
+    chosen = images[facts["columns"]][None]
+    facts["zeros"] = augment(chosen, seen.columns, {**blank, "mask_doppler": 1.0}, rng)[0].min(axis=(1, 2)).tolist()
+    values = np.empty((256, 256), np.float32)
+    tiles.values(signals[0], 0, "power", values)
+    whole = spectrum("power").definition(signals[0], tiles.spectra["power"], "power", 1.0, 1.0)
+    facts["mean"] = float(abs(values.mean() / whole.mean() - 1))
+print(json.dumps(facts))
+"""
+
+
+@pytest.fixture
+def tree(tmp_path):
+    """A copy of the tree, and a function that runs Python there and returns what it prints."""
     for name in ("src", "config", "workflow"):
         shutil.copytree(ROOT / name, tmp_path / name)
-    (tmp_path / "src/lowalt/effects/receiver/dc_offset.py").write_text(EFFECT)
-    schema = tmp_path / "workflow/schemas/config.schema.yaml"
-    text = schema.read_text()
-    assert text.count("      adc:\n") == 1
-    schema.write_text(text.replace("      adc:\n", ENTRY + "      adc:\n"))
-    (tmp_path / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")
     environment = {**os.environ, "PYTHONPATH": str(tmp_path / "src")}
 
     def python(*arguments):
@@ -55,6 +146,22 @@ def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_
         assert run.returncode == 0, run.stderr
         return run.stdout
 
+    return tmp_path, python
+
+
+def enter(folder: Path, before: str, entry: str) -> None:
+    """Write an entry into the schema of a copy of the tree, before the line `before`."""
+    schema = folder / "workflow/schemas/config.schema.yaml"
+    text = schema.read_text()
+    assert text.count(before) == 1
+    schema.write_text(text.replace(before, entry + before))
+
+
+def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(tree):
+    folder, python = tree
+    (folder / "src/lowalt/effects/receiver/dc_offset.py").write_text(EFFECT)
+    enter(folder, "      adc:\n", ENTRY)
+    (folder / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")
     found = python("-m", "lowalt", "explain", "scene.yaml", "--sample", "Crow:0", "--station", "A")
     # Documented: its place, its parameter and its source. Priced: milliseconds added. Run: the signal is another.
     (line,) = [line for line in found.splitlines() if line.startswith("dc_offset")]
@@ -69,6 +176,25 @@ def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_
     names = python("-c", program).split()
     # Its place in the chain is the last of the receiver's, before detection begins.
     assert names.index("adc") + 1 == names.index("dc_offset") == names.index("canceller") - 1
+
+
+def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented_and_priced(tree):
+    folder, python = tree
+    (folder / "src/lowalt/spectra/kinds/power.py").write_text(SPECTRUM)
+    enter(folder, "      vrp: &fourier\n", SPECTRUM_ENTRY)
+    (folder / "more.yaml").write_text("run: more\nspectra: {power: {window: 16, hop: 2}, trp: null}\n")
+    listed = python("-m", "lowalt", "spectra", "more.yaml").splitlines()
+    pattern = r"power \(mean power\): 16 rows, 192 windows, zero at index 128, \d+\.\d\d ms an image \| window 16"
+    (line,) = [number for number, line in enumerate(listed) if re.match(pattern, line)]
+    assert listed[line + 1] == "  any textbook, ch. 3"
+    # The configuration decides: without an entry there, the new file changes nothing.
+    before = json.loads(python("-c", SPECTRUM_TRIAL))
+    assert before == {"spectra": ["vrp", "trp", "vt"], "shape": [768, 768], "device": True}
+    found = json.loads(python("-c", SPECTRUM_TRIAL, "more.yaml"))
+    assert found["spectra"] == ["vrp", "vt", "power"] and found["shape"] == [768, 768] and found["device"]
+    assert found["columns"] == [3, 5, 6, 8]
+    assert found["zeros"] == [0, 128, 0, 128]
+    assert found["mean"] < 0.02
 
 
 @pytest.mark.parametrize("name", ["CONTRIBUTING.md", "README.md", "design/interfaces.md"])

@@ -21,8 +21,8 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.freeze import freeze
 from lowalt.recognition.samples import Facts, ViewSamples, joined_views, write
 from lowalt.shards.record import record, row_of
-from lowalt.targets.__main__ import make
 from lowalt.targets.cloud import cloud_of, extent, scaled
+from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls

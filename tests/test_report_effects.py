@@ -138,7 +138,7 @@ def test_no_effect_changes_nothing_and_gives_the_images_of_the_run():
     noisy = noisy_signals(clean.swapaxes(0, 1), [row(0), row(1)], ["A", "B"], [3.0, INFINITY], 3)
     for model, level in np.ndindex(2, 2):
         np.testing.assert_array_equal(
-            found["views"][model, level], resize(split(tiles.tile(noisy[model, level])), SIZE)
+            found["views"][model, level], resize(split(tiles.tile(noisy[model, level]), 3), SIZE)
         )
     assert (found["total_ms"] > 0).all() and (found["base_ms"] > 0).all()
 
@@ -163,6 +163,7 @@ def fake(name, effects, added, snrs, motion=6):
         "signal_change": np.full(shape, 0.25), "cells_changed": np.full(shape, 0.5),
         "pixels_changed": np.full(motion, 0.125), "pixel_difference": np.full(motion, 3.0),
         "example": rng.integers(0, 256, (2, 6, 8, 8), dtype=np.uint8), "example_subtype": np.array("Crow"),
+        "spectra": np.array(["vrp", "trp", "vt"]),
     }  # fmt: skip
 
 
@@ -257,7 +258,7 @@ def test_the_table_is_read_back_and_the_figure_has_a_pair_for_every_call(tmp_pat
     assert float(back[3]["parts_ms"]) == 5.0 and back[2]["effects"] == "adc"
     lines = read_rows(tmp_path / "effects.csv")
     assert [(line["added_ms"], line["parts_ms"]) for line in lines[2:]] == [(4.0, ""), (4.5, 5.0)]
-    examples = {header["name"]: ("Crow", arrays["example"]) for header, arrays in CALLS}
+    examples = {header["name"]: ("Crow", arrays["example"], ["vrp", "trp", "vt"]) for header, arrays in CALLS}
     picture = np.asarray(Image.open(io.BytesIO(figure(lines, examples))).convert("RGB"))
     # Without effects there is no pair: more calls make a taller picture.
     fewer = np.asarray(Image.open(io.BytesIO(figure(lines[:2], examples))).convert("RGB"))
@@ -269,9 +270,9 @@ def test_the_spectrum_that_changes_most_is_shown():
     pair = np.zeros((2, 6, 4, 4), np.uint8)
     pair[1, 1], pair[1, 2, 0, 0], pair[1, 5] = 3, 255, 255
     # Number 5 is the second station's.
-    assert most_changed(pair) == 2
+    assert most_changed(pair, 3) == 2
     pair[1, 1] = 20
-    assert most_changed(pair) == 1
+    assert most_changed(pair, 3) == 1
 
 
 def test_the_command_writes_what_it_measured_and_names_what_is_missing(tmp_path):
@@ -315,7 +316,8 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
     # Labels that are right at one sample of each motion model at least.
     label = told[:, 0]
     settings = {"batch": 4, "threads": 1, "precision": "fp32", "mirror": False}
-    right, about = recognised(tmp_path / "model.pt", [({"name": "none"}, {"views": views, "label": label})], settings)
+    arrays = {"spectra": np.array(["vrp", "trp", "vt"]), "views": views, "label": label}
+    right, about = recognised(tmp_path / "model.pt", [({"name": "none"}, arrays)], settings)
     np.testing.assert_array_equal(right["none"], told == label[:, None])
     assert about == {"scheme": "BC:VRP+VT", "protocol": "seen"}
     with pytest.raises(InputError, match="images of 16 pixels"):

@@ -199,7 +199,7 @@ def test_shard_set_reads_any_sample(images):
         assert (shards.labels[number], shards.models[number]) == (entry["label"], entry["model"])
         assert shards.snrs_db[number] == row_of(entry)[1]
         tile, palette = decode(shards.png(number))
-        np.testing.assert_array_equal(shards.images(number), split(tile))
+        np.testing.assert_array_equal(shards.images(number), split(tile, 3))
         np.testing.assert_array_equal(shards.palette, palette)
     with pytest.raises(IndexError):
         shards.record(len(shards))

@@ -10,7 +10,7 @@ import yaml
 from dataset import SEED, SNRS, build
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main

@@ -77,7 +77,7 @@ def test_sliding_transfer_is_the_definition(dtype, window):
     signal = noise(400, seed=5).astype(np.complex128 if dtype == np.float64 else np.complex64)
     setting = Spectra(vt=Transfer(window, 1, -6.1, 6.1, 0.1))
     expected = vt(signal, CARRIER, INTERVAL, setting)
-    steps = np.outer(setting.vt.speeds_mps, np.arange(window + 1))
+    steps = np.outer(setting["vt"].speeds_mps, np.arange(window + 1))
     phase = 4 * np.pi * CARRIER * INTERVAL / SPEED_OF_LIGHT * steps
     share = np.array([(window / (window + 1)) ** 2], dtype)
     found = np.empty(expected.shape, dtype)
@@ -104,7 +104,7 @@ def test_speed_of_a_receding_point_is_read_back(speed):
     echo = np.exp(-4j * np.pi * CARRIER * speed * INTERVAL * np.arange(400) / SPEED_OF_LIGHT)
     frequency = (vrp(echo)[:, 70].argmax() - 128) / 256 / INTERVAL
     assert abs(frequency + 2 * CARRIER * speed / SPEED_OF_LIGHT) <= 0.5 / 256 / INTERVAL + 1e-9
-    speeds = Spectra().vt.speeds_mps
+    speeds = Spectra()["vt"].speeds_mps
     transition = np.abs(vt(echo, CARRIER, INTERVAL)[:, 70])
     # A steady point gains nothing at its own speed: |9|^2 (8/9)^2 - |8|^2 = 0.
     assert transition[np.abs(speeds - speed).argmin()] < 1e-9 * transition.max()
@@ -150,7 +150,7 @@ BLOCK = {
 
 def test_settings_default_to_the_published_ones():
     assert Spectra.from_settings(BLOCK) == Spectra()
-    np.testing.assert_allclose(Spectra().vt.speeds_mps, np.arange(-61, 62) / 10, atol=1e-12)
+    np.testing.assert_allclose(Spectra()["vt"].speeds_mps, np.arange(-61, 62) / 10, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_lookup_counts_thresholds_exactly(scale, levels):
 def test_renderer_agrees_with_the_definition(scale):
     """float32 against the float64 definition: at most one level off, and seldom."""
     signals, tiles = echoes(), renderer(scale)
-    found = split(tiles.tile(signals)).astype(int)
+    found = split(tiles.tile(signals), 3).astype(int)
     for station in range(3):
         carrier = tiles.network.stations[station].frequency_hz
         spectra = (vrp(signals[station]), trp(signals[station]), vt(signals[station], carrier, 2.5e-3))
@@ -99,10 +99,10 @@ def test_renderer_agrees_with_the_definition(scale):
 def test_renderer_against_the_loops():
     """A small sample, all the way from the definitions in loops."""
     block = {**NETWORK, "symbols": 40, "stations": {"A": NETWORK["stations"]["A"]}}
-    spectra = Spectra(Fourier(16, 1, 16), Fourier(8, 2, 32), Transfer(6, 1, -3.0, 3.0, 0.25))
+    spectra = Spectra(vrp=Fourier(16, 1, 16), trp=Fourier(8, 2, 32), vt=Transfer(6, 1, -3.0, 3.0, 0.25))
     tiles = Renderer(Network.from_settings(block), spectra, Images(24, Scale("linear")))
     signal = echoes(3)[:1, :40]
-    images = split(tiles.tile(signal)).astype(int)
+    images = split(tiles.tile(signal), 3).astype(int)
     speeds = [-3 + 0.25 * step for step in range(25)]
     values = [
         reference.stft(signal[0], 16, 1, 16),
@@ -122,7 +122,7 @@ def test_orientation_of_axes():
     rising = np.exp(2j * np.pi * 100 * 2.5e-3 * times) * (times > 200)
     receding = np.exp(-4j * np.pi * 4.9e9 * 4.0 * 2.5e-3 * times / 299792458) * (times % 50 < 25)
     tile = renderer(Scale("linear")).tile(np.stack([rising, receding, 0 * rising]).astype(np.complex64))
-    images = split(tile)
+    images = split(tile, 3)
     # 100 Hz of the +-200 Hz stands a quarter from the top and only in the second half of the time.
     assert abs(int(images[1][:, 200].argmax()) - 64) <= 1
     assert images[1][:, :120].max() == 0
@@ -131,16 +131,16 @@ def test_orientation_of_axes():
     assert np.abs(images[5].astype(int) - 128).sum(axis=1).argmax() < 128
     assert (images[6] == 0).all() and (images[8] == 128).all()
     np.testing.assert_array_equal(tile[:256, 256:512], images[1])
-    np.testing.assert_array_equal(join(images), tile)
+    np.testing.assert_array_equal(join(images, 3), tile)
 
 
 @pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
 def test_zero_and_constant_signals_have_defined_images(scale):
     tiles = renderer(scale)
-    zero = split(tiles.tile(np.zeros((3, 400), np.complex64)))
+    zero = split(tiles.tile(np.zeros((3, 400), np.complex64)), 3)
     assert (zero[[0, 1, 3, 4, 6, 7]] == 0).all()
     assert (zero[[2, 5, 8]] == 128).all()
-    constant = split(tiles.tile(np.full((3, 400), 0.25 + 0.5j, np.complex64)))
+    constant = split(tiles.tile(np.full((3, 400), 0.25 + 0.5j, np.complex64)), 3)
     # Frequency zero is bin 128 from below, row 127 from above; nothing changes along time.
     assert (constant[0][127] == 255).all() and (constant[0][[126, 128]] == 0).all()
     assert (constant == constant[..., :1]).all()
@@ -154,10 +154,10 @@ def test_extreme_snrs_have_defined_images(snr_db):
     clean = echoes(1, snr=0)
     grain = np.random.default_rng(2).standard_normal((2, 3, 400))
     noise = 1e-7 * 10 ** (-snr_db / 20) * (grain[0] + 1j * grain[1]) / np.sqrt(2)
-    images = split(renderer().tile((clean + noise).astype(np.complex64)))
+    images = split(renderer().tile((clean + noise).astype(np.complex64)), 3)
     assert ((images.max(axis=(1, 2)) == 255) | (images.min(axis=(1, 2)) == 1)).all()
     if snr_db == 200:
-        np.testing.assert_array_equal(images, split(renderer().tile(clean)))
+        np.testing.assert_array_equal(images, split(renderer().tile(clean), 3))
 
 
 @pytest.mark.parametrize("level", [1e-36, 1e-30, 1e-12, 1.0, 1e30])

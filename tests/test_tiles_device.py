@@ -31,16 +31,16 @@ def test_every_pixel_is_equal(device, scale):
     compiled, signals = renderer(scale), batch()
     found = DeviceRenderer(compiled, device).images(signals).cpu().numpy()
     for number, sample in enumerate(signals):
-        np.testing.assert_array_equal(found[number], split(compiled.tile(sample)))
+        np.testing.assert_array_equal(found[number], split(compiled.tile(sample), 3))
 
 
 @pytest.mark.parametrize("device", DEVICES)
 def test_other_windows_sizes_and_hops_are_equal(device):
     network = renderer().network
-    spectra = Spectra(Fourier(64, 2, 128), Fourier(4, 3, 64), Transfer(5, 2, -3.0, 3.0, 0.25))
+    spectra = Spectra(vrp=Fourier(64, 2, 128), trp=Fourier(4, 3, 64), vt=Transfer(5, 2, -3.0, 3.0, 0.25))
     compiled = Renderer(network, spectra, Images(100, Scale("linear")))
     found = DeviceRenderer(compiled, device).images(batch()[:2]).cpu().numpy()
-    np.testing.assert_array_equal(found, [split(compiled.tile(sample)) for sample in batch()[:2]])
+    np.testing.assert_array_equal(found, [split(compiled.tile(sample), 3) for sample in batch()[:2]])
     assert isinstance(network, Network)
 
 

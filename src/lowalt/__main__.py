@@ -1,4 +1,4 @@
-"""The command `lowalt`, for people: scenes explained, own targets made; stages have commands of their own
+"""The command `lowalt`, for people: scenes and spectra explained, own targets made; stages have commands of their own
 (python -m lowalt.STAGE)."""
 
 import argparse
@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from lowalt.commands import target
+from lowalt.commands import spectra, target
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -30,7 +30,7 @@ def _explained(given: argparse.Namespace) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run `lowalt explain SCENE` or `lowalt target ACTION`; returns the exit status."""
+    """Run `lowalt explain SCENE`, `lowalt spectra` or `lowalt target ACTION`; returns the exit status."""
     line = argparse.ArgumentParser(prog="lowalt", description=__doc__)
     commands = line.add_subparsers(dest="command", required=True)
     explain = commands.add_parser(
@@ -43,9 +43,10 @@ def main(arguments: list[str] | None = None) -> int:
     explain.add_argument("--station", help="the station that listens (default: the first)")
     explain.add_argument("--no-cost", action="store_true", help="do not measure times")
     target.add_to(commands)
+    spectra.add_to(commands, CONFIG, SCHEMA)
     given = line.parse_args(arguments)
     try:
-        text = target.run(given) if given.command == "target" else _explained(given)
+        text = {"target": target.run, "spectra": spectra.run, "explain": _explained}[given.command](given)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2

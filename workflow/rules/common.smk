@@ -1,6 +1,8 @@
 # What the rules share: the run that follows from the configuration, and the functions that rules name.
 # RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
 # options: parts of a command line that not every job has; code: the source files that a command runs.
+from functools import partial
+
 from snakemake.exceptions import WorkflowError
 
 from lowalt.common.environment import prepare
@@ -12,7 +14,7 @@ from lowalt.workflow.located import located
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
-from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code
+from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
 locks.install()
 scheduling.install()
@@ -26,6 +28,7 @@ except InputError as error:
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)
 settings = Settings(RUN, calls)
+code = partial(code_of, spectra=tuple(config["spectra"]))
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.
 DATA = f"results/{RUN.data}"

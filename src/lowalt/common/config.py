@@ -84,16 +84,16 @@ def faults(config: dict, schema: dict) -> list[str]:
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without the stations that are null.
+    """Return the configuration if it fits the schema, without the stations and spectra that are null.
 
-    Layers of configuration can only add keys to a mapping; a null takes a station of a lower layer out, in place.
-    Raises: InputError with one line a fault.
+    Layers of configuration can only add keys to a mapping; a null takes a station or a spectrum of a lower layer out,
+    in place. Raises: InputError with one line a fault.
     """
     network = config.get("network")
-    stations = network.get("stations") if isinstance(network, dict) else None
-    if isinstance(stations, dict):
-        for name in [name for name, place in stations.items() if place is None]:
-            del stations[name]
+    for block in (network.get("stations") if isinstance(network, dict) else None, config.get("spectra")):
+        if isinstance(block, dict):
+            for name in [name for name, value in block.items() if value is None]:
+                del block[name]
     found = faults(config, load_yaml(schema_path))
     if found:
         raise InputError("configuration refused:\n  " + "\n  ".join(found))

@@ -163,6 +163,7 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
     """
     from lowalt.recognition import recipe, runs
     from lowalt.recognition.inference import Machine, probabilities
+    from lowalt.recognition.schemes import columns_in
 
     batch, threads, precision, mirror = pick(block, "batch", "threads", "precision", "mirror")
     trained = runs.load(model)
@@ -174,7 +175,9 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
         if arrays["views"].shape[-1] != trained.size:
             raise InputError(f"{header['name']}: images of {arrays['views'].shape[-1]} pixels, {model} {trained.size}")
         count = arrays["views"].shape[0] * arrays["views"].shape[1]
-        held = _Held(arrays["views"], trained.scheme.columns)
+        names = arrays["spectra"].tolist()
+        stations = arrays["views"].shape[2] // len(names)
+        held = _Held(arrays["views"], columns_in(trained.scheme.columns, names, stations, header["name"]))
         told = probabilities(network, held, np.arange(count), machine, batch, mirror)
         found[header["name"]] = correct(told.reshape(*arrays["views"].shape[:2], -1), arrays["label"])
     return found, {"scheme": trained.scheme.name, "protocol": trained.protocol}

@@ -35,11 +35,12 @@ STEP = 8
 """Steps of the 256 by which a pixel must move to count as changed: about the smallest that an eye sees side by side."""
 ARRAYS = (
     "subtype", "model", "label", "snr_db", "base_ms", "total_ms", "signal_change", "cells_changed", "pixels_changed",
-    "pixel_difference", "views", "example", "example_subtype",
+    "pixel_difference", "views", "example", "example_subtype", "spectra",
 )  # fmt: skip
 """subtype, model, label (K,); snr_db (S,); base_ms, total_ms, signal_change and cells_changed (K, stations);
 pixels_changed and pixel_difference (K,); views (K, S, V, size, size) uint8; example (2, V, S, S) uint8: the spectra of
-the first UAV (of the first target, without one) without and with the effects, free of noise; its name."""
+the first UAV (of the first target, without one) without and with the effects, free of noise; its name; names of the
+spectra, in the order of the tiles."""
 
 
 class Take(NamedTuple):
@@ -122,8 +123,10 @@ def pixel_change(before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
 
 
 def views(tiles: Renderer, signals: np.ndarray, size: int) -> np.ndarray:
-    """Return the images that a network sees of signals (K, S, stations, N): (K, S, 3 stations, size, size) uint8."""
-    return np.stack([[resize(split(tiles.tile(one)), size) for one in levels] for levels in signals])
+    """Return the images that a network sees of signals (K, S, stations, N): (K, S, V, size, size) uint8."""
+    return np.stack([
+        [resize(split(tiles.tile(one), len(tiles.spectra)), size) for one in levels] for levels in signals
+    ])  # fmt: skip
 
 
 def measure(
@@ -146,14 +149,14 @@ def measure(
         pair = [tiles.tile(take.signal[index]) for take in (before, after)]
         changed[index], difference[index] = pixel_change(*pair)
         if index == shown:
-            example = np.stack([split(tile) for tile in pair])
+            example = np.stack([split(tile, len(tiles.spectra)) for tile in pair])
     return {
         "subtype": np.array([row["subtype"] for row in rows]), "model": np.array([row["model"] for row in rows]),
         "label": np.array([label(classes, row) for row in rows]), "snr_db": np.array(snrs, float),
         "base_ms": before.ms, "total_ms": after.ms, "signal_change": signal_change(before.signal, after.signal),
         "cells_changed": np.mean(before.cell != after.cell, axis=2), "pixels_changed": changed,
         "pixel_difference": difference, "views": views(tiles, noisy, size), "example": example,
-        "example_subtype": np.array(rows[shown]["subtype"]),
+        "example_subtype": np.array(rows[shown]["subtype"]), "spectra": np.array(list(tiles.spectra)),
     }  # fmt: skip
 
 

@@ -17,11 +17,9 @@ import numpy as np
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.recognition.schemes import SPECTRA
+from lowalt.spectra.catalogue import NAMES, zero_index
 
 KEYS = ("mirror", "shift_doppler", "shift_time", "contrast", "mask_doppler", "mask_time", "drop_view")
-ZERO_INDEX = {"VRP": 0, "TRP": 0, "VT": 128}
-"""Index of the value zero: VT is signed and symmetric about it."""
 
 
 def check(block: dict) -> dict:
@@ -45,12 +43,12 @@ def _contrast(exponent: float, zero: int) -> np.ndarray:
 def augment(images: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator) -> np.ndarray:
     """Return changed copies of index images (samples, views, rows, columns) uint8; rows are Doppler, columns time.
 
-    columns: which of the nine views they are. Equal generators give equal changes.
+    columns: numbers of their views (`Scheme.columns`). Equal generators give equal changes.
     """
     samples, views, rows, width = images.shape
     draws = generator.random((samples, 8))
     drops = generator.random((samples, views)) < block["drop_view"]
-    zeros = [ZERO_INDEX[SPECTRA[column % len(SPECTRA)]] for column in columns]
+    zeros = [zero_index(NAMES[column % len(NAMES)]) for column in columns]
     result = np.empty_like(images)
     for number in range(samples):
         draw = draws[number]

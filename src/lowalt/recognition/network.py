@@ -62,7 +62,7 @@ class Palettes(nn.Module):
     """
 
     def __init__(self, palettes: np.ndarray, spectra: tuple[int, ...], mean: tuple, std: tuple) -> None:
-        """palettes (3, 256, 3) uint8 by SPECTRA; mean, std: per channel, on colours in 0..1."""
+        """palettes (spectra, 256, 3) uint8 by SPECTRA; mean, std: per channel, on colours in 0..1."""
         super().__init__()
         if np.shape(palettes) != (len(SPECTRA), 256, 3):
             raise InputError(f"palettes have shape {np.shape(palettes)}, expected ({len(SPECTRA)}, 256, 3)")

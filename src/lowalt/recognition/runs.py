@@ -22,9 +22,10 @@ from lowalt.common.hardware import describe
 from lowalt.recognition import augment, checkpoint, metrics, network, predictions, recipe
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import SPECTRA, Scheme
+from lowalt.recognition.schemes import SPECTRA, Scheme, columns_in
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
+from lowalt.spectra.catalogue import named
 from lowalt.tiles import colour_map, resize
 
 Samples = ViewSamples | ShardSamples
@@ -157,36 +158,31 @@ def evaluate(
 
 
 def images_of(path: Path, settings: dict) -> np.ndarray:
-    """Return all index images (3 stations, S, S) uint8 of a signal file or a tile.
+    """Return all index images (stations spectra, S, S) uint8 of a signal file or a tile.
 
     path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
     Raises: InputError for another kind of file or a shape that does not fit.
     """
-    from lowalt.common.network import Network
-    from lowalt.spectra import Spectra
-    from lowalt.tiles import Images, Renderer, decode, split
+    from lowalt.tiles import Renderer, decode, split
 
+    spectra = len(named(settings["spectra"]))
     if path.suffix == ".png":
-        return split(decode(path.read_bytes())[0])
+        return split(decode(path.read_bytes())[0], spectra)
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
     try:
         signals = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: not an array file ({error})") from error
-    blocks = pick(settings, "network", "spectra", "images")
-    net, spectra, images = (
-        cls.from_settings(block) for cls, block in zip((Network, Spectra, Images), blocks, strict=True)
-    )
-    return split(Renderer(net, spectra, images).tile(signals))
+    return split(Renderer.from_settings(settings).tile(signals), spectra)
 
 
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     """Return the probability of each category for one signal file or tile, in full precision."""
     images = images_of(path, settings)
-    if len(images) <= max(trained.scheme.columns):
-        raise InputError(f"{path}: {len(images)} images, the model needs at least {max(trained.scheme.columns) + 1}")
-    views = resize(images, trained.size)[trained.scheme.columns]
+    names = named(settings["spectra"])
+    places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
+    views = resize(images, trained.size)[places]
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]
     return dict(zip(trained.classes, found.tolist(), strict=True))

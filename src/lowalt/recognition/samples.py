@@ -4,13 +4,15 @@ Both sources answer the same calls: `facts` (labels and what is known of each sa
 `views(numbers, columns)`, uint8 index images of the scheme's size. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
-    views   (samples, 3 stations, size, size) uint8, station-major, index images averaged over areas
+    views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over areas
+    spectra names of the spectra, in the order of the tiles
     one array (samples,) for every name of FACTS
 """
 
 import copy
 import hashlib
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -18,7 +20,8 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
-from lowalt.recognition.schemes import SPECTRA
+from lowalt.recognition.schemes import columns_in
+from lowalt.spectra.catalogue import LISTED
 
 
 @dataclass(frozen=True)
@@ -144,20 +147,17 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
             keep = np.array([pair in folds for pair in pairs], dtype=bool)
             if not keep.any():
                 return None
-            images = data["views"]
+            images, spectra = data["views"], data["spectra"].tolist()
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise InputError(f"{path}: not a views file ({error})") from error
-    count = len(SPECTRA) * facts.range_m.shape[1]
+    count = len(spectra) * facts.range_m.shape[1]
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
         raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)")
-    if max(columns) >= count:
-        raise InputError(
-            f"{path}: {facts.range_m.shape[1]} stations, the scheme needs {max(columns) // len(SPECTRA) + 1}"
-        )
-    return images[keep][:, columns], facts.take(keep)
+    places = columns_in(columns, spectra, facts.range_m.shape[1], str(path))
+    return images[keep][:, places], facts.take(keep)
 
 
-def write(path: str | Path, views: np.ndarray, facts: Facts) -> None:
-    """Write a cache file; equal samples give equal bytes."""
+def write(path: str | Path, views: np.ndarray, facts: Facts, spectra: Sequence[str] = LISTED) -> None:
+    """Write a cache file; equal samples give equal bytes. spectra: names in the order of the tiles."""
     with replacing(path, views.nbytes) as temporary:
-        np.savez(temporary, views=views, **{name: getattr(facts, name) for name in FACTS})
+        np.savez(temporary, views=views, spectra=np.array(spectra), **{name: getattr(facts, name) for name in FACTS})

@@ -23,10 +23,12 @@ from pathlib import Path
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
+from lowalt.spectra.catalogue import NAMES
 
 TABLE = "config/schemes.csv"
 """Where the table of schemes stands if a command names no other."""
-SPECTRA = ("VRP", "TRP", "VT")
+SPECTRA = tuple(name.upper() for name in NAMES)
+"""Spectra as the table of schemes writes them, in the catalogue's order."""
 FUSIONS = ("attention", "mean")
 PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
@@ -60,8 +62,27 @@ class Scheme:
 
     @property
     def columns(self) -> list[int]:
-        """Positions of the scheme's views among all views of a sample, station-major."""
+        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number.
+
+        `columns_in` gives their places in a data set, which may have fewer spectra.
+        """
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
+
+
+def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, where: str) -> list[int]:
+    """Return the places of views (`Scheme.columns`) among the images of a data set.
+
+    spectra: names of the data set's spectra, in the order of its tiles; stations: how many stations it has.
+    Raises: InputError naming `where` and the spectrum or the number of stations that is missing.
+    """
+    pairs = [divmod(column, len(NAMES)) for column in columns]
+    needed = 1 + max(station for station, _ in pairs)
+    if needed > stations:
+        raise InputError(f"{where}: {stations} stations, the scheme needs {needed}")
+    lacking = {NAMES[number] for _, number in pairs} - set(spectra)
+    if lacking:
+        raise InputError(f"{where}: spectra {list(spectra)}, the scheme also needs {sorted(lacking)}")
+    return [len(spectra) * station + list(spectra).index(NAMES[number]) for station, number in pairs]
 
 
 def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, where: str) -> tuple[int, ...]:

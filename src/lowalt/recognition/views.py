@@ -18,7 +18,7 @@ from lowalt.common.network import Network, station_names
 from lowalt.motion import read_table
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.schemes import SPECTRA
+from lowalt.recognition.schemes import columns_in
 from lowalt.shards import ShardSet
 from lowalt.tiles import reduced
 
@@ -138,7 +138,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
         views = np.empty((len(numbers), len(shards.columns()), size, size), dtype=np.uint8)
         for row, number in enumerate(numbers):
             views[row] = shards.images(number, size)
-    samples.write(out, views, facts)
+    samples.write(out, views, facts, shards.spectra)
     return len(numbers)
 
 
@@ -155,10 +155,10 @@ class ShardSamples:
         groups, names = sorted({group for group, _ in folds}), sorted({fold for _, fold in folds})
         self.shards, self.size = ShardSet(index, groups, names), size
         known = station_names(self.shards.index["render"]["network"])
-        if max(columns) >= len(SPECTRA) * len(known):
-            raise InputError(f"{index}: stations {known}, the scheme needs {max(columns) // len(SPECTRA) + 1} of them")
-        self.stations = [known[number] for number in sorted({column // len(SPECTRA) for column in columns})]
-        self.spectra = [SPECTRA[number].lower() for number in sorted({column % len(SPECTRA) for column in columns})]
+        names = self.shards.spectra
+        places = columns_in(columns, names, len(known), str(index))
+        self.stations = [known[number] for number in sorted({place // len(names) for place in places})]
+        self.spectra = [names[number] for number in sorted({place % len(names) for place in places})]
         flags = [[(shard["group"], shard["fold"]) in folds] * shard["samples"] for shard in self.shards.shards]
         self.numbers = np.flatnonzero(np.concatenate(flags)) if flags else np.zeros(0, dtype=np.int64)
         if not len(self.numbers):

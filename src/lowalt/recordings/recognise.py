@@ -13,10 +13,10 @@ from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load_yaml, merge
 from lowalt.common.errors import InputError
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.schemes import named
+from lowalt.recognition.schemes import SPECTRA, named
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
-from lowalt.tiles.render import VIEWS, Renderer, split
+from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
 
@@ -50,9 +50,9 @@ def settings(path: str | Path) -> dict:
 def rendered(intervals: np.ndarray, twin: Twin, images: Images, size: int) -> np.ndarray:
     """Return the images (n, 3, size, size) uint8 of coherent intervals (n, symbols), at a radar's own carrier."""
     renderer = Renderer(twin.network(intervals.shape[1]), twin.spectra(), images)
-    found = np.empty((len(intervals), len(VIEWS), size, size), np.uint8)
+    found = np.empty((len(intervals), len(renderer.spectra), size, size), np.uint8)
     for number, interval in enumerate(intervals):
-        found[number] = resize(split(renderer.tile(interval[None].astype(np.complex64))), size)
+        found[number] = resize(split(renderer.tile(interval[None].astype(np.complex64)), len(renderer.spectra)), size)
     return found
 
 
@@ -90,9 +90,8 @@ def recogniser(block: dict):
 
     scheme = named(block["table"], block["scheme"], ["A"])
     palette = Images.from_settings(block["images"]).palette
-    return Recogniser(
-        scheme, block["network"], block["size"], np.stack([palette] * len(VIEWS)), len(CATEGORIES)
-    ), scheme
+    palettes = np.stack([palette] * len(SPECTRA))
+    return Recogniser(scheme, block["network"], block["size"], palettes, len(CATEGORIES)), scheme
 
 
 def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder: str | Path):

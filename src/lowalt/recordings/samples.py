@@ -1,6 +1,7 @@
 """A recording as samples of the data set: signals, tiles and shards, by the functions that simulated signals use."""
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -99,13 +100,7 @@ def block(twin: Twin) -> dict:
 
 def spectra_block(twin: Twin) -> dict:
     """Return the twin's spectra as a configuration's `spectra` block."""
-    settings = twin.spectra()
-    fourier = {
-        name: {key: getattr(getattr(settings, name), key) for key in ("window", "hop", "points")}
-        for name in ("vrp", "trp")
-    }
-    keys = ("window", "hop", "speed_min_mps", "speed_max_mps", "speed_step_mps")
-    return {**fourier, "vt": {key: getattr(settings.vt, key) for key in keys}}
+    return {name: asdict(settings) for name, settings in twin.spectra().items()}
 
 
 def write_table(path: str | Path, columns: tuple[str, ...], rows: list) -> None:

@@ -19,7 +19,7 @@ from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.recordings.channel import SAMPLINGS
 from lowalt.recordings.courses import Course
 from lowalt.recordings.record import CHANNELS
-from lowalt.spectra.settings import Fourier, Spectra, Transfer
+from lowalt.spectra import Fourier, Spectra, Transfer
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import NODES
 
@@ -76,7 +76,7 @@ class Twin:
     def spectra(self) -> Spectra:
         """Return the project's three spectra; the matched speeds cover this radar's unambiguous ones in 123 steps."""
         edge = float(f"{self.edge_mps:.3g}")
-        return Spectra(Fourier(256, 1, 256), Fourier(8, 1, 1024), Transfer(8, 1, -edge, edge, edge / 61))
+        return Spectra(vrp=Fourier(256, 1, 256), trp=Fourier(8, 1, 1024), vt=Transfer(8, 1, -edge, edge, edge / 61))
 
 
 TOLERANCE = 1e-4

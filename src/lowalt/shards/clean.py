@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from lowalt.common.errors import InputError
-from lowalt.noise.__main__ import noisy_signals
+from lowalt.noise.chunk import noisy_signals
 from lowalt.shards.record import NO_NOISE_DB, sample_key
 
 POWER = "power_w"

@@ -5,7 +5,6 @@ Source: Croissant format specification 1.1 (MLCommons).
 
 from lowalt.common.classes import stated
 from lowalt.shards.table import EXTENSIONS
-from lowalt.tiles import VIEWS
 
 CONTEXT = {
     "@language": "en",
@@ -98,7 +97,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
     mime, data_type, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
-    meaning = meaning.format(len(VIEWS) * size, stations * size)
+    meaning = meaning.format(len(index["render"]["spectra"]) * size, stations * size)
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
     sets = [
         _files(

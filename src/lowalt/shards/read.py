@@ -15,16 +15,16 @@ import numpy as np
 from lowalt.common.classes import stated
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, sha256
-from lowalt.common.network import Network, station_names
+from lowalt.common.network import station_names
 from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.write import npy
-from lowalt.spectra import Spectra
+from lowalt.spectra.catalogue import named
 from lowalt.tiles.png import decode
-from lowalt.tiles.render import VIEWS, Renderer, split
+from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
 
@@ -102,12 +102,12 @@ class ShardSet:
     @functools.cached_property
     def renderer(self) -> Renderer:
         """What turns the signals of these shards into tiles, as the index says."""
-        block = self.index["render"]
-        return Renderer(
-            Network.from_settings(block["network"]),
-            Spectra.from_settings(block["spectra"]),
-            Images.from_settings(block["images"]),
-        )
+        return Renderer.from_settings({key: self.index["render"][key] for key in ("network", "spectra", "images")})
+
+    @property
+    def spectra(self) -> tuple[str, ...]:
+        """Names of the spectra, in the order of the columns of a tile."""
+        return named(self.index["render"]["spectra"])
 
     @property
     def palette(self) -> np.ndarray:
@@ -195,7 +195,7 @@ class ShardSet:
         stations: Iterable[str] | None = None,
         views: Iterable[str] | None = None,
     ) -> np.ndarray:
-        """Return the images of a sample, (9, S, S) uint8: station by station, VRP, TRP, VT.
+        """Return the images of a sample, (stations spectra, S, S) uint8, station by station.
 
         size: pixels a side, by the project's one resampling kernel; stations, views: names to keep, in their own
         order (signal and recipe shards then compute nothing else).
@@ -205,7 +205,7 @@ class ShardSet:
         if self.kind != "image":
             images = self.renderer.some(self.signal(number), numbers)
         else:
-            images = split(self.tile(number))[numbers]
+            images = split(self.tile(number), len(self.spectra))[numbers]
         return images if size in (None, images.shape[-1]) else resize(images, size)
 
     def columns(self, stations: Iterable[str] | None = None, views: Iterable[str] | None = None) -> list[int]:
@@ -214,10 +214,11 @@ class ShardSet:
         Raises: InputError naming an unknown one.
         """
         known = station_names(self.index["render"]["network"])
-        stations, views = list(known if stations is None else stations), list(VIEWS if views is None else views)
-        if set(stations) - set(known) or set(views) - set(VIEWS):
-            raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(VIEWS)}")
-        return [len(VIEWS) * known.index(station) + VIEWS.index(view) for station in stations for view in views]
+        spectra = self.spectra
+        stations, views = list(known if stations is None else stations), list(spectra if views is None else views)
+        if set(stations) - set(known) or set(views) - set(spectra):
+            raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(spectra)}")
+        return [len(spectra) * known.index(station) + spectra.index(view) for station in stations for view in views]
 
     def _need(self, *kinds: str) -> None:
         if self.kind not in kinds:

@@ -1,6 +1,20 @@
 """Time-frequency spectra of symbol-domain signals: VRP, TRP and VT (paper, section IV-B to IV-E)."""
 
-from lowalt.spectra.definitions import magnitudes, trp, vrp, vt
-from lowalt.spectra.settings import Fourier, Spectra, Transfer, windows
+from lowalt.spectra.catalogue import NAMES, Spectra, spectrum, zero_index
+from lowalt.spectra.definitions import trp, vrp, vt
+from lowalt.spectra.fourier import magnitudes
+from lowalt.spectra.settings import Fourier, Transfer, windows
 
-__all__ = ["Fourier", "Spectra", "Transfer", "magnitudes", "trp", "vrp", "vt", "windows"]
+__all__ = [
+    "NAMES",
+    "Fourier",
+    "Spectra",
+    "Transfer",
+    "magnitudes",
+    "spectrum",
+    "trp",
+    "vrp",
+    "vt",
+    "windows",
+    "zero_index",
+]

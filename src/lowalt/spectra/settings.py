@@ -1,10 +1,9 @@
-"""The settings of the three spectra: windows, hops, FFT points and the grid of matched speeds."""
+"""The settings of the paper's spectra: windows, hops, FFT points and the grid of matched speeds."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 
 
@@ -62,34 +61,6 @@ class Transfer:
         count = int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9)) + 1
         last = self.speed_min_mps + (count - 1) * self.speed_step_mps
         return np.linspace(self.speed_min_mps, last, count)
-
-
-@dataclass(frozen=True)
-class Spectra:
-    """The three spectra of a sample: velocity-resolution preferred, time-resolution preferred, velocity transfer."""
-
-    vrp: Fourier = Fourier(256, 1, 256)
-    trp: Fourier = Fourier(8, 1, 1024)
-    vt: Transfer = Transfer(8, 1, -6.1, 6.1, 0.1)
-
-    @classmethod
-    def from_settings(cls, block: dict) -> "Spectra":
-        """Build from the configuration's `spectra` block: {vrp: {window, hop, points}, trp: ..., vt: ...}.
-
-        Raises: InputError naming the key and value that is missing, unknown or out of range.
-        """
-        vrp, trp, vt = pick(block, "vrp", "trp", "vt")
-        fourier = [Fourier(*pick(part, "window", "hop", "points")) for part in (vrp, trp)]
-        speeds = ("speed_min_mps", "speed_max_mps", "speed_step_mps")
-        return cls(*fourier, Transfer(*pick(vt, "window", "hop", *speeds)))
-
-    def check(self, symbols: int) -> None:
-        """Refuse signals too short for a window.
-
-        Raises: InputError naming the spectrum whose window is no shorter than the signal.
-        """
-        for name in ("vrp", "trp", "vt"):
-            windows(symbols, getattr(self, name).window, getattr(self, name).hop, name)
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:

@@ -2,13 +2,12 @@
 
 from lowalt.tiles.colour import colour_map, paint
 from lowalt.tiles.png import decode, encode
-from lowalt.tiles.render import VIEWS, Renderer, join, split
+from lowalt.tiles.render import Renderer, join, split
 from lowalt.tiles.resample import resize, triangle
 from lowalt.tiles.scale import Scale
 from lowalt.tiles.settings import Images
 
 __all__ = [
-    "VIEWS",
     "Images",
     "Renderer",
     "Scale",

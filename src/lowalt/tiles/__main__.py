@@ -37,7 +37,7 @@ def main(arguments: list[str]) -> None:
     tiles = Renderer.from_settings(given.settings)
     signals = load_signals(given.signals, tiles.network)
     targets = [reduced.target(text) for text in given.reduced]
-    with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2]) as seen:
+    with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
         files.write(given.out, encoded(signals, tiles, seen))
 
 

@@ -10,7 +10,9 @@ import torch
 from torch import Tensor
 
 from lowalt.common.errors import InputError
-from lowalt.tiles.render import VIEWS, Renderer
+from lowalt.spectra import spectrum
+from lowalt.spectra.interface import OnDevice
+from lowalt.tiles.render import Renderer, levels
 
 
 def _power_of_two(exponent: Tensor) -> Tensor:
@@ -33,19 +35,22 @@ class DeviceRenderer:
     def __init__(self, renderer: Renderer, device: str | torch.device = "cpu") -> None:
         """Copy the tables of `renderer` to `device`."""
         self.renderer, self.device = renderer, torch.device(device)
-        self._plans = {name: [self._put(table) for table in renderer.plan(name)] for name in VIEWS}
-        self._turns = {name: [self._put(table)[:, None] for table in renderer.turns(name)] for name in ("vrp", "trp")}
-        self._matched = [self._put(np.stack(tables)) for tables in zip(*renderer.matched, strict=True)]
-        levels = {name: 127 if name == "vt" else 255 for name in VIEWS}
+        self._plans = {name: [self._put(table) for table in renderer.plan(name)] for name in renderer.spectra}
+        self._tables = {
+            name: [self._put(np.stack(tables)) for tables in zip(*renderer.tables(name), strict=True)]
+            for name in renderer.spectra
+        }
         scale = renderer.images.scale
-        self._thresholds = {n: self._put(scale.thresholds(k).astype(np.float32)) for n, k in levels.items()}
+        self._thresholds = {
+            name: self._put(scale.thresholds(levels(name)).astype(np.float32)) for name in renderer.spectra
+        }
 
     def _put(self, table: np.ndarray) -> Tensor:
         table = table.astype(np.int64) if table.dtype.kind in "iu" else table
         return torch.from_numpy(np.ascontiguousarray(table)).to(self.device)
 
     def images(self, signals: Tensor | np.ndarray) -> Tensor:
-        """Return the index images of a batch: (B, stations, symbols) complex64 -> (B, 3 stations, S, S) uint8.
+        """Return the index images of a batch: (B, stations, symbols) complex64 -> (B, stations spectra, S, S) uint8.
 
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
@@ -58,45 +63,19 @@ class DeviceRenderer:
         if not torch.isfinite(parts).all():
             raise InputError("images: signals have a NaN or infinite value")
         re, im = _normalised(parts).unbind(-2)
-        views = [self._index(self._resampled(self._values(re, im, name), name), name) for name in VIEWS]
+        views = [self._index(self._resampled(self._values(re, im, name), name), name) for name in self.renderer.spectra]
         return torch.stack(views, dim=2).flatten(1, 2)
 
     def _values(self, re: Tensor, im: Tensor, name: str) -> Tensor:
-        """The spectrum `name` of signals (B, stations, symbols): (B, stations, points, starts)."""
-        setting = getattr(self.renderer.spectra, name)
-        starts = self.renderer.starts(name)
-        if name == "vt":
-            return self._transfer(re, im, setting.window, starts)
-        cosine, sine = self._turns[name]
-        re, im = re.unsqueeze(-2), im.unsqueeze(-2)
-        stride, rows = setting.window // 2, setting.points // setting.window
-        while stride:
-            count = starts + stride - 1
-            which = torch.arange(rows, device=self.device) * stride % setting.points
-            c, s = cosine[which], sine[which]
-            far_re, far_im = re[..., stride : stride + count], im[..., stride : stride + count]
-            b_re, b_im = far_re * c - far_im * s, far_re * s + far_im * c
-            a_re, a_im = re[..., :count], im[..., :count]
-            re = torch.cat([a_re + b_re, a_re - b_re], dim=-2)
-            im = torch.cat([a_im + b_im, a_im - b_im], dim=-2)
-            stride, rows = stride // 2, 2 * rows
-        # torch's float32 square root is not correctly rounded on every processor (AVX2); a double's, rounded once, is.
-        return torch.sqrt((re * re + im * im).double()).float()
-
-    def _transfer(self, re: Tensor, im: Tensor, window: int, starts: int) -> Tensor:
-        """The velocity-transfer spectrum, (B, stations, speeds, starts)."""
-        cosine, sine = self._matched
-        re, im = re.unsqueeze(-2), im.unsqueeze(-2)
-        x = re[..., :starts].expand(-1, -1, cosine.shape[1], -1)
-        y = im[..., :starts].expand_as(x)
-        for step in range(1, window + 1):
-            c, s = cosine[..., step, None], sine[..., step, None]
-            near, far = re[..., step : step + starts], im[..., step : step + starts]
-            ahead_x, ahead_y = x + (near * c - far * s), y + (near * s + far * c)
-            if step < window:
-                x, y = ahead_x, ahead_y
-        share = float(self.renderer.share[0])
-        return (ahead_x * ahead_x + ahead_y * ahead_y) * share - (x * x + y * y)
+        """The spectrum `name` of signals (B, stations, symbols): (B, stations, rows, starts)."""
+        kind, settings, starts = spectrum(name), self.renderer.spectra[name], self.renderer.starts(name)
+        if isinstance(kind, OnDevice):
+            return kind.on_device(re, im, settings, self._tables[name], starts)
+        values = np.empty((*re.shape[:2], kind.rows(settings), starts), np.float32)
+        for number, station in np.ndindex(*re.shape[:2]):
+            parts = (np.ascontiguousarray(part[number, station].cpu().numpy()) for part in (re, im))
+            kind.fill(*parts, settings, self.renderer.tables(name)[station], values[number, station])
+        return self._put(values)
 
     def _resampled(self, values: Tensor, name: str) -> Tensor:
         """Values (B, stations, points, starts) at the image's size, the axes in the order of the compiled path."""
@@ -125,6 +104,6 @@ class DeviceRenderer:
         largest = values.abs().amax(dim=(-2, -1), keepdim=True)
         x = values.abs() / torch.where(largest > 0, largest, 1)
         steps = torch.searchsorted(self._thresholds[name], x, right=True)
-        if name == "vt":
+        if spectrum(name).SIGNED:
             steps = torch.where(values < 0, 128 - steps, 128 + steps)
         return steps.to(torch.uint8)

@@ -13,7 +13,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
-from lowalt.tiles.render import VIEWS, split
+from lowalt.tiles.render import split
 from lowalt.tiles.resample import resize
 
 _TARGET = re.compile(r"([1-9]\d*)=(.+)", re.DOTALL)
@@ -32,22 +32,22 @@ def target(text: str) -> tuple[int, Path]:
 
 @contextlib.contextmanager
 def writing(
-    targets: list[tuple[int, Path]], samples: int, stations: int
+    targets: list[tuple[int, Path]], samples: int, stations: int, spectra: int
 ) -> Iterator[Callable[[int, np.ndarray], None]]:
     """Open reduced files and yield a function (number, tile) that fills the place of one sample in all of them.
 
-    targets: size (pixels a side) and path of each file; a tile is (stations S, 3 S) uint8. The files appear under their
-    names when the block ends without an error.
+    targets: size (pixels a side) and path of each file; a tile is (stations S, spectra S) uint8. The files appear
+    under their names when the block ends without an error.
     """
     with contextlib.ExitStack() as stack:
         arrays = []
         for size, path in targets:
             temporary = stack.enter_context(replacing(path))
-            shape = (samples, stations * len(VIEWS), size, size)
+            shape = (samples, stations * spectra, size, size)
             arrays.append(np.lib.format.open_memmap(temporary, "w+", np.uint8, shape))
 
         def fill(number: int, tile: np.ndarray) -> None:
-            images = split(tile) if arrays else tile
+            images = split(tile, spectra) if arrays else tile
             for array in arrays:
                 array[number] = resize(images, array.shape[-1])
 

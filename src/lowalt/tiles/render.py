@@ -13,16 +13,11 @@ from numba import njit
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.common.portable import sine_cosine
-from lowalt.spectra.settings import Spectra, windows
-from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
+from lowalt.common.network import Network
+from lowalt.spectra import Spectra, spectrum, windows
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
-
-VIEWS = ("vrp", "trp", "vt")
-"""Columns of a tile, left to right; its rows are the stations in the network's order."""
 
 
 @njit(cache=True)
@@ -80,18 +75,16 @@ class Renderer:
         """
         self.network, self.spectra, self.images = network, spectra, images
         spectra.check(network.symbols)
-        self._plans = {name: self._plan(name) for name in VIEWS}
-        self._fourier = {name: turns(getattr(spectra, name).points, np.float32) for name in ("vrp", "trp")}
-        length = spectra.vt.window
-        steps = np.outer(spectra.vt.speeds_mps, np.arange(length + 1))
-        self.matched = []
-        for station in network.stations:
-            phase = 4 * np.pi * station.frequency_hz * network.symbol_interval_s / SPEED_OF_LIGHT * steps
-            sine, cosine = sine_cosine(phase)
-            self.matched.append((cosine.astype(np.float32), sine.astype(np.float32)))
-        self.share = np.array([(length / (length + 1)) ** 2], np.float32)
-        tables = {name: lookup(images.scale, 127 if name == "vt" else 255) for name in VIEWS}
-        self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in tables.items()}
+        self._plans = {name: self._plan(name) for name in spectra}
+        self._tables = {
+            name: [
+                spectrum(name).tables(spectra[name], station.frequency_hz, network.symbol_interval_s)
+                for station in network.stations
+            ]
+            for name in spectra
+        }
+        steps = {name: lookup(images.scale, levels(name)) for name in spectra}
+        self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in steps.items()}
         self._image = np.empty((images.size, images.size), np.float32)
 
     @classmethod
@@ -105,14 +98,14 @@ class Renderer:
 
     def _plan(self, name: str) -> tuple:
         """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the axes' order."""
-        setting = getattr(self.spectra, name)
+        setting, kind = self.spectra[name], spectrum(name)
         symbols, size = self.network.symbols, self.images.size
         count = windows(symbols, setting.window, setting.hop, name)
-        points = len(setting.speeds_mps) if name == "vt" else setting.points
+        points = kind.rows(setting)
         source, weights = row_taps(points, size)
         # Row 0 is the most positive value, so rows count down; FFT rows start at frequency zero.
         source = points - 1 - source
-        if name != "vt":
+        if kind.ZERO_FIRST:
             source = (source + points // 2) % points
         columns, shares = column_taps(count, size, setting.hop)
         starts = (count - 1) * setting.hop + 1
@@ -134,19 +127,15 @@ class Renderer:
         """Number of symbols, from the first, at which a window of one spectrum is computed."""
         return self._plans[name][4].shape[1]
 
-    def turns(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Cosines and sines of one Fourier spectrum, (points,) each."""
-        return self._fourier[name]
+    def tables(self, name: str) -> list[tuple[np.ndarray, ...]]:
+        """Tables of one spectrum, a tuple of arrays a station."""
+        return self._tables[name]
 
     def values(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
         """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,)."""
         re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
-        if name == "vt":
-            transfer(re, im, self.spectra.vt.window, *self.matched[station], self.share, values)
-        else:
-            setting = getattr(self.spectra, name)
-            fourier_magnitudes(re, im, setting.window, setting.points, *self._fourier[name], values)
+        spectrum(name).fill(re, im, self.spectra[name], self._tables[name][station], values)
         if rows_first:
             across_rows(values, source, weights, between)
             along_rows(between, columns, shares, out)
@@ -168,34 +157,35 @@ class Renderer:
     def image(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
         """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,)."""
         self.values(signal, station, name, self._image)
-        _index(self._image, name == "vt", *self._lookup[name], out)
+        _index(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
 
     def tile(self, signals: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-        """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, 3 S) uint8.
+        """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S) uint8.
 
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
         stations, size = len(self.network.stations), self.images.size
-        out = np.empty((stations * size, len(VIEWS) * size), np.uint8) if out is None else out
+        out = np.empty((stations * size, len(self.spectra) * size), np.uint8) if out is None else out
         for station in range(stations):
             signal = normalised(signals[station])
-            for view, name in enumerate(VIEWS):
+            for view, name in enumerate(self.spectra):
                 part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
                 self.image(signal, station, name, part)
         return out
 
     def some(self, signals: np.ndarray, numbers: Sequence[int]) -> np.ndarray:
-        """Return images of one sample by number, 3 station + view: (stations, symbols) -> (n, S, S) uint8.
+        """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n, S, S) uint8.
 
         They are those of `tile`, and only these are computed.
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
         out = np.empty((len(numbers), self.images.size, self.images.size), np.uint8)
+        names = list(self.spectra)
         for place, number in enumerate(numbers):
-            station, view = divmod(int(number), len(VIEWS))
-            self.image(normalised(signals[station]), station, VIEWS[view], out[place])
+            station, view = divmod(int(number), len(names))
+            self.image(normalised(signals[station]), station, names[view], out[place])
         return out
 
 
@@ -211,15 +201,20 @@ def normalised(signal: np.ndarray) -> np.ndarray:
     return result
 
 
-def split(tile: np.ndarray) -> np.ndarray:
-    """Return the images of a tile, (stations S, 3 S) -> (3 stations, S, S): station by station, VRP, TRP, VT."""
-    size = tile.shape[1] // len(VIEWS)
-    grid = tile.reshape(tile.shape[0] // size, size, len(VIEWS), size)
+def levels(name: str) -> int:
+    """Return the number of index values above that of zero: values with a sign use half of them."""
+    return 127 if spectrum(name).SIGNED else 255
+
+
+def split(tile: np.ndarray, spectra: int) -> np.ndarray:
+    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by station."""
+    size = tile.shape[1] // spectra
+    grid = tile.reshape(tile.shape[0] // size, size, spectra, size)
     return np.ascontiguousarray(grid.swapaxes(1, 2)).reshape(-1, size, size)
 
 
-def join(images: np.ndarray) -> np.ndarray:
-    """Return the tile of images, (3 stations, S, S) -> (stations S, 3 S): the inverse of `split`."""
+def join(images: np.ndarray, spectra: int) -> np.ndarray:
+    """Return the tile of images, (stations spectra, S, S) -> (stations S, spectra S): the inverse of `split`."""
     size = images.shape[-1]
-    grid = images.reshape(-1, len(VIEWS), size, size).swapaxes(1, 2)
-    return np.ascontiguousarray(grid).reshape(-1, len(VIEWS) * size)
+    grid = images.reshape(-1, spectra, size, size).swapaxes(1, 2)
+    return np.ascontiguousarray(grid).reshape(-1, spectra * size)

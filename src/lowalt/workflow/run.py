@@ -14,8 +14,9 @@ from lowalt.common.files import slug
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
 from lowalt.common.yaml_files import load_yaml
-from lowalt.recognition.schemes import Scheme, named
+from lowalt.recognition.schemes import Scheme, columns_in, named
 from lowalt.spectra import Spectra
+from lowalt.spectra.catalogue import named as spectra_named
 from lowalt.targets.records import load_records, load_table, missing_inputs
 from lowalt.tiles.settings import Images
 
@@ -57,6 +58,8 @@ class Run:
             name: named(block["table"], name, station_names(config["network"]))
             for name in (*block["schemes"], *block["timed"])
         }
+        for name, scheme in schemes.items():
+            columns_in(scheme.columns, spectra_named(config["spectra"]), len(config["network"]["stations"]), name)
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
         _check_sizes(config)

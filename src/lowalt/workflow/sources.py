@@ -11,6 +11,7 @@ PACKAGE = Path(__file__).parents[1]
 ROOT = PACKAGE.parent
 SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
 """Modules that targets are read from; a command imports the one that a record names."""
+CATALOGUE = "lowalt.spectra.catalogue"
 
 
 def _file(module: str) -> Path | None:
@@ -40,10 +41,11 @@ def _imports(path: Path) -> tuple[str, ...]:
 
 
 @functools.cache
-def sources(*modules: str) -> tuple[Path, ...]:
+def sources(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[Path, ...]:
     """Return the package's files that running `python -m` on these modules can import, sorted.
 
-    modules: as on the command line, then the modules that the subcommand in question imports by itself.
+    modules: as on the command line, then the modules that the subcommand in question imports by itself; spectra: those
+    that the configuration names, whose modules the catalogue of spectra imports by name.
     Raises: ModuleNotFoundError where there is no such module.
     """
     todo, seen = [], set()
@@ -57,6 +59,8 @@ def sources(*modules: str) -> tuple[Path, ...]:
             seen.add(name)
             parent = name.rpartition(".")[0]
             todo += [*([parent] if parent else []), *_imports(_file(name))]
+            if name == CATALOGUE:
+                todo += [f"lowalt.spectra.kinds.{one}" for one in spectra]
     return tuple(sorted({_file(name) for name in seen}))
 
 
@@ -67,6 +71,6 @@ def near(path: Path) -> str:
 
 
 @functools.cache
-def code(*modules: str) -> tuple[str, ...]:
+def code(*modules: str, spectra: tuple[str, ...] = ()) -> tuple[str, ...]:
     """Return `sources` of these modules as inputs of a rule: editing one re-runs the rule's jobs."""
-    return tuple(near(path) for path in sources(*modules))
+    return tuple(near(path) for path in sources(*modules, spectra=spectra))

@@ -18,29 +18,28 @@ from lowalt.common.files import replacing
 from lowalt.measure.effects_cost import COLUMNS, gathered
 from lowalt.measure.effects_samples import pixel_change, read_samples
 from lowalt.report.figures.style import SNR_LABELS, png
-from lowalt.tiles.render import VIEWS
 
 NUMBERS = ("base_ms", "added_ms", "parts_ms", "accuracy_without_percent", "difference_points", "low", "high")
 ACROSS = 4
 """Pairs of spectra in a row."""
 
 
-def most_changed(example: np.ndarray, stations: int = 1) -> int:
-    """Return which of the first stations' spectra changes most on average; example: (2, V, S, S) uint8."""
-    first = example[:, : len(VIEWS) * stations].astype(np.int16)
+def most_changed(example: np.ndarray, spectra: int) -> int:
+    """Return which of the first station's spectra changes most on average; example: (2, V, S, S) uint8."""
+    first = example[:, :spectra].astype(np.int16)
     return int(np.abs(first[1] - first[0]).mean(axis=(1, 2)).argmax())
 
 
 def _pairs(panels: np.ndarray, table: list[dict], examples: dict, colours: str) -> None:
     """Fill the panels (n,) with a pair of spectra for each row: without the effects left, with them right."""
     for panel, row in zip(panels, table, strict=False):
-        _, example = examples[row["call"]]
-        number = most_changed(example)
+        _, example, names = examples[row["call"]]
+        number = most_changed(example, len(names))
         gap = np.full((example.shape[2], 6), np.nan)
         pair = np.hstack([example[0, number].astype(float), gap, example[1, number].astype(float)])
         panel.imshow(pair, cmap=colours, vmin=0, vmax=255, aspect="auto", interpolation="nearest")
         share, _ = pixel_change(example[0, number], example[1, number])
-        panel.set_title(f"{row['call']} ({VIEWS[number].upper()}, {100 * share:.2g} % changed)", fontsize=9)
+        panel.set_title(f"{row['call']} ({names[number].upper()}, {100 * share:.2g} % changed)", fontsize=9)
     for panel in panels[len(table) :]:
         panel.axis("off")
     for panel in panels:
@@ -79,11 +78,13 @@ def _bars(times, losses, table: list[dict]) -> None:
         panel.set_ylim(-0.6, len(table) - 0.4)
 
 
-def figure(table: list[dict], examples: dict[str, tuple[str, np.ndarray]], colours: str = "viridis") -> bytes:
+def figure(
+    table: list[dict], examples: dict[str, tuple[str, np.ndarray, list[str]]], colours: str = "viridis"
+) -> bytes:
     """Return PNG bytes: a pair of spectra a call, free of noise, above the bars of time and accuracy.
 
-    table: rows of `read_rows`, the first without effects; examples: (subtype, spectra (2, V, S, S) uint8) of each call,
-    of which the first station's spectrum that changes most is shown.
+    table: rows of `read_rows`, the first without effects; examples: (subtype, spectra (2, V, S, S) uint8, names of
+    the spectra) of each call, of which the first station's spectrum that changes most is shown.
     """
     calls = table[1:]
     lines = -(-len(calls) // ACROSS)
@@ -124,7 +125,10 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
     given = options.parse_args(arguments)
     calls = gathered([read_samples(path) for path in given.samples])
-    examples = {header["name"]: (str(arrays["example_subtype"]), arrays["example"]) for header, arrays in calls}
+    examples = {
+        header["name"]: (str(arrays["example_subtype"]), arrays["example"], arrays["spectra"].tolist())
+        for header, arrays in calls
+    }
     with replacing(given.figure) as temporary:
         temporary.write_bytes(figure(read_rows(given.table), examples))
 

@@ -9,14 +9,14 @@ from PIL import Image
 
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.common.network import Network
 from lowalt.common.streams import stream
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
-from lowalt.spectra import Spectra, trp, vrp, vt
+from lowalt.spectra import Spectra, spectrum
 from lowalt.targets.cloud import Cloud
 
 VIEWS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
@@ -89,33 +89,29 @@ def _decibel(values: np.ndarray) -> np.ndarray:
 
 
 def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
-    """The three spectra of the first station, axes in seconds and metres a second."""
+    """Up to three spectra of the first station, axes in seconds and metres a second."""
     network = Network.from_settings(config["network"])
     station, settings = network.stations[0], Spectra.from_settings(config["spectra"])
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
     signal = echo_signal(network, station, motion, cloud.rcs_m2, aim).signal
-    interval = network.symbol_interval_s
-    fastest = SPEED_OF_LIGHT / (4 * station.frequency_hz * interval)
-    fields = [
-        ("velocity preferred (VRP)", _decibel(vrp(signal, settings)), settings.vrp, fastest),
-        ("time preferred (TRP)", _decibel(trp(signal, settings)), settings.trp, fastest),
-        ("velocity transfer (VT)", vt(signal, station.frequency_hz, interval, settings), settings.vt, None),
-    ]
-    for panel, (title, values, windows, limit) in zip(panels, fields, strict=True):
+    given = (station.frequency_hz, network.symbol_interval_s)
+    for panel, (name, windows) in zip(panels, settings.items(), strict=False):
+        kind = spectrum(name)
+        values = kind.definition(signal, windows, name, *given)
+        values = values if kind.SIGNED else _decibel(values)
         half = windows.window / 2
-        times = interval * np.array([half, half + windows.hop * values.shape[1]])
-        # A positive frequency approaches, so speed away from the station falls along the frequency axis.
-        speeds = (limit, -limit) if limit else (windows.speeds_mps[0], windows.speeds_mps[-1])
+        times = network.symbol_interval_s * np.array([half, half + windows.hop * values.shape[1]])
+        speeds = kind.speeds(windows, *given)
         scale = {"vmin": FLOOR_DB, "vmax": 0.0, "cmap": "viridis"}
-        if limit is None:
+        if kind.SIGNED:
             top = float(abs(values).max()) or 1.0
             scale = {"vmin": -top, "vmax": top, "cmap": "RdBu_r"}
         picture = panel.imshow(
             values, origin="lower", aspect="auto", extent=(*times, *speeds), interpolation="nearest", **scale
         )
-        panel.set(title=title, xlabel="time (s)", ylabel="speed away from the station (m/s, folded)")
-        panel.figure.colorbar(picture, ax=panel, label="dB" if limit else "signed power", fraction=0.05)
+        panel.set(title=kind.TITLE, xlabel="time (s)", ylabel="speed away from the station (m/s, folded)")
+        panel.figure.colorbar(picture, ax=panel, label="signed power" if kind.SIGNED else "dB", fraction=0.05)
 
 
 def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> bytes:

@@ -1,0 +1,96 @@
+"""The catalogue of spectra, and the settings of those that a configuration names.
+
+A spectrum is a module of `lowalt.spectra.kinds` (`lowalt.spectra.interface`). The catalogue's order is that of the
+columns of a tile; a tile has a column for each spectrum in the configuration's block `spectra`.
+"""
+
+import functools
+import importlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from lowalt.common.command import pick
+from lowalt.common.errors import InputError
+from lowalt.spectra.interface import Spectrum
+from lowalt.spectra.settings import windows
+
+LISTED = ("vrp", "trp", "vt")
+"""The paper's three, in its order. Any other module comes after them, in alphabetical order."""
+_FOUND = sorted(path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__")
+NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED))
+"""Names of all spectra."""
+
+
+@functools.cache
+def spectrum(name: str) -> Spectrum:
+    """Return the module of a spectrum.
+
+    Raises: InputError for a name that belongs to none, or a module that lacks a name of the interface.
+    """
+    if name not in NAMES:
+        raise InputError(f"spectra: unknown spectrum {name!r}, expected some of {list(NAMES)}")
+    module = importlib.import_module(f"lowalt.spectra.kinds.{name}")
+    if not isinstance(module, Spectrum):
+        raise InputError(f"{module.__file__}: lacks a name of lowalt.spectra.interface.Spectrum")
+    return module
+
+
+def named(block: Iterable[str]) -> tuple[str, ...]:
+    """Return the names of a configuration's block `spectra` in the catalogue's order.
+
+    Raises: InputError for an unknown name, or where there is none.
+    """
+    for name in block:
+        spectrum(name)
+    found = tuple(name for name in NAMES if name in set(block))
+    if not found:
+        raise InputError(f"spectra: none named, expected some of {list(NAMES)}")
+    return found
+
+
+def zero_index(name: str) -> int:
+    """Return the index (0..255) that stands for the value zero in the images of a spectrum."""
+    return 128 if spectrum(name).SIGNED else 0
+
+
+class Spectra(Mapping[str, Any]):
+    """The settings of a data set's spectra by name, in the order of the columns of its tiles."""
+
+    def __init__(self, **settings: Any) -> None:
+        """settings: a `Settings` for each spectrum; without any, the paper's three with their defaults.
+
+        Raises: InputError for an unknown name.
+        """
+        given = settings or {name: spectrum(name).DEFAULTS for name in LISTED}
+        self._settings = {name: given[name] for name in named(given)}
+
+    @classmethod
+    def from_settings(cls, block: dict) -> "Spectra":
+        """Build from the configuration's `spectra` block, such as {vrp: {window, hop, points}, trp: ..., vt: ...}.
+
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        found = {}
+        for name in named(block):
+            kind = spectrum(name).Settings
+            found[name] = kind(*pick(block[name], *(entry.name for entry in fields(kind))))
+        return cls(**found)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._settings[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._settings)
+
+    def __len__(self) -> int:
+        return len(self._settings)
+
+    def check(self, symbols: int) -> None:
+        """Refuse signals too short for a window.
+
+        Raises: InputError naming the spectrum whose window is no shorter than the signal.
+        """
+        for name, settings in self.items():
+            windows(symbols, settings.window, settings.hop, name)

@@ -1,0 +1,76 @@
+"""Short-time Fourier spectra: the functions that VRP and TRP share. They differ in their settings only."""
+
+from typing import Any
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.spectra.segments import segments
+from lowalt.spectra.settings import Fourier
+from lowalt.spectra.sliding import fourier_magnitudes, turns
+
+
+def rows(settings: Fourier) -> int:
+    """Return the number of frequencies."""
+    return settings.points
+
+
+def speeds(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
+    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`, folded.
+
+    A positive Doppler frequency approaches, so the speed falls along the rows.
+    """
+    fastest = SPEED_OF_LIGHT / (4 * frequency_hz * symbol_interval_s)
+    return fastest, -fastest
+
+
+def magnitudes(signals: np.ndarray, fourier: Fourier, name: str = "stft") -> np.ndarray:
+    """Return |FFT| of every window, zero frequency in the middle; rectangular window.
+
+    signals: (..., symbols) complex. Result: (..., points, windows), float64, rows from -1/2T_r upwards.
+    Raises: InputError where the signal is no longer than the window or is not finite.
+    Source: paper, Eq. 26, 27.
+    """
+    spectra = np.fft.fft(segments(signals, fourier.window, fourier.hop, name), fourier.points, axis=-1)
+    return np.swapaxes(np.abs(np.fft.fftshift(spectra, axes=-1)), -1, -2)
+
+
+def definition(
+    signals: np.ndarray, settings: Fourier, name: str, frequency_hz: float, symbol_interval_s: float
+) -> np.ndarray:
+    """Return `magnitudes`; neither the carrier nor the symbol interval changes them."""
+    return magnitudes(signals, settings, name)
+
+
+def tables(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
+    """Return cosines and sines (points,) float32 of the transform; they are the same for every station."""
+    return turns(settings.points, np.float32)
+
+
+def fill(re: np.ndarray, im: np.ndarray, settings: Fourier, tables: tuple, out: np.ndarray) -> None:
+    """Fill out (points, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
+    fourier_magnitudes(re, im, settings.window, settings.points, *tables, out)
+
+
+def on_device(re: Any, im: Any, settings: Fourier, tables: list, starts: int) -> Any:
+    """Return what `fill` computes for tensors (B, stations, symbols): (B, stations, points, starts), the same bits.
+
+    tables: tensors (stations, points) of cosines and sines.
+    """
+    import torch
+
+    cosine, sine = tables
+    re, im = re.unsqueeze(-2), im.unsqueeze(-2)
+    stride, rows = settings.window // 2, settings.points // settings.window
+    while stride:
+        count = starts + stride - 1
+        which = torch.arange(rows, device=re.device) * stride % settings.points
+        c, s = cosine[:, which, None], sine[:, which, None]
+        far_re, far_im = re[..., stride : stride + count], im[..., stride : stride + count]
+        b_re, b_im = far_re * c - far_im * s, far_re * s + far_im * c
+        a_re, a_im = re[..., :count], im[..., :count]
+        re = torch.cat([a_re + b_re, a_re - b_re], dim=-2)
+        im = torch.cat([a_im + b_im, a_im - b_im], dim=-2)
+        stride, rows = stride // 2, 2 * rows
+    # torch's float32 square root is not correctly rounded on every processor (AVX2); a double's, rounded once, is.
+    return torch.sqrt((re * re + im * im).double()).float()

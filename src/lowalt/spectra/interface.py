@@ -1,0 +1,61 @@
+"""The interface of a spectrum: the names that a module of `lowalt.spectra.kinds` defines.
+
+Axes: rows are Doppler frequencies or speeds, columns are windows in time. A window starts at every symbol in the fast
+path (`fill`); the images take those that the hop asks for. `isinstance(module, Spectrum)` checks a module.
+"""
+
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+
+@runtime_checkable
+class Spectrum(Protocol):
+    """One time-frequency image of a station's signal."""
+
+    TITLE: str
+    """Name in figures."""
+    SOURCE: str
+    """Equation or reference."""
+    SIGNED: bool
+    """Whether values have a sign: zero then is index 128 of the image, else index 0."""
+    ZERO_FIRST: bool
+    """Whether the rows of `fill` begin at frequency zero (FFT order) or at the most negative value."""
+    Settings: type
+    """Frozen dataclass of the settings, the keys of the configuration; it has `window` and `hop`, both in symbols."""
+    DEFAULTS: Any
+    """A `Settings`."""
+
+    def rows(self, settings: Any) -> int:
+        """Return the number of rows."""
+        ...
+
+    def speeds(self, settings: Any, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
+        """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`."""
+        ...
+
+    def definition(
+        self, signals: np.ndarray, settings: Any, name: str, frequency_hz: float, symbol_interval_s: float
+    ) -> np.ndarray:
+        """Return the spectrum in float64 by its definition, (..., symbols) -> (..., rows, windows), rows ascending.
+
+        frequency_hz: f_k of the station; symbol_interval_s: T_r; name: how errors call the spectrum.
+        """
+        ...
+
+    def tables(self, settings: Any, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
+        """Return float32 arrays that `fill` needs and that are the same for all signals of a station."""
+        ...
+
+    def fill(self, re: np.ndarray, im: np.ndarray, settings: Any, tables: tuple, out: np.ndarray) -> None:
+        """Fill out (rows, starts) float32 with the windows of one signal (symbols,) that start at 0 .. starts - 1."""
+        ...
+
+
+@runtime_checkable
+class OnDevice(Protocol):
+    """A spectrum that PyTorch can compute too; the others are computed on the processor."""
+
+    def on_device(self, re: Any, im: Any, settings: Any, tables: list, starts: int) -> Any:
+        """Return `fill` of tensors (B, stations, symbols): (B, stations, rows, starts); tables are (stations, ...)."""
+        ...

@@ -1,0 +1,79 @@
+"""VT: the velocity-transfer spectrum, the difference of two filters matched to each speed."""
+
+from typing import Any
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.common.portable import sine_cosine
+from lowalt.spectra.segments import segments
+from lowalt.spectra.settings import Transfer
+from lowalt.spectra.sliding import transfer
+
+TITLE = "velocity transfer (VT)"
+SOURCE = "paper, Eq. 30 to 35"
+SIGNED = True
+ZERO_FIRST = False
+Settings = Transfer
+DEFAULTS = Settings(8, 1, -6.1, 6.1, 0.1)
+
+
+def rows(settings: Transfer) -> int:
+    """Return the number of matched speeds."""
+    return len(settings.speeds_mps)
+
+
+def speeds(settings: Transfer, frequency_hz: float, symbol_interval_s: float) -> tuple[float, float]:
+    """Return the speeds (m/s, positive recedes) of the first and the last row of `definition`."""
+    return settings.speeds_mps[0], settings.speeds_mps[-1]
+
+
+def definition(
+    signals: np.ndarray, settings: Transfer, name: str, frequency_hz: float, symbol_interval_s: float
+) -> np.ndarray:
+    """Return the spectrum in float64, (..., symbols) -> (..., speeds, windows); the unit is that of |signal|^2.
+
+    Raises: InputError where the signal is no longer than the window or is not finite.
+    """
+    length = settings.window
+    # The published count of windows is that of the shorter segment less one, so each has one more symbol behind it.
+    parts = segments(signals, length, settings.hop, name, extra=1)
+    steps = np.arange(length + 1)
+    phase = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * np.outer(settings.speeds_mps, steps)
+    matched = np.exp(1j * phase)
+    short = np.einsum("vl,...gl->...vg", matched[:, :length], parts[..., :length])
+    longer = np.einsum("vl,...gl->...vg", matched, parts)
+    return (np.abs(longer) * length / (length + 1)) ** 2 - np.abs(short) ** 2
+
+
+def tables(settings: Transfer, frequency_hz: float, symbol_interval_s: float) -> tuple[np.ndarray, ...]:
+    """Return cosines and sines (speeds, window + 1) of the matched filters and the longer window's share (1,)."""
+    length = settings.window
+    steps = np.outer(settings.speeds_mps, np.arange(length + 1))
+    phase = 4 * np.pi * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * steps
+    sine, cosine = sine_cosine(phase)
+    share = np.array([(length / (length + 1)) ** 2], np.float32)
+    return cosine.astype(np.float32), sine.astype(np.float32), share
+
+
+def fill(re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out: np.ndarray) -> None:
+    """Fill out (speeds, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
+    transfer(re, im, settings.window, *tables, out)
+
+
+def on_device(re: Any, im: Any, settings: Transfer, tables: list, starts: int) -> Any:
+    """Return what `fill` computes for tensors (B, stations, symbols): (B, stations, speeds, starts), the same bits.
+
+    tables: tensors (stations, ...) of `tables` of every station.
+    """
+    cosine, sine, share = tables
+    re, im = re.unsqueeze(-2), im.unsqueeze(-2)
+    x = re[..., :starts].expand(-1, -1, cosine.shape[1], -1)
+    y = im[..., :starts].expand_as(x)
+    for step in range(1, settings.window + 1):
+        c, s = cosine[..., step, None], sine[..., step, None]
+        near, far = re[..., step : step + starts], im[..., step : step + starts]
+        ahead_x, ahead_y = x + (near * c - far * s), y + (near * s + far * c)
+        if step < settings.window:
+            x, y = ahead_x, ahead_y
+    return (ahead_x * ahead_x + ahead_y * ahead_y) * share[..., None] - (x * x + y * y)
