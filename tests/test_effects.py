@@ -186,7 +186,8 @@ NOTHING = {
     "iq_imbalance": {"gain_db": 0, "phase_deg": 0}, "adc": {"bits": 0}, "canceller": {"kind": "none"},
     "cell_error": {"probability": 0}, "slow_time": {"downlink": 1}, "data_symbols": {"order": 4},
     "power_amplifier": {"backoff_db": None}, "comb_pilots": {"spacing": 1}, "pointing_error": {"sigma_deg": 0},
-    "transmit_leakage": {"isolation_db": None},
+    "transmit_leakage": {"isolation_db": None}, "cell_noise": {"snr_db": float("inf")},
+    "detector": {"cfar": "none", "gate_cells": None},
 }  # fmt: skip
 """Every effect that has a strength, without any."""
 

@@ -5,7 +5,7 @@
 
 rule noise:
     input:
-        code=code("lowalt.noise"),
+        code=code("lowalt.noise", *options.noise_modules(config)),
         motion="results/{run}/motion/{group}-{part}.csv",
         echoes=products.chunk_echoes,
         powers=products.chunk_powers,

@@ -23,7 +23,10 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes")
     options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
     options.add_argument(
-        "--out", nargs="+", required=True, help="signals to write (.npy), a file a station: complex64 (models, N)"
+        "--out",
+        nargs="+",
+        required=True,
+        help="signals to write (.npy), a file a station: complex64 (models, N), or (models, snrs, N)",
     )
     options.add_argument(
         "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"
@@ -32,6 +35,8 @@ def main(arguments: list[str]) -> None:
     for name, files in (("--out", given.out), ("--power", given.power)):
         if len(files) != len(given.station):
             raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {given.station}")
+    snrs = given.settings.pop("snr_db", None)
+    snrs = None if snrs is None else [float(snr) for snr in snrs]
     seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
     scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
@@ -41,7 +46,7 @@ def main(arguments: list[str]) -> None:
 
         occluders = read_all(given.occluders)
     rows = read_table(given.motion)
-    found = [scene_signals(scene, station, clouds, rows, occluders) for station in given.station]
+    found = [scene_signals(scene, station, clouds, rows, occluders, snrs) for station in given.station]
     for files in zip(zip(given.out, given.power, strict=True), found, strict=True):
         for path, values in zip(*files, strict=True):
             with replacing(path) as temporary:

@@ -33,6 +33,7 @@ LISTED = (
     "channel/cyclic_prefix",
     "channel/clutter",
     "receiver/receiver_noise",
+    "receiver/cell_noise",
     "receiver/timing_offset",
     "receiver/clock_offset",
     "receiver/carrier_offset",
@@ -41,6 +42,7 @@ LISTED = (
     "receiver/iq_imbalance",
     "receiver/adc",
     "detection/canceller",
+    "detection/detector",
     "detection/cell_error",
 )
 """Place and name of the effects whose order within their place matters, in the order of the chain."""

@@ -39,6 +39,11 @@ def check(config: dict) -> CheckedScene:
             f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
             "or set SNRs, not both"
         )
+    if noisy and config.get("shards", {}).get("kind") == "recipe" and {"cell_noise", "canceller"} & set(scene.effects):
+        raise InputError(
+            "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
+            "effects.cell_noise or effects.canceller"
+        )
     if "canceller" in scene.effects and not set(STILL) & set(scene.effects):
         raise InputError(
             f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"

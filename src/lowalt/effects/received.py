@@ -46,7 +46,17 @@ class Scene:
 
     def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
-        return stream(self.seed, "effect", name, row["subtype"], row["model"], *more)
+        # Noise at one SNR does not depend on noise at another.
+        levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
+        return stream(self.seed, "effect", name, row["subtype"], row["model"], *more, *filter(None, levels))
+
+    def at_snr(self, snr_db: float) -> "Scene":
+        """Return the scene with noise in all range cells at this SNR (dB), instead of at each of noise.snr_db."""
+        changed = [
+            effect._replace(settings=effect.settings | {"snr_db": snr_db}) if effect.name == "cell_noise" else effect
+            for effect in self.effects
+        ]
+        return replace(self, effects=tuple(one for one in changed if not one.module.idle(one.settings)))
 
 
 class Received(NamedTuple):

@@ -26,6 +26,7 @@ from lowalt.common.splits import fold
 from lowalt.common.timing import once
 from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, received_signal
+from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
 from lowalt.targets.cloud import Cloud, cloud_of, read
@@ -80,6 +81,8 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
     occluders: surfaces of each subtype, where a scene hides points behind them.
     Raises: InputError naming the sample that has no cloud or cannot be computed with.
     """
+    if not scenes:
+        return []
     network = scenes[0].network
     shape = (len(rows), len(network.stations))
     found = [
@@ -139,10 +142,19 @@ def measure(
     Noise is drawn as the noise stage does, so that without effects the images are the run's own.
     Raises: InputError as `takes` does.
     """
-    before, after = takes(list(scenes), clouds, rows, occluders)
+    scene, settings = scenes[1], {effect.name: effect.settings for effect in scenes[1].effects}
+    inside = in_all_cells(settings)
+    before, after = takes([scenes[0], scene.at_snr(snrs[0]) if inside else scene], clouds, rows, occluders)
     names = [station.name for station in tiles.network.stations]
-    power = after.power.T if scenes[1].effects else None
-    noisy = noisy_signals(after.signal.swapaxes(0, 1), rows, names, snrs, scenes[1].seed, power)
+    if inside:
+        found = [after, *takes([scene.at_snr(snr) for snr in snrs[1:]], clouds, rows, occluders)]
+        noisy = np.stack([take.signal for take in found], axis=1)
+    else:
+        behind = None
+        if "canceller" in settings:
+            behind = functools.partial(behind_canceller, canceller=settings["canceller"])
+        power = after.power.T if settings else None
+        noisy = noisy_signals(after.signal.swapaxes(0, 1), rows, names, snrs, scene.seed, power, behind)
     changed, difference = np.empty(len(rows)), np.empty(len(rows))
     shown = next((index for index, row in enumerate(rows) if row["category"] == classes[0]), 0)
     for index in range(len(rows)):

@@ -1,5 +1,6 @@
 """Command line of the noise stage: clean echoes of a chunk, a file a station -> noisy signals at all SNRs."""
 
+import functools
 import sys
 
 import numpy as np
@@ -11,8 +12,10 @@ from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
 
 
-def load_echoes(paths: list[str], stations: list[str], models: int) -> list[np.ndarray]:
+def load_echoes(paths: list[str], stations: list[str], models: int, snrs: int | None = None) -> list[np.ndarray]:
     """Return the clean echoes of a chunk as memory maps, one (models, symbols) a station.
+
+    snrs: echoes may also be (models, snrs, symbols), which hold the noise of so many SNRs.
 
     Raises: InputError naming the file that is missing, or that does not fit stations, models or the other files.
     """
@@ -20,7 +23,8 @@ def load_echoes(paths: list[str], stations: list[str], models: int) -> list[np.n
         raise InputError(f"--echoes: {len(paths)} files, expected one for each station of {stations}")
     echoes = [np.load(existing(path, "echo"), mmap_mode="r") for path in paths]
     for path, echo in zip(paths, echoes, strict=True):
-        if echo.ndim != 2 or len(echo) != models or echo.shape != echoes[0].shape:
+        fits = echo.ndim == 2 or (echo.ndim == 3 and echo.shape[1] == snrs)
+        if not fits or len(echo) != models or echo.shape != echoes[0].shape:
             raise InputError(f"{path}: shape {echo.shape}, expected ({models}, symbols) as the motion table and others")
     return echoes
 
@@ -46,11 +50,16 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station")
     options.add_argument("--out", required=True, help="noisy signals to write (.npy)")
     given = options.parse_args(arguments)
+    canceller, behind = given.settings.pop("canceller", None), None
+    if canceller is not None:
+        from lowalt.effects.set_noise import behind_canceller
+
+        behind = functools.partial(behind_canceller, canceller=canceller)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")
     rows = read_table(given.motion)
-    echoes = load_echoes(given.echoes, stations, len(rows))
+    echoes = load_echoes(given.echoes, stations, len(rows), len(snrs))
     powers = load_powers(given.powers, stations, len(rows)) if given.powers else None
-    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers)
+    result = noisy_signals(np.stack(echoes), rows, stations, [float(snr) for snr in snrs], seed, powers, behind)
     with replacing(given.out, result.nbytes) as temporary:
         np.save(temporary, result)
     print(f"{given.out}: {result.shape[0] * result.shape[1]} samples", file=sys.stderr)

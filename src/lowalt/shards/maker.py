@@ -10,6 +10,7 @@ import numpy as np
 
 from lowalt.common.network import Network
 from lowalt.echo.chunk import clean_signals
+from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.noise.chunk import noisy_signals
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud
@@ -37,7 +38,7 @@ class Maker:
         self.network = Network.from_settings(render["network"])
         self.kept = KEPT
         self.images = Images.from_settings(render["images"])
-        self._received: dict[tuple[str, int], tuple[np.ndarray, np.ndarray | None]] = {}
+        self._received: dict[tuple, tuple[np.ndarray, np.ndarray | None]] = {}
 
     def __getstate__(self) -> dict:
         # Workers prepare tables of their own.
@@ -48,20 +49,20 @@ class Maker:
         """What turns signals into tiles."""
         return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
 
-    def received(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
+    def received(self, row: dict, snr_db: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
         """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
-        refer to, None where they are the echoes' own.
+        refer to, None where they are the echoes' own. With an SNR (dB), echoes hold noise in all range cells.
 
         Raises: InputError naming the sample that cannot be computed.
         """
-        key = row["subtype"], row["model"]
+        key = row["subtype"], row["model"], snr_db
         if key not in self._received:
             if len(self._received) >= self.kept:
                 del self._received[next(iter(self._received))]
-            self._received[key] = self._listen(row)
+            self._received[key] = self._listen(row, snr_db)
         return self._received[key]
 
-    def _listen(self, row: dict) -> tuple[np.ndarray, np.ndarray | None]:
+    def _listen(self, row: dict, snr_db: float | None) -> tuple[np.ndarray, np.ndarray | None]:
         names = [station.name for station in self.network.stations]
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
@@ -71,6 +72,8 @@ class Maker:
         from lowalt.effects.received import Scene
 
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
+        if snr_db is not None:
+            scene = scene.at_snr(snr_db)
         found = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
         return np.stack([signal[0] for signal, _ in found]), np.stack([power for _, power in found])
 
@@ -79,9 +82,14 @@ class Maker:
 
         Raises: InputError naming the sample that cannot be computed.
         """
+        effects, behind = self.echo["effects"], None
+        if in_all_cells(effects):
+            return self.received(row, snr_db)[0]
+        if "canceller" in effects:
+            behind = functools.partial(behind_canceller, canceller=effects["canceller"] or {})
         clean, powers = self.received(row)
         names = [station.name for station in self.network.stations]
-        return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers)[0, 0]
+        return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers, behind)[0, 0]
 
     def png(self, signal: np.ndarray) -> bytes:
         """Return the PNG file of the tile of one sample's signals."""

@@ -6,6 +6,8 @@ Each function takes the wildcards and the inputs of a job and can stand in a rul
 from pathlib import Path
 from typing import Any
 
+from lowalt.effects.catalogue import dotted
+
 
 def occluders(wildcards: Any, input: Any) -> str:
     """The surfaces of a group, where points are hidden behind them."""
@@ -15,6 +17,11 @@ def occluders(wildcards: Any, input: Any) -> str:
 def powers(wildcards: Any, input: Any) -> str:
     """The powers to which set SNRs refer, in a scene with effects."""
     return f"--powers {input.powers}" if input.powers else ""
+
+
+def noise_modules(config: dict) -> list[str]:
+    """The modules that the noise stage loads in a scene with a canceller."""
+    return ["lowalt.effects.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
 def content(wildcards: Any, input: Any) -> str:

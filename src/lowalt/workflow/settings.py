@@ -7,6 +7,7 @@ wildcards of a job and can stand in a rule's `params:`. A text is made once: Sna
 from typing import Any
 
 from lowalt.common.config import canonical
+from lowalt.effects.set_noise import in_all_cells
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
@@ -56,14 +57,16 @@ class Settings:
         return self._text("echo", **self._blocks("network"), tolerance=self._config["echo"]["tolerance"])
 
     def echo_in_scene(self, wildcards: Any) -> str:
-        """The network, the echo's tolerance, the effects of the scene, and the seed that they draw from."""
+        """The network, the echo's tolerance, the scene's effects with their SNRs, and the seed that they draw from."""
         tolerance = self._config["echo"]["tolerance"]
-        return self._text("echo_in_scene", **self._blocks("seed", "network", "effects"), tolerance=tolerance)
+        inside = self._blocks("noise")["noise"] if in_all_cells(self._config["effects"]) else {}
+        return self._text("echo_in_scene", **self._blocks("seed", "network", "effects"), tolerance=tolerance, **inside)
 
     def noise(self, wildcards: Any) -> str:
-        """The set of SNRs and the names of the stations."""
-        snrs = self._config["noise"]["snr_db"]
-        return self._text("noise", **self._blocks("seed"), stations=self._run.stations, snr_db=snrs)
+        """The set of SNRs, the names of the stations, and the canceller that the noise passes."""
+        snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
+        passed = {"canceller": effects["canceller"] or {}} if "canceller" in effects else {}
+        return self._text("noise", **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
         """Network, spectra and images."""
