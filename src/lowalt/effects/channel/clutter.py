@@ -30,8 +30,10 @@ DEFAULTS = {
 
 MPH = 0.44704
 """Metres per second in a statute mile per hour, the unit of Billingsley's formulas."""
-TAIL = 1e-4
+TAIL = 1e-3
 """Largest correlation left where the synthesised moving part wraps round."""
+FAINT = 1e-11
+"""Share of the moving part's power in each of the frequencies that are not drawn."""
 
 
 def idle(settings: dict) -> bool:
@@ -57,35 +59,49 @@ def cell_power(
     """
     radio = radar(network, station)
     height = float(station.position_m[2])
-    cells = int(settings["reach_m"] * radio.cells + 0.5)
-    node, weight = np.polynomial.legendre.leggauss(6)
-    edge = (np.arange(cells)[:, None] + [-0.5, 0.5]) / radio.cells
-    low, high = np.clip(edge, height, settings["reach_m"]).T
-    r = 0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node
     psi0, omega0 = aim_cosines(np.asarray(aim_m, float), radio.station, radio.sine, radio.cosine)
-    reach = np.pi * radio.kappa * (network.transmit[0] + network.receive[0])
-    # The pattern is even in azimuth about the array's line, so half a circle holds all of it.
-    turns = int(reach) + 24
-    azimuth = np.pi * (np.arange(turns) + 0.5) / turns
-    level = np.sqrt(np.maximum(1.0 - (height / r) ** 2, 0.0))
-    around = np.empty(r.shape)
-    sides = (
-        None if element is None else _element_gain(element, height, tuple(r.ravel()), turns).reshape(*r.shape, turns)
-    )
-    for cell in range(cells):
-        psi = level[cell][:, None] * np.cos(azimuth)
-        beam = _pattern(radio.kappa * (psi - psi0), network.transmit[0], network.receive[0])
-        around[cell] = 2 * np.pi * (beam if sides is None else beam * sides[cell]).mean(axis=1)
+    wide = network.transmit[0], network.receive[0]
+    rings, r, across = _rings(height, settings["reach_m"], radio.cells, radio.kappa, wide, element)
+    order = np.arange(len(across))
+    around = (np.exp(-1j * np.pi * radio.kappa * psi0 * order) @ across).real.reshape(r.shape)
     around *= _pattern(radio.kappa * (-height / r - omega0), network.transmit[1], network.receive[1])
-    ring = around * settings["gamma"] * height / r * r / r**4 * 0.5 * (high - low)[:, None]
-    return radio.scale**2 * ring @ weight
+    return radio.scale**2 * settings["gamma"] * np.maximum((around * rings).sum(axis=1), 0.0)
 
 
 @lru_cache(maxsize=8)
-def _element_gain(element: Element, height: float, ranges: tuple[float, ...], turns: int) -> np.ndarray:
-    """Two-way element gain (ranges, turns) toward the land, mean of the front's and the back's, which share Psi."""
-    r = np.array(ranges)[:, None]
+def _rings(
+    height: float, reach_m: float, cells_per_m: float, kappa: float, wide: tuple[int, int], element: Element | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what all aims share: weights and ranges (cells, 6) of the rings' nodes, and across (K, nodes) complex.
+
+    Along its line the arrays' pattern is a trigonometric polynomial, sum over k of c_k exp(j pi k kappa (Psi - Psi0)):
+    across holds its terms without Psi0, integrated over azimuth; negative k are the others' conjugates.
+    """
+    cells = int(reach_m * cells_per_m + 0.5)
+    node, weight = np.polynomial.legendre.leggauss(6)
+    edge = (np.arange(cells)[:, None] + [-0.5, 0.5]) / cells_per_m
+    low, high = np.clip(edge, height, reach_m).T
+    r = 0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node
+    # The pattern is even in azimuth about the array's line, so half a circle holds all of it.
+    turns = int(np.pi * kappa * sum(wide)) + 24
     azimuth = np.pi * (np.arange(turns) + 0.5) / turns
+    level = np.sqrt(np.maximum(1.0 - (height / r.ravel()) ** 2, 0.0))
+    step = np.exp(1j * np.pi * kappa * level[:, None] * np.cos(azimuth))
+    term = np.full(step.shape, 2 * np.pi / turns, np.complex128)
+    if element is not None:
+        term *= _element_gain(element, height, r.ravel(), azimuth)
+    one, other = (np.bartlett(2 * count + 1)[1:-1] * count for count in wide)
+    factors = np.convolve(one, other)[sum(wide) - 2 :]
+    across = np.empty((len(factors), r.size), np.complex128)
+    for order, factor in enumerate(factors):
+        across[order] = (1.0 if order == 0 else 2.0) * factor * term.sum(axis=1)
+        term *= step
+    return height * 0.5 * (high - low)[:, None] * weight / r**4, r, across
+
+
+def _element_gain(element: Element, height: float, ranges: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    """Two-way element gain (ranges, azimuths) toward the land, mean of the front's and the back's, which share Psi."""
+    r = ranges[:, None]
     flat = np.sqrt(np.maximum(r * r - height * height, 0.0))
     side, ahead = flat * np.cos(azimuth), flat * np.sin(azimuth)
     down = np.broadcast_to(-height, side.shape)
@@ -163,8 +179,15 @@ def speckle(
     if not np.isfinite(still):
         return np.repeat(kept, count, axis=1)
     shape = _shape(count, step_s, beta, wavelength_m)
-    moving = np.fft.ifft(_normal(rng, cells, len(shape)) * shape, axis=1, norm="forward")[:, :count]
-    return np.sqrt(still / (1 + still)) * kept + np.sqrt(1 / (1 + still)) * moving
+    lines = np.zeros((cells, len(shape)), np.complex128)
+    # Two blocks of lines, at low frequencies and at negative ones; between them the spectrum is too faint to matter.
+    strong = shape > np.sqrt(FAINT)
+    drawn = _normal(rng, cells, int(strong.sum()))
+    drawn *= np.sqrt(1 / (1 + still)) * shape[strong]
+    lines[:, strong] = drawn
+    moving = np.fft.ifft(lines, axis=1, norm="forward", out=lines)[:, :count]
+    moving += np.sqrt(still / (1 + still)) * kept
+    return moving
 
 
 def mean_power(settings: dict, view: View) -> np.ndarray:
@@ -188,9 +211,11 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         rng, len(power), len(view.times_s), network.symbol_interval_s, still, beta, SPEED_OF_LIGHT / frequency
     )
     # Land beyond the unambiguous range folds into the cells it shares with nearer land.
-    cells = np.zeros((-(-len(power) // network.subcarriers) * network.subcarriers, len(view.times_s)), complex)
-    cells[: len(power)] = lit[:, None] * waves
-    return np.fft.fft(cells.reshape(-1, network.subcarriers, len(view.times_s)).sum(axis=0), axis=0).T
+    cells = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
+    for first in range(0, len(power), network.subcarriers):
+        some = slice(first, min(first + network.subcarriers, len(power)))
+        cells[:, : some.stop - first] += lit[some] * waves[some].T
+    return np.fft.fft(cells, axis=1, out=cells)
 
 
 def target_power(view: View) -> float:
