@@ -9,7 +9,7 @@ rule echo_in_scene:
     input:
         code=code("lowalt.effects", *map(dotted, config["effects"])),
         motion="results/{run}/motion/{group}-{part}.csv",
-        clouds=products.group_clouds,
+        clouds=products.scene_clouds,
         occluders=products.group_occluders,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),

@@ -31,6 +31,7 @@ LISTED = (
     "channel/wavefront",
     "channel/symbol_motion",
     "channel/cyclic_prefix",
+    "channel/companions",
     "channel/clutter",
     "receiver/receiver_noise",
     "receiver/cell_noise",

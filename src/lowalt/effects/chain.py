@@ -66,6 +66,8 @@ class Chain:
             effect.module.amplifies(effect.settings)
             for effect in providing((*self.transmitter, *self.receiver, *self.detection), Amplifies)
         )
+        self.others: list[Chain] = []
+        """Other targets of the beam, each with its own view; everything they ask for is computed."""
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
             self.factor = self.factor * effect.module.visible(effect.settings, view, draws(effect.name))
@@ -112,12 +114,17 @@ class Chain:
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[rows]
-        if on & {"symbol_motion", "cyclic_prefix"}:
+        if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             samples = self._samples(view, on, factor, rows)
+            for other in self.others:
+                samples += other.own_samples[rows]
             if self._clutter is not None:
-                samples = samples + self._clutter_samples("cyclic_prefix" in on)[rows]
+                cut = self.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
+                samples = samples + self.sending.still(self._clutter, cut)[rows]
         else:
             spectrum = self._echo(view, on, factor)
+            for other in self.others:
+                spectrum = spectrum + other.own_response[rows]
             if self._clutter is not None:
                 spectrum = spectrum + self._clutter[rows]
             if not self.receiver and not self.sending.distorts:
@@ -127,6 +134,21 @@ class Chain:
             draws = self.draws(stream_name(effect.name))
             samples = effect.module.receive(effect.settings, samples, self._frame, draws)
         return self.sending.cells(self.sending.received(samples, rows))
+
+    @cached_property
+    def own_response(self) -> np.ndarray:
+        """Subcarriers (N, M) of this target, everything asked for computed to rounding."""
+        return self._echo(self.view, frozenset(self.by_need), self.factor)
+
+    @cached_property
+    def own_samples(self) -> np.ndarray:
+        """Time samples (N, M) of this target, likewise."""
+        return self._samples(self.view, frozenset(self.by_need), self.factor, slice(None))
+
+    @property
+    def _company(self) -> frozenset[str]:
+        """Physics by need of the other targets."""
+        return frozenset(name for other in self.others for name in other.by_need)
 
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
@@ -204,16 +226,6 @@ class Chain:
                     echo[:, :count] = waveform.transmit(spectrum * turned, self.sending.aired_before[rows])[:, :count]
                 samples += weight * echo
         return samples
-
-    def _clutter_samples(self, cut: bool) -> np.ndarray:
-        """Time samples (N, M) of the echoes of everything but the target, cut by the cyclic prefix or not."""
-        if not cut:
-            return waveform.transmit(self._clutter, self.sending.aired)
-        effect, whole = self.by_need["cyclic_prefix"], np.ones_like(self.sending.aired)
-        sent = waveform.transmit(whole, self.sending.aired), waveform.transmit(whole, self.sending.aired_before)
-        # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
-        cells = np.fft.ifft(np.fft.ifftshift(self._clutter, axes=1), axis=1)
-        return effect.module.convolved(effect.settings, self.view.network, cells, sent)
 
     def _paths_of(self, view: View) -> list[ImagePath]:
         """All paths except the direct one."""

@@ -13,8 +13,8 @@ def scene_signals(
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.
 
-    occluders: each subtype's surfaces, where the scene hides points behind them; snrs (dB): signals are
-    (models, snrs, N), with noise in all range cells, where the scene has `cell_noise`.
+    clouds: by subtype, companions' too; occluders: each subtype's surfaces, where the scene hides points behind them;
+    snrs (dB): signals are (models, snrs, N), with noise in all range cells, where the scene has `cell_noise`.
     Raises: InputError naming the sample where a subtype has no cloud or cannot be computed with.
     """
     station, occluders = scene.network.station(name), occluders or {}
@@ -22,7 +22,8 @@ def scene_signals(
     result = np.empty((len(rows), len(levels), scene.network.symbols), np.complex64)
     power = np.empty(len(rows))
     for index, row in enumerate(reported(rows, len(rows), "models")):
+        cloud, surfaces = cloud_of(clouds, row), occluders.get(row["subtype"])
         for place, level in enumerate(levels):
-            received = received_signal(level, station, cloud_of(clouds, row), row, occluders.get(row["subtype"]))
+            received = received_signal(level, station, cloud, row, surfaces, clouds)
             result[index, place], power[index] = received.signal, received.power
     return result[:, 0] if snrs is None else result, power

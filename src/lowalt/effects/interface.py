@@ -13,6 +13,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
 
     from lowalt.common.network import Network
@@ -152,6 +154,16 @@ class AddsEchoes(Protocol):
 
 
 @runtime_checkable
+class AddsTargets(Protocol):
+    """Channel: an effect that puts other targets beside the primary one; all stations see the same."""
+
+    def companions(
+        self, settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator
+    ) -> list[tuple[Cloud, dict]]:
+        """Return the other targets' clouds and rows of the motion table; clouds: by subtype."""
+
+
+@runtime_checkable
 class BoundsItself(Protocol):
     """Channel: physics beyond Eq. 7 that is left out where its bound allows it; `response` and `chain` compute it."""
 
@@ -189,7 +201,7 @@ class ChoosesCells(Protocol):
 WORK = {
     "motion": (PerturbsMotion,),
     "transmitter": (DrawsData, ChangesWaveform, PicksSubcarriers, SamplesTime),
-    "channel": (PointsBeams, SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, BoundsItself),
+    "channel": (PointsBeams, SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, AddsTargets, BoundsItself),
     "receiver": (ChangesSamples,),
     "detection": (FiltersCells, ChoosesCells),
 }

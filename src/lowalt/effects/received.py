@@ -5,7 +5,9 @@ scene names: no waveform without a receiver effect, no frequency response where 
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,9 @@ from lowalt.effects import need
 from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
 from lowalt.effects.interface import (
+    AddsEchoes,
     AddsPaths,
+    AddsTargets,
     PointsBeams,
     SamplesTime,
     SetsCrossSections,
@@ -26,7 +30,7 @@ from lowalt.effects.interface import (
     WeighsPoints,
 )
 from lowalt.effects.need import Decision
-from lowalt.effects.view import View
+from lowalt.effects.view import Beams, View
 from lowalt.targets.cloud import Cloud
 
 BEYOND_MOTION = "transmitter", "channel", "receiver", "detection"
@@ -73,10 +77,13 @@ class Received(NamedTuple):
     decisions: list[Decision]
 
 
-def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> Received:
+def received_signal(
+    scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None,
+    clouds: Mapping[str, Cloud] | None = None,
+) -> Received:  # fmt: skip
     """Return the signal at `station` of the motion model `row` (motion table) under the scene's effects.
 
-    occluders: the target's surfaces, for self-occlusion.
+    occluders: the target's surfaces, for self-occlusion; clouds: those of other subtypes, for companions.
     Raises: InputError naming the sample that cannot be computed.
     """
     sample = f"{row['subtype']}, model {row['model']}, station {station.name}"
@@ -98,6 +105,7 @@ def received_signal(scene: Scene, station: Station, cloud: Cloud, row: dict, occ
     if not exact or (chain.bent and not weighed):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
+    chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
         outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
@@ -134,6 +142,30 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     for effect in providing(scene.effects, SetsCrossSections):
         cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud))
     return cloud
+
+
+def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud]) -> list[Chain]:
+    """Return a chain for every other target beside that of `chain`, under the same beams at the same instants."""
+    view = chain.view
+    mine = [one for one in chain.channel if not isinstance(one.module, (AddsTargets, AddsEchoes))]
+    result = []
+    for effect in providing(scene.effects, AddsTargets):
+        found = effect.module.companions(effect.settings, cloud, row, clouds, scene.stream(effect.name, row))
+        for given, at in found:
+            # A companion of the target's own subtype has its cross sections already.
+            own = given if given is cloud else with_cross_sections(scene, given)
+            seen = observe(scene, view.station, own, at, view.occluders if given is cloud else None)
+            beams = view.beams or Beams(np.zeros(1), view.aim_m[None])
+            seen = replace(seen, times_s=view.times_s, sampling=view.sampling, beams=beams)
+            draws = partial(_drawn, scene, at, view.station.name)
+            other = Chain(mine, seen, draws)
+            other.sending = chain.sending
+            result.append(other)
+    return result
+
+
+def _drawn(scene: Scene, row: dict, station: str, name: str) -> np.random.Generator:
+    return scene.stream(name, row, station)
 
 
 def largest_of(outcome: Outcome) -> float:

@@ -58,6 +58,16 @@ class Sending:
             return waveform.demodulate(samples, self.known[rows])
         return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) / self.known[rows]
 
+    def still(self, spectrum: np.ndarray, prefix: NamedEffect | None) -> np.ndarray:
+        """Return time samples (N, M) of responses (N, M); beyond a `prefix` cells begin with the previous symbol."""
+        if prefix is None:
+            return waveform.transmit(spectrum, self.aired)
+        whole = np.ones_like(self.aired)
+        symbols = waveform.transmit(whole, self.aired), waveform.transmit(whole, self.aired_before)
+        # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
+        cells = np.fft.ifft(np.fft.ifftshift(spectrum, axes=1), axis=1)
+        return prefix.module.convolved(prefix.settings, self.network, cells, symbols)
+
     def _drawn(self, name: str) -> np.ndarray:
         shape = self.network.symbols, self.network.subcarriers
         if self.source is None:

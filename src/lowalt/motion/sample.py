@@ -60,8 +60,11 @@ def heights(settings: dict, subtype: str, category: str, like: str) -> list[floa
     return next(block[name] for name in (subtype, category, like) if name in block)
 
 
-def _rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
-    """Fill in rate, phases and the place in a recording."""
+def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
+    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence: free or tied to it.
+
+    Raises: InputError for more moving parts than the motion table has phases.
+    """
     if cloud.like == "Vehicle":
         row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
     elif cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
@@ -127,7 +130,7 @@ def draw(
         speed = rng.uniform(published["speed_lo"], published["speed_hi"])
         sine, cosine = map(float, portable.sine_cosine(row["yaw_rad"]))
         row["vx_mps"], row["vy_mps"], row["vz_mps"] = -speed * sine, speed * cosine, 0.0
-    _rates(rng, cloud, published, row, speed, settings["cadence"])
+    draw_rates(rng, cloud, published, row, speed, settings["cadence"])
     sizes = settings.get("sizes_m", {})
     if cloud.category in sizes:
         _resize(rng, cloud, *sizes[cloud.category], row)

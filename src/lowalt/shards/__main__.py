@@ -11,6 +11,7 @@ from lowalt.common.network import Network
 from lowalt.motion import read_table
 from lowalt.shards.content import clean_content, noisy_content
 from lowalt.shards.index import build
+from lowalt.shards.record import accompanied
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
 from lowalt.shards.write import write_shard
@@ -19,7 +20,7 @@ from lowalt.shards.write import write_shard
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}.
+    Settings: seed, network, snr_db, split, shards {kind}, and companions, the effect's settings, in a scene with it.
     """
     options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     options.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -35,11 +36,13 @@ def write(arguments: list[str]) -> None:
     options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz beside it")
     given = options.parse_args(arguments)
     classes = _classes(given.settings)
+    beside = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
     (kind,) = pick(shards, "kind")
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
-    rows, snrs, network = read_table(given.motion), [float(snr) for snr in snrs], Network.from_settings(network)
+    rows = [accompanied(row, beside, seed) for row in read_table(given.motion)]
+    snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
     if kind == "recipe":
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:

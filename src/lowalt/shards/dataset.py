@@ -21,7 +21,7 @@ from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.shards.maker import Maker
-from lowalt.shards.record import record, sample_key
+from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
 from lowalt.shards.write import npy
 from lowalt.targets.cloud import Cloud
@@ -145,7 +145,8 @@ class Dataset:
         published, settings = self.published[place.subtype], self.config["motion"]
         cloud = self.clouds[place.subtype]
         row = draw(rng, cloud, published, self._masts, self._corners, settings)
-        return {**row, "group": place.group, "model": place.model}
+        row = {**row, "group": place.group, "model": place.model}
+        return accompanied(row, self.config["effects"], self.plan.seed)
 
     def made_signal(self, place: Place) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""

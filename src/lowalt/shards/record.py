@@ -80,16 +80,20 @@ def record(
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Of a recorded target whose place nobody knows,
-    unknown numbers are null. classes: in the order of their labels.
+    unknown numbers are null. Where `row` has the key `companions`, the subtypes of the other targets in the beam, the
+    record has it too; the label is the row's own target's. classes: in the order of their
+    labels.
     Raises: InputError where the row's category is no class.
     """
     names = ("subtype", "category", "group", "model")
-    motion = {name: value for name, value in row.items() if name not in (*names, "fold")}
+    motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
+    beside = {"companions": list(row["companions"])} if "companions" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
         "label": label(classes, row),
         **{name: row[name] for name in names},
+        **beside,
         "fold": fold,
         "snr_db": NO_NOISE_DB if math.isinf(snr_db) else float(snr_db),
         "noise": not math.isinf(snr_db),
@@ -102,6 +106,16 @@ def record(
         "versions": versions(),
     }
     return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+
+
+def accompanied(row: dict, effects: dict, seed: int) -> dict:
+    """Return the row and the subtypes that the scene's effects put beside its target; alone as it is."""
+    if "companions" not in effects:
+        return row
+    # Most runs have no companions and must not pay for the module.
+    from lowalt.effects.channel.companions import listed
+
+    return {**row, "companions": listed(effects["companions"] or {}, seed, row)}
 
 
 def row_of(entry: dict) -> tuple[dict, float]:

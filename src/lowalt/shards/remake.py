@@ -12,7 +12,7 @@ from lowalt.common.network import Network
 from lowalt.common.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
-from lowalt.shards.record import record, row_of
+from lowalt.shards.record import accompanied, record, row_of
 from lowalt.shards.write import npy
 from lowalt.targets.cloud import Cloud, read
 
@@ -70,6 +70,7 @@ class Remaker:
         maker = self._makers[seed]
         signal = maker.signal(row, snr_db)
         data = maker.png(signal) if self.shards.kind == "image" else npy(signal)
+        row = accompanied(row, self.shards.index["echo"]["effects"], seed)
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data
 
     def faults(self, number: int) -> list[str]:

@@ -45,6 +45,19 @@ class Products:
         """Clouds of a group's subtypes, in the table's order."""
         return self._of_group("clouds", wildcards)
 
+    def scene_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of a group's subtypes, and of the subtypes that the scene puts beside them.
+
+        Raises: InputError for a companion that the run does not have.
+        """
+        beside = (self._config["effects"].get("companions") or {}).get("subtypes", [])
+        unknown = sorted(set(beside) - set(self._run.records))
+        if unknown:
+            raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
+        own = self.group_clouds(wildcards)
+        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(beside)]
+        return [*own, *(path for path in more if path not in own)]
+
     def group_occluders(self, wildcards: Any) -> list[str]:
         """Surfaces of a group's subtypes where the scene hides points behind surfaces, none elsewhere."""
         return self._of_group("occluders", wildcards) if "occlusion" in self._config["effects"] else []

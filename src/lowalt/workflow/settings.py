@@ -79,11 +79,11 @@ class Settings:
         return self._text("index", **blocks, echo=echo, classes=self._run.classes)
 
     def shard(self, wildcards: Any) -> str:
-        """The fold of each sample, its name and its form."""
-        snrs = self._config["noise"]["snr_db"]
-        return self._text(
-            "shard", **self._blocks("seed", "network", "split", "shards"), snr_db=snrs, classes=self._run.classes
-        )
+        """The fold of each sample, its name and its form, and whom its record names beside it."""
+        snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
+        beside = {"companions": effects["companions"] or {}} if "companions" in effects else {}
+        blocks = self._blocks("seed", "network", "split", "shards")
+        return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **beside)
 
     def cost_table(self, wildcards: Any) -> str:
         """What the echo is timed with."""
