@@ -15,7 +15,7 @@ TABLES := accuracy comparisons confusion subtypes stages alarms calibration reli
 NUMPYS := 2.0.0 2.4.6
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 
-.PHONY: all default data real measured test test-slow lint format bench bench-workflow bench-make status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
+.PHONY: all default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
 all: default
 
@@ -74,6 +74,10 @@ test: $(TESTING)  ## the test suite
 
 test-slow: $(TESTING)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
+
+# One process a reader; some ten minutes.
+fuzz: $(TESTING)  ## 2000 damaged files for every reader of files: results/benchmarks/fuzz.csv
+	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
 lint: $(TESTING)  ## ruff, snakefmt, snakemake --lint
 	$(BIN)/ruff check .

@@ -14,8 +14,8 @@ from lowalt.targets import mocap
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.skeleton import LIMBS, NODES, PARENTS, rotation
 from real_inputs import FOLDER, needs_inputs
+from walkers import CHANNELS, asf, walk
 
-CHANNELS = {"lfemur": "rx ry rz", "ltibia": "rx", "rfemur": "rx ry rz", "rtibia": "rx", "lhumerus": "rx ry rz"}
 PUBLISHED = {"hgt_m": 1.75}
 
 
@@ -99,36 +99,6 @@ def test_forward_kinematics_agrees_with_an_independent_conversion():
     positions = mocap.nodes_m(mocap.posed(skeleton, channels, 120)) @ mocap.FROM_FILE
     for node, joint in (same | above).items():
         assert np.abs(positions[:, NODES.index(node)] - joints[joint] * unit).max() < 5e-5, node
-
-
-def asf(bones: dict[str, np.ndarray], extra: str = "") -> str:
-    lines = [":version 1.10", ":units", "length 0.45", "angle deg", ":root", "order TX TY TZ RX RY RZ", "axis XYZ"]
-    lines += ["position 0 0 0", "orientation 0 0 0", ":bonedata"]
-    for name in NODES[1:]:
-        x, y, z = bones[name]
-        lines += ["begin", f"name {name}", f"direction {x} {y} {z}", f"length {math.hypot(x, y, z)!r}"]
-        lines += ["axis 0 0 0 XYZ"] + ([f"dof {CHANNELS[name]}"] if name in CHANNELS else []) + ["end"]
-    lines += [":hierarchy", "begin"]
-    for parent in NODES:
-        children = [child for child, above in LIMBS.items() if above == parent]
-        lines += [" ".join([parent, *children])] if children else []
-    return "\n".join([*lines, "end", extra])
-
-
-def walk(frames: int, period: float = 100, turn_deg: float = 0.0, speed: float = 0.2, growth: float = 0.0) -> str:
-    """A made-up walk: sinusoidal angles, growing a frame by `growth`; the root moves along z turned about y."""
-    lines = [":FULLY-SPECIFIED", ":DEGREES"]
-    heading = math.radians(turn_deg)
-    for frame in range(frames):
-        swing = math.sin(2 * math.pi * frame / period) * (1 + growth * frame)
-        way = speed * frame
-        lines += [str(frame + 1)]
-        lines += [
-            f"root {way * math.sin(heading)!r} {16 + 0.3 * swing**2!r} {way * math.cos(heading)!r} 0 {turn_deg!r} 0"
-        ]
-        lines += [f"lfemur {30 * swing!r} 0 0", f"rfemur {-30 * swing!r} 0 0", f"lhumerus {-20 * swing!r} 5 0"]
-        lines += [f"ltibia {20 - 20 * swing!r}", f"rtibia {20 + 20 * swing!r}"]
-    return "\n".join(lines)
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from lowalt.common.errors import InputError, InputWarning
-from lowalt.common.files import existing
+from lowalt.common.files import text_of
 from lowalt.common.memory import keep_freed_memory
 
 
@@ -40,10 +40,10 @@ def settings(text: str) -> dict:
     """
     source = text
     if text.startswith("@"):
-        source = existing(text[1:], "--settings").read_text()
+        source = text_of(text[1:], "--settings")
     try:
         value = json.loads(source)
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"--settings {text[:80]!r}: not JSON ({error})") from error
     if not isinstance(value, dict):
         raise InputError(f"--settings {text[:80]!r}: {type(value).__name__}, expected a JSON object")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing, text_file
 
 
 def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
@@ -16,7 +16,7 @@ def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
 
     Raises: InputError naming the file and the columns it lacks.
     """
-    with existing(path, "table").open(newline="") as file:
+    with text_file(path, "table") as file:
         reader = csv.DictReader(file)
         missing = set(needed) - set(reader.fieldnames or ())
         if missing:

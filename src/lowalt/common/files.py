@@ -1,6 +1,7 @@
 """Files at the edges of the stages: nothing half-written stays behind, every file has a checksum and a plain name."""
 
 import contextlib
+import csv
 import errno
 import hashlib
 import os
@@ -8,6 +9,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 from lowalt.common.errors import InputError, SpaceError
 
@@ -82,6 +84,29 @@ def existing(path: str | Path, what: str) -> Path:
     if not path.is_file():
         raise InputError(f"{what}: no file at {path}")
     return path
+
+
+@contextlib.contextmanager
+def text_file(path: str | Path, what: str) -> Iterator[TextIO]:
+    """Yield a file opened as UTF-8 text, with or without a byte order mark; line ends are left as they are.
+
+    Raises: InputError naming `what` and the path where there is no such file, it is no UTF-8, or no CSV where it is
+    read as CSV.
+    """
+    try:
+        with existing(path, what).open(encoding="utf-8-sig", newline="") as file:
+            yield file
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: not a {what} in UTF-8 text ({error})") from error
+
+
+def text_of(path: str | Path, what: str) -> str:
+    """Return the text of a file.
+
+    Raises: as `text_file`.
+    """
+    with text_file(path, what) as file:
+        return file.read()
 
 
 def slug(name: str) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 import yaml
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_of
 
 
 class _UniqueKeyLoader(yaml.SafeLoader):
@@ -23,16 +23,46 @@ class _UniqueKeyLoader(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+MOST_NODES = 1_000_000
+"""Values that a file may hold, counted as often as anchors repeat them: ten lines can stand for billions."""
+
+
+def _check_size(root: yaml.Node | None, path: str | Path) -> None:
+    """Refuse a document whose anchors repeat it beyond measure or lead back into itself."""
+    sizes: dict[int, int] = {}
+
+    def size(node: yaml.Node | None) -> int:
+        if not isinstance(node, yaml.CollectionNode):
+            return 1
+        if id(node) not in sizes:
+            sizes[id(node)] = MOST_NODES + 1  # stands for the node until it is counted: one inside itself is endless
+            pairs = node.value if isinstance(node, yaml.MappingNode) else [(entry,) for entry in node.value]
+            sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
+        return sizes[id(node)]
+
+    if size(root) > MOST_NODES:
+        raise InputError(f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document")
+
+
 def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
     """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in messages.
 
     Raises: InputError naming the file where it is missing, not YAML, no mapping, or has a key twice.
     """
-    with existing(path, what).open() as file:
-        try:
-            value = yaml.load(file, _UniqueKeyLoader)
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: not YAML ({error})") from error
+    text = text_of(path, what)
+    try:
+        loader = _UniqueKeyLoader(text)
+        loader.name = str(path)
+        root = loader.get_single_node()
+        _check_size(root, path)
+        value = None if root is None else loader.construct_document(root)
+    except InputError:
+        raise
+    # Beside its own errors the library lets those of its converters pass: a date of month 99, a number of 5000 digits.
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise InputError(f"{path}: not YAML ({error})") from error
+    except RecursionError:
+        raise InputError(f"{path}: mappings and lists stand in each other too deeply, expected a few levels") from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: {type(value).__name__}, expected a mapping of {holds}")
     return value

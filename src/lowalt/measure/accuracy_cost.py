@@ -30,7 +30,7 @@ import numpy as np
 from lowalt.common.command import parser, pick, run
 from lowalt.common.csv_tables import read_csv, short, write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_of
 from lowalt.common.network import station_names
 from lowalt.common.streams import stream
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
@@ -58,7 +58,7 @@ def read_speeds(paths: list[str | Path]) -> dict[str, dict]:
     found = {}
     for path in paths:
         try:
-            entry = json.loads(existing(path, "speed").read_text())
+            entry = json.loads(text_of(path, "speed"))
             found[entry["scheme"]] = {
                 key: entry[key] for key in ("size", "parameters", "inference_ms_1", "inference_ms_64", "train_ms",
                                             "batch", "steps", "backbone", "hardware")}  # fmt: skip
@@ -200,7 +200,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
-    index = json.loads(existing(given.index, "index").read_text())
+    index = json.loads(text_of(given.index, "index"))
     shards, stations = index["shards"], station_names(index["render"]["network"])
     size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
     runs, speeds = [Run(path) for path in given.predictions], read_speeds(given.speeds)

@@ -10,12 +10,12 @@ computed with and without the effects, one right after the other, so that both m
 import functools
 import json
 import time
-import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE
 from lowalt.common.classes import label
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
@@ -181,7 +181,7 @@ def read_samples(path: str | Path) -> tuple[dict, dict[str, np.ndarray]]:
     try:
         with np.load(path, allow_pickle=False) as data:
             return json.loads(str(data["header"])), {name: data[name] for name in ARRAYS}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a file of an effect's samples ({error})") from error
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_file
 from lowalt.targets.cloud import MOST_TURNING_PARTS
 
 PHASES = MOST_TURNING_PARTS
@@ -41,7 +41,7 @@ def read_table(path: str | Path) -> list[dict]:
 
     Raises: InputError naming the file, line and column that is wrong.
     """
-    with existing(path, "motion table").open(newline="") as file:
+    with text_file(path, "motion table") as file:
         reader = csv.reader(file)
         header = tuple(next(reader, ()))
         if header not in (COLUMNS, (*COLUMNS, SCALE)):

@@ -6,7 +6,7 @@ The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.files import existing, replacing, sha256, text_of
 
 
 def freeze(paths: list[str | Path], out: str | Path) -> None:
@@ -33,7 +33,7 @@ def verify(sums: str | Path) -> int:
     Raises: InputError naming the first file that is missing or has changed since it was frozen.
     """
     folder = existing(sums, "checksums").resolve().parent
-    lines = Path(sums).read_text().splitlines()
+    lines = text_of(sums, "checksums").splitlines()
     for number, line in enumerate(lines, start=1):
         digest, gap, name = line[:64], line[64:66], line[66:]
         if gap != "  " or not name:

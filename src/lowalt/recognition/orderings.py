@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_file
 
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
@@ -24,7 +24,7 @@ def read_published(path: str | Path) -> dict[tuple[str, str], float]:
     Raises: InputError for a file that is no such table.
     """
     try:
-        with existing(path, "published accuracies").open(newline="") as file:
+        with text_file(path, "published accuracies") as file:
             rows = [row for row in csv.DictReader(file) if row["snr_db"] == "avg"]
             return {(row["protocol"], row["scheme"]): float(row["accuracy_percent"]) for row in rows}
     except (KeyError, ValueError, TypeError) as error:

@@ -20,7 +20,7 @@ import numpy as np
 from lowalt.common.classes import CATEGORIES, word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import existing, text_file, text_of
 from lowalt.recognition.samples import Facts
 
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")
@@ -83,8 +83,8 @@ def record(path: str | Path) -> dict:
     """
     side = existing(Path(path).with_suffix(".json"), "run record")
     try:
-        found = json.loads(side.read_text())
-    except ValueError as error:
+        found = json.loads(text_of(side, "run record"))
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{side}: not a run record ({error})") from error
     if not isinstance(found, dict):
         raise InputError(f"{side}: not a run record, expected a JSON object")
@@ -124,7 +124,7 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
     Raises: InputError naming the file, the line and what is wrong.
     """
     rows, shares = [], probability_columns(classes)
-    with existing(path, "predictions").open(newline="") as file:
+    with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)
         if tuple(reader.fieldnames or ()) != (*COLUMNS, *shares):
             raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *shares]}")

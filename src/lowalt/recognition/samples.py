@@ -11,15 +11,15 @@ A cache file (.npz) holds, for the samples of one shard in its order,
 
 import copy
 import hashlib
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing
 from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import LISTED
 
@@ -139,7 +139,7 @@ def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:
-    existing(path, "views")
+    checked_archive(path, "views")
     try:
         with np.load(path, allow_pickle=False) as data:
             facts = Facts(*(data[name] for name in FACTS))
@@ -148,7 +148,7 @@ def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[
             if not keep.any():
                 return None
             images, spectra = data["views"], data["spectra"].tolist()
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a views file ({error})") from error
     count = len(spectra) * facts.range_m.shape[1]
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:

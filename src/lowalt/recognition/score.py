@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_file
 from lowalt.recognition.predictions import probability_columns
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
@@ -16,7 +16,7 @@ from lowalt.shards import ShardSet
 
 def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
     found: dict[str, list[float]] = {}
-    with existing(path, "predictions").open(newline="") as file:
+    with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)
         missing = {"key", *columns} - set(reader.fieldnames or ())
         if missing:

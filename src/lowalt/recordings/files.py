@@ -9,9 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import existing, text_file
 from lowalt.recordings import faults
+from lowalt.recordings.mat_files import read_mat
 from lowalt.recordings.record import Record
 
 
@@ -49,12 +51,10 @@ def _wav(path: Path, record: Record) -> _Table:
 
 
 def _mat(path: Path, record: Record) -> _Table:
-    from scipy.io import loadmat
-
-    held = {name: value for name, value in loadmat(path).items() if not name.startswith("__")}
+    held = read_mat(path)
     name = record.variable
     if name is None:
-        arrays = [key for key, value in held.items() if getattr(value, "size", 0) > 1]
+        arrays = [key for key, value in held.items() if value.size > 1]
         if len(arrays) != 1:
             raise InputError(f"{path}: variables {sorted(held)}, expected the record to name one as `variable`")
         name = arrays[0]
@@ -64,14 +64,14 @@ def _mat(path: Path, record: Record) -> _Table:
 
 
 def _csv(path: Path, record: Record) -> _Table:
-    with path.open() as file:
+    with text_file(path, "recording") as file:
         first = file.readline().strip().split(",")
     try:
         [complex(cell.strip()) for cell in first]
         names: tuple[str, ...] = ()
     except ValueError:
         names = tuple(cell.strip() for cell in first)
-    values = np.loadtxt(path, delimiter=",", skiprows=int(bool(names)), ndmin=2)
+    values = np.loadtxt(path, delimiter=",", skiprows=int(bool(names)), ndmin=2, encoding="utf-8-sig")
     return _Table(values, names, None)
 
 
@@ -145,7 +145,7 @@ def read(record: Record) -> Baseband:
         table = READERS[path.suffix](path, record)
     except InputError:
         raise
-    except (OSError, ValueError, TypeError, EOFError, NotImplementedError) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a readable {path.suffix} file ({error})") from error
     times = None if record.times is None else _column(table, record.times, path)
     rate = faults.agreed_rate(path, record.rate_hz, table.rate_hz, times)

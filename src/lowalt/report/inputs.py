@@ -12,7 +12,7 @@ from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import existing, text_of
 
 FILES = (
     "accuracy", "confusion", "subtypes", "comparisons", "orderings", "alarms", "calibration", "reliability", "seeds",
@@ -49,7 +49,7 @@ class Inputs:
     def read(cls, path: str | Path) -> "Inputs":
         """Read a manifest. Raises: InputError where it is missing, no JSON object, or as the constructor says."""
         try:
-            found = json.loads(existing(path, "manifest").read_text())
+            found = json.loads(text_of(path, "manifest"))
         except ValueError as error:
             raise InputError(f"{path}: not JSON ({error})") from error
         if not isinstance(found, dict):

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_of
 
 
 def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:
@@ -33,7 +33,7 @@ def measurement(path: str | Path) -> dict:
     Raises: InputError for a file that is no such benchmark.
     """
     try:
-        last = json.loads(existing(path, "benchmark").read_text().splitlines()[-1])
+        last = json.loads(text_of(path, "benchmark").splitlines()[-1])
         return {name: last[name] for name in ("rule_name", "wildcards", "s", "cpu_time", "max_rss")}
     except (ValueError, IndexError, KeyError) as error:
         raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error

@@ -18,7 +18,7 @@ from lowalt.common.classes import plural
 from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.files import replacing, sha256, text_of
 from lowalt.common.network import station_names
 from lowalt.common.splits import FOLDS
 from lowalt.shards import sums
@@ -237,7 +237,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     """
     if license_name not in LICENSES:
         raise InputError(f"--license: {license_name!r}, expected one of {sorted(LICENSES)}")
-    shards, config = ShardSet(index_path), existing(config_path, "configuration").read_text()
+    shards, config = ShardSet(index_path), text_of(config_path, "configuration")
     name = f"lowalt-{yaml.safe_load(config)['run']}"
     folder = Path(index_path).parent
     with replacing(folder / "README.md") as temporary:

@@ -6,11 +6,11 @@ SHA-256 stay in its shard's table, whose SHA-256 stands in the index: one checks
 
 import hashlib
 import json
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.files import existing, replacing, sha256, text_of
 from lowalt.shards.table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
@@ -79,12 +79,31 @@ def load(path: str | Path) -> dict:
     """
     existing(path, "index")
     try:
-        index = json.loads(Path(path).read_text())
+        index = json.loads(text_of(path, "index"))
         found, checksum = index["format"], index["sha256"]
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not an index of shards ({error})") from error
     if found not in READABLE:
         raise InputError(f"{path}: format {found!r}, expected one of {READABLE}")
     if checksum != _checksum(index):
         raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
+    _check_entries(index, path)
     return index
+
+
+NEEDED = {"name": str, "path": str, "group": str, "fold": str, "samples": int, "bytes": int, "table_sha256": str}
+
+
+def _check_entries(index: dict, path: str | Path) -> None:
+    """Refuse an index whose checksum is right and whose shards are no shards, or lie outside its folder."""
+    entries = index.get("shards")
+    if not isinstance(entries, list) or not isinstance(index.get("kind"), str):
+        raise InputError(f"{path}: lacks its kind or its list of shards")
+    for entry in entries:
+        known = entry if isinstance(entry, dict) else {}
+        wrong = [key for key, kind in NEEDED.items() if not isinstance(known.get(key), kind)]
+        if wrong:
+            raise InputError(f"{path}: a shard lacks {wrong}, or they are of another type")
+        place = PurePosixPath(entry["path"])
+        if place.is_absolute() or ".." in place.parts:
+            raise InputError(f"{path}: shard {entry['path']!r} lies outside the index's folder")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from lowalt.common.command import run
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.files import replacing, sha256, text_of
 
 STAGES = {
     "clouds": ("clouds/*.npz",), "motion": ("motion/*.csv",), "echo": ("echo/*/*.npy",), "noise": ("noisy/*.npy",),
@@ -45,7 +45,7 @@ def read(path: str | Path) -> dict[str, str]:
     Raises: InputError naming the file and the line that is no checksum and name.
     """
     result = {}
-    for number, line in enumerate(existing(path, "manifest").read_text().splitlines(), start=1):
+    for number, line in enumerate(text_of(path, "manifest").splitlines(), start=1):
         digest, _, name = line.partition("  ")
         if len(digest) != 64 or not name:
             raise InputError(f"{path}, line {number}: {line!r}, expected a SHA-256, two spaces and a file")

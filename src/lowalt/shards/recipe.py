@@ -18,7 +18,7 @@ from lowalt import __version__
 from lowalt.common.command import run
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.common.files import existing, replacing, sha256, text_of
 from lowalt.common.yaml_files import load_yaml
 from lowalt.shards import manifest
 from lowalt.shards.build import write_run
@@ -60,11 +60,14 @@ def pack(folder: str | Path, path: str | Path) -> int:
 def _extracted(path: Path, folder: Path) -> dict:
     """The recipe's head; its other members are unpacked into `folder`."""
     try:
-        with tarfile.open(existing(path, "recipe")) as archive:
+        # Not compressed and no sparse members, so what is unpacked is never larger than the file.
+        with tarfile.open(existing(path, "recipe"), "r:") as archive:
+            if any(not (member.isfile() or member.isdir()) or member.issparse() for member in archive):
+                raise InputError(f"{path}: has members that are no plain files, expected a recipe")
             archive.extractall(folder, filter="data")
-        head = json.loads((folder / "recipe.json").read_text())
+        head = json.loads(text_of(folder / "recipe.json", "recipe"))
         found, version = head["format"], head["lowalt"]
-    except (tarfile.TarError, OSError, ValueError, KeyError) as error:
+    except (tarfile.TarError, OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not a recipe ({error})") from error
     if found != FORMAT:
         raise InputError(f"{path}: format {found!r}, expected {FORMAT!r}")

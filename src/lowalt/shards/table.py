@@ -7,11 +7,11 @@ The table is stored uncompressed, so that a loader maps it into memory and a mil
 """
 
 import json
-import zipfile
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 from lowalt.tiles.files import map_array
@@ -52,11 +52,11 @@ def read_header(path: str | Path) -> dict:
 
     Raises: InputError naming the file where it is missing or damaged.
     """
-    existing(path, "shard table")
+    checked_archive(path, "shard table")
     try:
         with np.load(path, allow_pickle=False) as data:
             return json.loads(str(data["header"]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a shard table ({error})") from error
 
 

@@ -18,7 +18,6 @@ up +z. Every point belongs to one part; every part but the body moves.
 """
 
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -26,8 +25,9 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common import classes
+from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
@@ -181,7 +181,7 @@ def read(path: str | Path) -> Cloud:
 
     Raises: InputError naming the file and what is wrong with it.
     """
-    existing(path, "cloud")
+    checked_archive(path, "cloud")
     try:
         with np.load(path, allow_pickle=False) as data:
             arrays = {name: data[name] for name in data.files}
@@ -189,6 +189,6 @@ def read(path: str | Path) -> Cloud:
         kinds = tuple(str(value) for value in arrays.pop("kinds"))
         names = tuple(str(value) for value in arrays.pop("names"))
         cloud = Cloud(kinds=kinds, names=names, record=record, **arrays)
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a cloud file ({error})") from error
     return check(cloud, str(path))

@@ -112,7 +112,7 @@ def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
         words = line.split()
         if not words or words[0].startswith(("#", ":")):
             continue
-        if len(words) == 1 and words[0].isdigit():
+        if len(words) == 1 and words[0].isdecimal():
             if last is not None and int(words[0]) > last:
                 break
             if int(words[0]) != frame + 1:
@@ -132,7 +132,7 @@ def in_radians(path: Path) -> bool:
             word = line.split()[:1]
             if word and word[0].upper() == ":RADIANS":
                 return True
-            if word and word[0].isdigit():
+            if word and word[0].isdecimal():
                 return False
     return False
 

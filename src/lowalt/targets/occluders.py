@@ -7,12 +7,12 @@ meshes are simplified, and the file says how far each point then lies off.
 
 import json
 import os
-import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE
 from lowalt.common.classes import like
 from lowalt.common.command import parser, pick, run
 from lowalt.common.environment import INPUTS
@@ -149,7 +149,7 @@ def read(path: str | Path) -> dict:
     try:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in ARRAYS} | {"subtype": json.loads(str(data["subtype"]))}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: not a file of occluders ({error})") from error
 
 

@@ -12,7 +12,7 @@ from types import ModuleType
 
 from lowalt.common.classes import AIRBORNE, classes_of, like
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.common.files import text_file
 from lowalt.common.yaml_files import load_yaml
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
@@ -35,7 +35,7 @@ def load_table(path: str | Path) -> dict[str, dict]:
 
     Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive number.
     """
-    with existing(path, "table of published targets").open(newline="") as file:
+    with text_file(path, "table of published targets") as file:
         reader = csv.DictReader(file)
         columns, rows = reader.fieldnames or [], list(reader)
     expected = {*_WORDS, *_WHOLE, *_NUMBERS}

@@ -13,6 +13,7 @@ from pathlib import Path
 import deflate
 import numpy as np
 
+from lowalt.common.array_files import UNREADABLE
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 
@@ -71,7 +72,7 @@ def stored_array(path: Path, name: str) -> tuple[np.dtype, int, int]:
         if info.compress_type != zipfile.ZIP_STORED or len(shape) != 1:
             raise ValueError(f"{name} is compressed or not one-dimensional")
         return dtype, shape[0], start
-    except (OSError, zipfile.BadZipFile, KeyError, ValueError, struct.error) as error:
+    except UNREADABLE as error:
         raise InputError(f"{path}: no array {name} ({error})") from error
 
 

@@ -15,6 +15,8 @@ from lowalt.common.errors import InputError
 from lowalt.tiles import filters
 from lowalt.tiles.huffman import zlib_compress
 
+MOST_EXPANSION = 1032
+"""No zlib stream expands by more. Source: RFC 1951, a match of 258 bytes takes two bits at least."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
@@ -77,18 +79,23 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     palette = np.zeros((256, 3), np.uint8)
     for name, body in chunks:
         if name == b"PLTE":
+            if len(body) % 3 or len(body) > palette.size:
+                raise InputError(f"image: a palette of {len(body)} bytes, expected up to 256 colours of three bytes")
             table = np.frombuffer(body, np.uint8).reshape(-1, 3)
             palette[: len(table)] = table
+    packed = b"".join(body for name, body in chunks if name == b"IDAT")
+    pixels = height * (width + 1)
+    if not width * height or pixels > MOST_EXPANSION * (len(packed) + 1):
+        raise InputError(f"image: {width} x {height} pixels in {len(packed)} bytes, expected a size that fits them")
     if interlace:
         with Image.open(io.BytesIO(data)) as picture:
             return np.array(picture), palette
-    packed = b"".join(body for name, body in chunks if name == b"IDAT")
     try:
-        plain = deflate.zlib_decompress(packed, height * (width + 1))
+        plain = deflate.zlib_decompress(packed, pixels)
     except (deflate.DeflateError, ValueError) as error:
         raise InputError(f"image: the PNG's pixels cannot be unpacked ({error})") from error
     image = np.empty((height, width), np.uint8)
     rows = np.frombuffer(plain, np.uint8)
-    if rows.size != height * (width + 1) or filters.undo(rows.reshape(height, width + 1), image) >= 0:
+    if rows.size != pixels or filters.undo(rows.reshape(height, width + 1), image) >= 0:
         raise InputError("image: the PNG has too few pixels or an unknown filter")
     return image, palette

@@ -1,0 +1,41 @@
+"""Files of arrays (.npy, .npz) from anywhere: what reading a damaged one may raise, and what one may promise."""
+
+import struct
+import tokenize
+import zipfile
+import zlib
+from pathlib import Path
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+
+UNREADABLE = (
+    OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, MemoryError, OverflowError, RuntimeError,
+    SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What numpy and zipfile raise on a file that is no array file, or is damaged."""
+
+FREE_BYTES = 64 << 20
+"""Up to this size a member of an archive may expand as it likes."""
+MOST_EXPANSION = 16
+"""Larger members may be this many times their compressed size; the project's own are stored as they are."""
+
+
+def checked_archive(path: str | Path, what: str) -> Path:
+    """Return the path of a .npz whose members can be what they say; nothing is unpacked.
+
+    Raises: InputError naming the file where it is missing, no archive, or has a member that would fill the memory.
+    """
+    path = existing(path, what)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+    except UNREADABLE as error:
+        raise InputError(f"{path}: not a {what} file ({error})") from error
+    for member in members:
+        if member.file_size > max(FREE_BYTES, MOST_EXPANSION * member.compress_size):
+            raise InputError(
+                f"{path}: {member.filename} says that {member.compress_size} bytes expand to {member.file_size}, "
+                f"expected at most {MOST_EXPANSION} times as many"
+            )
+    return path
