@@ -22,8 +22,9 @@ NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 PLAIN = replace(NETWORK, transmit=(1, 1), receive=(1, 1), subcarriers=1)
 """Isotropic arrays and one subcarrier, so that only the propagation paths matter."""
 NOTHING = np.full(3, np.nan)
-METAL = {"permittivity": 1.0, "conductivity_s_m": 1e14, "roughness_m": 0.0, "polarisation": "horizontal"}
+METAL = {**ground_reflection.DEFAULTS, "permittivity": 1.0, "conductivity_s_m": 1e14, "polarisation": "horizontal"}
 """A mirror: reflection -1 at every angle."""
+EARTH = {**ground_reflection.DEFAULTS, "permittivity": 12.8, "conductivity_s_m": 0.47}
 
 
 def body(points: list, normals: np.ndarray | None = None, kind: str = "body") -> Cloud:
@@ -51,9 +52,7 @@ def received(view: View, settings: dict | None) -> np.ndarray:
     return response(view.network, view.station, view.places, view.cloud.rcs_m2, view.aim_m, paths=paths)
 
 
-@pytest.mark.parametrize(
-    "settings", [METAL, ground_reflection.DEFAULTS, {**ground_reflection.DEFAULTS, "roughness_m": 0.1}]
-)
+@pytest.mark.parametrize("settings", [METAL, EARTH, {**EARTH, "roughness_m": 0.1}])
 def test_two_rays_add_as_the_closed_form_over_range_and_height(settings):
     station = np.array(PLAIN.station("A").position_m)
     frequency = PLAIN.station("A").frequency_hz
