@@ -45,7 +45,8 @@ def pack(folder: str | Path, path: str | Path) -> int:
         raise InputError(f"{folder}: has no shards, expected the folder of a finished run")
     head = {"format": FORMAT, "lowalt": __version__, "config": plain(config), "published": dataset.published}
     members = {
-        "recipe.json": json.dumps(head, sort_keys=True, indent=1).encode(),
+        # The order of the published rows is that of the classes, so keys are not sorted.
+        "recipe.json": json.dumps(head, indent=1).encode(),
         "manifest.sha256": "".join(kept).encode(),
         **{f"clouds/{file.name}": file.read_bytes() for file in sorted((folder / "clouds").glob("*.npz"))},
     }
