@@ -227,3 +227,13 @@ def test_every_name_in_the_list_of_words_stands_in_the_code():
     }
     assert len(rows) > 50 and len(named) > 50
     assert not named - known - {"py", "RUN"}
+
+
+def test_each_of_the_twenty_questions_is_answered_by_a_file_that_holds_its_word():
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Twenty questions")[2]
+    rows = re.findall(r"^\| (.+\?) \| `([^`]+)`[^|]* \| `([^`]+)` \|$", text, re.MULTILINE)
+    assert len(rows) == len({question for question, _, _ in rows}) == 20
+    found = {file: next((base / file for base in (ROOT, ROOT / "src/lowalt") if (base / file).is_file()), None)
+             for _, file, _ in rows}  # fmt: skip
+    wrong = [row for row in rows if not found[row[1]] or not re.search(rf"\b{row[2]}\b", found[row[1]].read_text())]
+    assert not wrong
