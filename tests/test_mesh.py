@@ -1,8 +1,5 @@
 """Users' meshes: every real one becomes a cloud of the published size, bad ones are refused by file and reason."""
 
-import json
-import subprocess
-import sys
 import warnings
 from pathlib import Path
 
@@ -15,50 +12,25 @@ from hypothesis import strategies as st
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets import mesh
-from lowalt.targets.make import make
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
-from lowalt.targets.records import load_table, merge, read_records
+from lowalt.targets.records import read_records
+from meshes import TABLE, box, car_record, made, plain, quad_record, write_bird, write_quad
 from real_inputs import FOLDER, needs_inputs
 
 ROOT = Path(__file__).parents[1]
-TABLE = load_table(ROOT / "config/targets.csv")
 REAL = read_records(ROOT / "config/targets/real.yaml")
 UNITS = {"hatchback.obj": "in", "prius_hybrid.obj": "cm", "prius_body.obj": "cm", "prius_wheel.obj": "cm",
          "cowbird_fly.obj": "cm"}  # fmt: skip
 
 
-def made(subtype: str, folder: Path, seed: int = 1, **record) -> clouds.Cloud:
-    merged = merge(TABLE[subtype], {"source": "mesh", **record}, subtype)
-    return clouds.check(mesh.mesh_cloud(merged, folder, seed), subtype)
-
-
-def plain(file: str, **changes) -> dict:
-    """A record that takes a whole file as a UAV's body, any size."""
-    record = {"unit": "m", "up": "z", "front": "y", "size_is": "largest extent", "scale": "none", "scale_limit": 1e6}
-    return record | {"parts": {"body": {"kind": "body", "meshes": [{"file": file}]}}} | changes
-
-
-def box(size, at=(0, 0, 0)) -> trimesh.Trimesh:
-    shape = trimesh.creation.box(size)
-    shape.apply_translation(at)
-    return shape
+@pytest.fixture
+def quad(tmp_path):
+    return write_quad(tmp_path)
 
 
 @pytest.fixture
-def quad(tmp_path):
-    """A body with arms along its file's x (front), and a propeller with its hub at the origin."""
-    box((0.2, 0.12, 0.06)).export(tmp_path / "body.stl")
-    box((0.2, 0.02, 0.004)).export(tmp_path / "prop.stl")
-    return tmp_path
-
-
-def quad_record(**changes) -> dict:
-    hubs = {"front right": (0.1, -0.1, "ccw"), "rear right": (-0.1, -0.1, "cw"), "rear left": (-0.1, 0.1, "ccw"),
-            "front left": (0.1, 0.1, "cw")}  # fmt: skip
-    parts = {"body": {"kind": "body", "meshes": [{"file": "body.stl"}]}}
-    for name, (x, y, sense) in hubs.items():
-        parts[name] = {"kind": "rotor", "meshes": [{"file": "prop.stl", "move": [x, y, 0.04]}], "sense": sense}
-    return {"unit": "m", "up": "z", "front": "x", "size_is": "motor diagonal", "parts": parts} | changes
+def bird(tmp_path):
+    return write_bird(tmp_path)
 
 
 # --- the real ones ---
@@ -243,23 +215,6 @@ def test_open_surface_is_sampled_as_triangle_soup(tmp_path):
     assert (np.abs(cloud.points[top][:, :2]) > [0.0499, 0.0999]).any(axis=1).all()  # only the rim is that high
 
 
-@pytest.fixture
-def bird(tmp_path):
-    """A body with flat wings to both sides, and a stand below, in centimetres; front y, up z."""
-    shapes = [box((4, 16, 4)), box((30, 6, 0.4), (0, 2, 0)), box((1, 1, 6), (0, 0, -6))]
-    trimesh.util.concatenate(shapes).export(tmp_path / "bird.obj")
-    parts = {"body": {"kind": "body", "meshes": [{"file": "bird.obj"}]}}
-    for side, sign in (("right", 1), ("left", -1)):
-        edges = sorted([sign * 0.021, sign * 0.08])
-        inner = [[edges[0], None, -0.01], [edges[1], None, 0.01]]
-        outer = [[0.08, None, None], [None, None, None]] if sign > 0 else [[None, None, None], [-0.08, None, None]]
-        parts[f"{side} inner"] = {"kind": "wing", "region": {"box": inner}, "hinge": [sign * 0.02, 0, 0]}
-        parts[f"{side} outer"] = {"kind": "wing", "region": {"box": outer}, "hinge": [sign * 0.08, 0, 0]}
-        parts[f"{side} outer"]["parent"] = f"{side} inner"
-    record = {"unit": "cm", "up": "z", "front": "y", "size_is": "length", "parts": parts}
-    return tmp_path, record | {"drop": [{"box": [[None, None, None], [None, None, -0.0205]]}]}
-
-
 def test_wings_are_cut_in_two_and_a_positive_angle_raises_the_tip(bird):
     folder, record = bird
     cloud = made("Crow", folder, **record)
@@ -276,16 +231,6 @@ def test_wings_are_cut_in_two_and_a_positive_angle_raises_the_tip(bird):
         turned = points + 0.01 * np.cross(cloud.axes[part], points - cloud.hinges[part])  # a small positive angle
         assert turned[:, 2].mean() > points[:, 2].mean()
         assert cloud.hinges[part, 0] == pytest.approx(sign * (0.02 if part % 2 else 0.08) * scale)
-
-
-def car_record(**wheel) -> dict:
-    parts = {"body": {"kind": "body", "meshes": [{"file": "car.obj"}]}}
-    for name, x, y in (("fl", -0.8, 1.4), ("fr", 0.8, 1.4), ("rl", -0.8, -1.4), ("rr", 0.8, -1.4)):
-        region = {"box": [[x - 0.2, y - 0.4, -0.1], [x + 0.2, y + 0.4, 0.7]], "whole": True}
-        parts[name] = {"kind": "wheel", "region": region}
-        if wheel:
-            parts[name] = {"kind": "wheel", "wheel": wheel, "hinge": [x, y, 0.33]}
-    return {"unit": "m", "up": "z", "front": "y", "parts": parts, "points": 400}
 
 
 @pytest.mark.parametrize("wheels", ["components", "made"])
@@ -327,238 +272,3 @@ def test_regions_take_whole_components_only_where_asked(tmp_path):
         taken = cloud.points[cloud.part == 1]
         assert bool((taken[:, 0] - taken[:, 0].max() < -0.4).any()) is tall  # the tall post is cut, not whole inside
         assert np.array_equal(cloud.axes[1], [0, 0, 1])
-
-
-# --- the order of parts, and parts that cannot be what they are called ---
-
-
-@pytest.mark.parametrize("names", [("front right", "body"), ("arm 1", "zebra"), ("back left wheel", "Aaa"), ("1", "0")])
-def test_the_order_and_the_names_of_parts_mean_nothing(names, quad):
-    """Settings reach a job with sorted keys, so a record must give the same cloud however its parts are sorted."""
-    first, body = names
-    record = quad_record()
-    given_parts = {first: record["parts"].pop("front right"), body: record["parts"].pop("body"), **record.pop("parts")}
-    if body != "body":
-        given_parts[body] = given_parts[body] | {"kind": "body"}
-    merged = merge(TABLE["DJI Mini 2"], {"source": "mesh", **record, "parts": given_parts}, "own")
-    found = [
-        make(json.loads(json.dumps(settings, sort_keys=keys)), quad, 1)
-        for settings, keys in ((merged, False), (merged, True), (merged | {"parts": given_parts}, False))
-    ]
-    assert found[0].kinds == ("body", "rotor", "rotor", "rotor", "rotor")
-    assert found[0].names == (body, *sorted(set(given_parts) - {body}))
-    for other in found[1:]:
-        assert other.names == found[0].names
-        np.testing.assert_array_equal(other.points, found[0].points)
-
-
-def test_a_child_may_sort_before_its_parent(bird):
-    folder, record = bird
-    renamed = {"right inner": "right wing", "right outer": "right outer wing"}
-    parts = {renamed.get(name, name): dict(part) for name, part in reversed(record["parts"].items())}
-    parts["right outer wing"]["parent"] = "right wing"
-    cloud = make(json.loads(json.dumps(merge(TABLE["Crow"], {"source": "mesh", **record, "parts": parts}, "own"),
-                                       sort_keys=True)), folder, 1)  # fmt: skip
-    assert cloud.names == ("body", "left inner", "left outer", "right wing", "right outer wing")
-    assert cloud.parents.tolist() == [-1, -1, 1, -1, 3]
-
-
-def test_parents_in_a_circle_two_bodies_and_none_are_refused(bird):
-    folder, record = bird
-    for change, words in (
-        ({"right inner": {"parent": "right outer"}}, "parent is 'right outer', which hangs on 'right inner' itself"),
-        ({"right inner": {"kind": "body"}}, "2 of kind body"),
-        ({"body": {"kind": "wing"}}, "0 of kind body"),
-    ):
-        parts = {name: part | change.get(name, {}) for name, part in record["parts"].items()}
-        with pytest.raises(InputError, match=words):
-            made("Crow", folder, **record | {"parts": parts})
-
-
-def test_regions_that_take_the_same_surface_are_refused_whatever_their_order(bird):
-    folder, record = bird
-    wide = {"box": [[0.03, None, -0.01], [None, None, 0.01]]}
-    for order in (1, -1):
-        parts = dict(list(record["parts"].items())[::order])
-        parts["right outer"] = parts["right outer"] | {"region": wide}
-        with pytest.raises(InputError, match="parts 'right inner' and 'right outer' take the same surface"):
-            made("Crow", folder, **record | {"parts": parts})
-
-
-def wheeled(tmp_path, axis=0, centre=0.33, count=4) -> dict:
-    """Write a car with separate wheels whose thin direction is `axis` and return its record."""
-    box((1.8, 4.5, 1.0), (0, 0, 0.9)).export(tmp_path / "car.obj")
-    turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0] if axis == 0 else [1, 0, 0])
-    shape = trimesh.creation.cylinder(radius=0.33, height=0.2, sections=64)
-    shape.apply_transform(turn)
-    shape.export(tmp_path / "wheel.obj")
-    record = car_record()
-    places = (("fl", -0.8, 1.4), ("fr", 0.8, 1.4), ("rl", -0.8, -1.4), ("rr", 0.8, -1.4))[:count]
-    body = record["parts"]["body"]
-    record["parts"] = {
-        name: {"kind": "wheel", "meshes": [{"file": "wheel.obj", "move": [x, y, centre]}]} for name, x, y in places
-    } | {"body": body}
-    return record
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"centre": 1.3}, "fl: its centre lies 0.9 m above the lowest point of a body 1 m high.*is `up` reversed"),
-        ({"axis": 1}, "fl: it measures 0.66 m along its axis and 0.2 x 0.66 m across"),
-    ],
-)
-def test_wheels_that_cannot_roll_are_refused_with_their_measures(changes, words, tmp_path):
-    made("Audi A6L 2019", tmp_path, **wheeled(tmp_path))
-    with pytest.raises(InputError, match=words):
-        made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, **changes))
-
-
-def test_a_wheel_axis_along_the_car_is_refused(tmp_path):
-    record = wheeled(tmp_path)
-    record["parts"]["rr"]["axis"] = [0, 1, 0]
-    with pytest.raises(InputError, match=r"rr: its axis is .*1.0, -?0.0. .right, front, up., expected right or left"):
-        made("Audi A6L 2019", tmp_path, **record)
-
-
-def test_a_car_on_two_wheels_is_made_with_a_warning_that_its_cloud_keeps(tmp_path):
-    with pytest.warns(InputWarning, match="2 wheels, expected at least 3"):
-        cloud = made("Audi A6L 2019", tmp_path, **wheeled(tmp_path, count=2))
-    assert cloud.record["warnings"] == ["Audi A6L 2019: 2 wheels, expected at least 3"]
-    assert "warnings" not in made("Audi A6L 2019", tmp_path, **wheeled(tmp_path)).record
-
-
-def test_a_hub_far_from_its_blades_and_a_rotor_of_a_millimetre_are_refused(quad):
-    record = quad_record()
-    record["parts"]["front left"]["hinge"] = [5.0, 0.1, 0.04]
-    with pytest.raises(InputError, match=r"front left: its hinge lies 4.9 m from the middle of its surface"):
-        made("DJI Mini 2", quad, **record)
-    box((0.012, 0.002, 0.001)).export(quad / "prop.stl")
-    with pytest.raises(InputError, match=r"rotor front left has a diameter of 0.0095 m at the final size"):
-        made("DJI Mini 2", quad, **quad_record())
-
-
-def test_wings_hinged_at_the_tip_or_on_one_side_only(bird):
-    folder, record = bird
-    parts = {name: dict(part) for name, part in record["parts"].items()}
-    parts["right inner"]["hinge"] = [0.2, 0, 0]
-    with pytest.raises(InputError, match=r"right inner: its hinge lies 0.2 m and its surface 0.05 m right"):
-        made("Crow", folder, **record | {"parts": parts})
-
-
-# --- bad ones ---
-
-
-def written(folder: Path, name: str, text: str | bytes) -> str:
-    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
-    return name
-
-
-TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-
-
-@pytest.mark.parametrize(
-    ("name", "text", "reason"),
-    [
-        ("empty.stl", b"", "no triangle|not a readable"),
-        ("empty.obj", "", "no triangle|not a readable"),
-        ("points.obj", "v 0 0 0\nv 1 0 0\n", "no triangle|not a readable"),
-        ("one.obj", TRIANGLE, "1 triangles with an area"),
-        ("nan.obj", TRIANGLE.replace("v 0 1 0", "v 0 nan 0") * 4, "NaN"),
-        ("inf.obj", TRIANGLE.replace("v 0 1 0", "v 0 inf 0") * 4, "NaN, infinite"),
-        ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n" * 5, "0 triangles with an area|no triangle"),
-        ("text.stl", "this is no mesh at all", "no triangle|not a readable"),
-        ("bytes.ply", bytes(range(256)) * 4, "no triangle|not a readable"),
-        ("bytes.glb", bytes(range(256)) * 4, "no triangle|not a readable"),
-        ("bytes.dae", bytes(range(256)) * 4, "no triangle|not a readable"),
-        ("mesh.fbx", b"Kaydara FBX", "format '.fbx', expected one of"),
-        ("gone.stl", None, "no file"),
-    ],
-)
-def test_bad_files_are_refused_by_name_and_reason(name, text, reason, tmp_path):
-    if text is not None:
-        written(tmp_path, name, text)
-    with pytest.raises(InputError, match=reason) as error:
-        made("DJI Mini 2", tmp_path, **plain(name))
-    assert name in str(error.value)
-
-
-def test_nan_in_binary_stl_is_refused(tmp_path):
-    shape = trimesh.creation.icosphere(2)
-    shape.vertices[7] = np.nan
-    (tmp_path / "nan.stl").write_bytes(shape.export(file_type="stl"))
-    with pytest.raises(InputError, match=r"nan.stl: a triangle has a NaN"):
-        read_mesh(tmp_path / "nan.stl", "m")
-
-
-def test_a_machine_without_pymeshlab_is_told_what_to_install(quad, monkeypatch):
-    monkeypatch.setitem(sys.modules, "pymeshlab", None)
-    with pytest.raises(InputError, match=r"mesh records need pymeshlab.*libgl1"):
-        read_mesh(quad / "body.stl", "m")
-
-
-@pytest.mark.parametrize(
-    ("path", "value", "names"),
-    [
-        (["unit"], "inch", "unit"), (["up"], "up", "up"), (["front"], "-z", "two different axes"),
-        (["size_is"], "tall", "size_is"),
-        (["colour"], "red", "colour"), (["scale"], 2, "scale"), (["moving_share"], 1, "moving_share"),
-        (["parts", "front right", "hinge"], [0, 0], "front right"),
-        (["parts", "front right", "kind"], "wheel", "expected rotor"),
-        (["parts", "front right", "axis"], [0, 0, 0], "axis is zero"),
-        (["parts", "front right", "parent"], "body", "parent"),
-        (["parts", "front right", "region"], {"box": [[0, 0, 0], [1, 1, 1]]}, "front right"),
-        (["parts", "body", "meshes", 0, "file"], "/etc/body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "file"], "../body.stl", "inside the folder"),
-        (["parts", "body", "meshes", 0, "geometry"], ["seat"], "geometry .'seat'. is not in it"),
-        (["parts", "body", "meshes", 0, "unit"], "furlong", "furlong"), (["points"], 4, "leave none for the body"),
-        (["unit"], "in", "part front left measures 0.00508 m in a mesh of 0.205 m.* is the unit"),
-        (["parts", "front right", "meshes", 0, "unit"], "in", "part front right measures .* is the unit"),
-        (["parts", "front right"], {"kind": "body"}, "front right"),
-    ],
-)  # fmt: skip
-def test_bad_records_are_refused_by_key_and_value(path, value, names, quad):
-    record = quad_record()
-    at = record
-    for key in path[:-1]:
-        at = at[key]
-    at[path[-1]] = value
-    with pytest.raises(InputError, match=names) as error:
-        made("DJI Mini 2", quad, **record)
-    assert "DJI Mini 2" in str(error.value) or "body.stl" in str(error.value)
-
-
-def test_regions_that_hold_nothing_or_everything_are_refused(quad):
-    for low, high, names in (
-        ([5, 5, 5], [6, 6, 6], "holds nothing"),
-        ([-5, -5, -5], [6, 6, 6], "leave nothing of body"),
-    ):
-        parts = {
-            "body": {"kind": "body", "meshes": [{"file": "body.stl"}]},
-            "r": {"kind": "rotor", "region": {"box": [low, high]}, "hinge": [0, 0, 0], "axis": [0, 0, 1]},
-        }
-        with pytest.raises(InputError, match=names):
-            made("DJI Mini 2", quad, **plain("", parts=parts))
-
-
-@pytest.mark.slow
-def test_two_million_triangles_take_bounded_memory(tmp_path):
-    side = 1000
-    x, y = np.meshgrid(np.linspace(-1, 1, side + 1), np.linspace(-1, 1, side + 1))
-    vertices = np.stack([x.ravel(), y.ravel(), 0.1 * np.sin(9 * x * y).ravel()], axis=1)
-    at = np.arange(side * (side + 1)).reshape(side, side + 1)[:, :-1].ravel()
-    faces = np.concatenate([np.stack([at, at + 1, at + side + 2], 1), np.stack([at, at + side + 2, at + side + 1], 1)])
-    trimesh.Trimesh(vertices, faces, process=False).export(tmp_path / "big.stl")
-    code = """
-import resource, sys
-from lowalt.targets.mesh import check_record, mesh_cloud
-extra = {"unit": "m", "up": "z", "front": "y", "size_is": "length",
-         "parts": {"body": {"kind": "body", "meshes": [{"file": "big.stl"}]}}}
-record = {"source": "mesh", "subtype": "Crow", "category": "Bird", "published": {"size_m": 2.0}, "points": 169,
-          "rcs_m2_per_point": 1.0, **extra}
-cloud = mesh_cloud(check_record(record, extra, "Crow"), sys.argv[1], 1)
-print(len(cloud.points), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss // 1024)
-"""
-    run = subprocess.run([sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=True)
-    points, peak_mib = map(int, run.stdout.split())
-    assert points == 169 and peak_mib < 1500
