@@ -188,7 +188,7 @@ NOTHING = {
     "power_amplifier": {"backoff_db": None}, "comb_pilots": {"spacing": 1}, "pointing_error": {"sigma_deg": 0},
     "transmit_leakage": {"isolation_db": None}, "cell_noise": {"snr_db": float("inf")},
     "detector": {"cfar": "none", "gate_cells": None},
-    "companions": {"count": [0, 0]},
+    "companions": {"count": [0, 0]}, "line_of_sight": {"blocked_db": 0}, "walls": {"facades": []},
 }  # fmt: skip
 """Every effect that has a strength, without any."""
 

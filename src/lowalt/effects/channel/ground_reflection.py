@@ -11,6 +11,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects.checks import CheckedScene, above_ground
+from lowalt.effects.fresnel import fresnel
 from lowalt.effects.response import ImagePath
 from lowalt.effects.view import View
 
@@ -33,9 +34,6 @@ MATERIALS = {
     "concrete": (5.24, 0.0, 0.0462, 0.7822, 1.0, 100.0),
 }
 """Each material's a, b, c and d, and the lowest and highest frequency (GHz) for which they hold."""
-
-VACUUM_F_M = 8.8541878128e-12
-"""Permittivity of the vacuum (F/m), CODATA 2018."""
 
 
 def idle(settings: dict) -> bool:
@@ -72,20 +70,6 @@ def ground(settings: dict, frequency_hz: float) -> tuple[float, float]:
     given, frequency = (settings["permittivity"], settings["conductivity_s_m"]), frequency_hz / 1e9
     found = (a * frequency**b, c * frequency**d)
     return tuple(one if value is None else value for value, one in zip(given, found, strict=True))
-
-
-def fresnel(
-    sine: np.ndarray, permittivity: float, conductivity_s_m: float, frequency_hz: float, polarisation: str
-) -> np.ndarray:
-    """Return the complex reflection coefficient at grazing angles of `sine` (any shape, 0 to 1).
-
-    Fields go as exp(+j 2 pi f t), so a wave's phase is exp(-j 2 pi f r / c) and the complex permittivity
-    eps - j sigma / (2 pi f eps0). Vertical polarisation counts the field's vertical component, and is -1 at grazing.
-    """
-    epsilon = permittivity - 1j * conductivity_s_m / (2 * np.pi * frequency_hz * VACUUM_F_M)
-    inside = np.sqrt(epsilon - 1.0 + sine * sine)
-    outside = sine * (epsilon if polarisation == "vertical" else 1.0)
-    return (outside - inside) / (outside + inside)
 
 
 def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndarray:
