@@ -51,6 +51,7 @@ def _freeze(arguments: list[str]) -> None:
 def _sources(line) -> None:
     line.add_argument("--views", nargs="+", help="caches of views (.npz)")
     line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
+    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
     line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
 
 
@@ -59,8 +60,12 @@ def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
     from lowalt.recognition.samples import ViewSamples
     from lowalt.recognition.views import ShardSamples
 
-    if (given.views is None) == (given.index is None):
-        raise InputError("expected either --views or --index")
+    if sum(source is not None for source in (given.views, given.index, given.dataset)) != 1:
+        raise InputError("expected one of --views, --index and --dataset")
+    if given.dataset is not None:
+        from lowalt.recognition.made import DatasetSamples, opened
+
+        return DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
     if given.views is None:
         return ShardSamples(given.index, scheme.columns, pairs, size, placed)
     found = ViewSamples(given.views, scheme.columns, pairs)

@@ -41,15 +41,21 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
     return build(written, render, folder / "shards" / "index.json", dataset.maker.echo, dataset.classes)
 
 
+def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
+    """Return the motion table of one chunk."""
+    group, (first, count) = chunk.partition("-")[0], dataset.plan.span(chunk)
+    places = [
+        Place(group, subtype, model, 0.0)
+        for model in range(first, first + count)
+        for subtype in dataset.plan.groups[group]
+    ]
+    return [dataset.row(place) for place in places]
+
+
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
     """Write the motion table and the shards of one chunk; return the shards' paths."""
-    plan, maker = dataset.plan, dataset.maker
+    plan, maker, rows = dataset.plan, dataset.maker, rows_of(dataset, chunk)
     group, _, part = chunk.partition("-")
-    first, count = plan.span(chunk)
-    places = [
-        Place(group, subtype, model, 0.0) for model in range(first, first + count) for subtype in plan.groups[group]
-    ]
-    rows = [dataset.row(place) for place in places]
     write_table(folder / "motion" / f"{chunk}.csv", rows)
     # A shard's samples are shuffled, so the echoes of all its motion models are kept meanwhile.
     maker.kept = len(rows)

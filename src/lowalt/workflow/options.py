@@ -47,5 +47,7 @@ def extra(wildcards: Any, input: Any) -> str:
 
 
 def samples(wildcards: Any, input: Any) -> str:
-    """The shrunk images, or the index of the shards."""
+    """The shrunk images, the index of the shards, or the configuration whose samples are made."""
+    if input.get("dataset"):
+        return f"--dataset {input.dataset}"
     return f"--views {input.views}" if input.get("views") else f"--index {input.index}"

@@ -110,8 +110,14 @@ class Products:
         return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": f"{base}/motion/{chunk}.csv"}
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """What training and evaluation read: images shrunk to the scheme's size, or the shards."""
+        """What training and evaluation read: images shrunk to the scheme's size, the shards, or what samples are made
+        from."""
         base = f"results/{self._run.data}"
+        if self._config["recognition"].get("input") == "dataset":
+            clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
+            surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
+            hidden = {"surfaces": surfaces} if "occlusion" in self._config["effects"] else {}
+            return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
         if not self._config["recognition"]["cache"]:
             return {"index": f"{base}/shards/index.json"}
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])

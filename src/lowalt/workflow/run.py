@@ -71,6 +71,7 @@ class Run:
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         _check_data(config)
+        _check_input(config)
         for name in block.get("extra", []):
             _check_extra(config, name, classes)
         return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
@@ -158,6 +159,13 @@ def _check_sizes(config: dict) -> None:
             raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
     if sizes and config["effects"]:
         raise InputError(f"motion.sizes_m: given beside effects {sorted(config['effects'])}, expected one or the other")
+
+
+def _check_input(config: dict) -> None:
+    """Refuse samples made on the spot beside a cache of the shards' images."""
+    block = config["recognition"]
+    if block.get("input") == "dataset" and block["cache"]:
+        raise InputError("recognition.input: 'dataset' beside recognition.cache true, expected cache: false")
 
 
 def _check_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:

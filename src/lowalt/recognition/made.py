@@ -1,0 +1,137 @@
+"""Samples for the network made on the spot (`lowalt.Dataset`): no shard is read, and none need be written.
+
+Order, facts and pixels are those of the shards of the same configuration, so a training sees the same batches.
+"""
+
+import hashlib
+import json
+import math
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition import samples
+from lowalt.recognition.samples import Facts
+from lowalt.recognition.schemes import SPECTRA
+from lowalt.recognition.views import geometry
+from lowalt.shards.build import rows_of
+from lowalt.shards.dataset import Dataset
+from lowalt.shards.record import record, sample_key
+from lowalt.shards.write import select
+from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.tiles.resample import resize
+
+CLEAN_BYTES = 2**30
+"""Most memory for clean echoes kept; where a training's motion models need more, only the last ones are kept."""
+
+
+def opened(config: str | Path) -> Dataset:
+    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand beside it.
+
+    Raises: InputError naming what is missing or wrong.
+    """
+    from lowalt.targets.occluders import read_all
+
+    folder = Path(config).parent
+    surfaces = sorted((folder / "occluders").glob("*.npz"))
+    return Dataset(load_yaml(config), folder / "clouds", occluders=read_all(surfaces) if surfaces else None)
+
+
+def _sha256(cloud: Cloud) -> str:
+    """SHA-256 of all arrays of a cloud, in the order of its fields."""
+    arrays = [
+        value for value in (getattr(cloud, field.name) for field in fields(cloud)) if isinstance(value, np.ndarray)
+    ]
+    return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
+
+
+class DatasetSamples:
+    """Samples made as they are asked for; the same calls, order and pixels as `ShardSamples`."""
+
+    def __init__(self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool) -> None:
+        """columns: views to keep; folds: (group, fold) pairs; size: pixels; placed: whether facts carry ranges and
+        aspects.
+
+        Every motion model's clean echoes are computed here, once, where they fit into CLEAN_BYTES: workers that are
+        forked inherit them, and only noise and images are left for the steps.
+        Raises: InputError where nothing is left, or a station is missing.
+        """
+        self.dataset, self.columns, self.size = dataset, list(columns), size
+        stations = dataset.maker.network.stations
+        if max(columns) >= len(SPECTRA) * len(stations):
+            known = [station.name for station in stations]
+            raise InputError(f"dataset: stations {known}, the scheme needs {max(columns) // len(SPECTRA) + 1} of them")
+        self.rows, self.chosen, parts = [], [], []
+        for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
+            group, fold, part = name.split("-")
+            if (group, fold) in folds:
+                parts.append(self._shard(f"{group}-{part}", fold, placed))
+        if not self.chosen:
+            raise InputError(f"dataset: no samples of {sorted(folds)}")
+        self.facts = samples.joined(parts)
+        self._prepare()
+
+    def _shard(self, chunk: str, fold: str, placed: bool) -> Facts:
+        """Note the samples of one shard in its order; return their facts."""
+        plan, network = self.dataset.plan, self.dataset.maker.network
+        rows, first = rows_of(self.dataset, chunk), len(self.rows)
+        chosen = select(rows, list(plan.snrs), plan.split, plan.seed, fold)
+        self.rows += rows
+        self.chosen += [(first + number, plan.snrs[level]) for number, level in chosen]
+        blank = [math.nan] * len(network.stations)
+        places = []
+        for number, level in chosen if placed else ():
+            entry = json.loads(record(rows[number], plan.snrs[level], fold, plan.seed, network))
+            places.append(geometry(entry, network))
+        places = places or [(blank, blank)] * len(chosen)
+        own = [rows[number] for number, _ in chosen]
+        snrs = [plan.snrs[level] for _, level in chosen]
+        return Facts(
+            key=np.array([sample_key(row["subtype"], row["model"], snr) for row, snr in zip(own, snrs, strict=True)]),
+            subtype=np.array([row["subtype"] for row in own]),
+            model=np.array([row["model"] for row in own], np.int64),
+            snr_db=np.array(snrs, float),
+            group=np.array([row["group"] for row in own]),
+            fold=np.array([fold] * len(own)),
+            label=np.array([CATEGORIES.index(row["category"]) for row in own], np.int64),
+            range_m=np.array([place[0] for place in places]).reshape(len(own), -1),
+            aspect_rad=np.array([place[1] for place in places]).reshape(len(own), -1),
+        )
+
+    def _prepare(self) -> None:
+        """Compute the clean echoes of all motion models where they can be kept."""
+        maker = self.dataset.maker
+        used = sorted({number for number, _ in self.chosen})
+        if 8 * len(maker.network.stations) * maker.network.symbols * len(used) <= CLEAN_BYTES:
+            maker.kept = max(maker.kept, len(used))
+            for number in used:
+                maker.received(self.rows[number])
+
+    def keep(self, numbers: np.ndarray) -> None:
+        """Drop all samples but those at `numbers`."""
+        self.chosen, self.facts = [self.chosen[number] for number in numbers], self.facts.take(numbers)
+
+    def views(self, numbers: np.ndarray) -> np.ndarray:
+        """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
+        maker, found = self.dataset.maker, []
+        for number in numbers:
+            place, snr_db = self.chosen[number]
+            images = maker.renderer.some(maker.signal(self.rows[place], snr_db), self.columns)
+            found.append(images if images.shape[-1] == self.size else resize(images, self.size))
+        return np.stack(found)
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all that a training sees of these samples; clouds, rows and settings stand for images.
+
+        The same samples from shards or a cache have another sum.
+        """
+        maker, subtypes = self.dataset.maker, sorted({self.rows[place]["subtype"] for place, _ in self.chosen})
+        clouds = {name: self.dataset.clouds[name] for name in subtypes}
+        sums = {name: _sha256(cloud) for name, cloud in clouds.items()}
+        rows = hashlib.sha256(json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode())
+        settings = {"size": self.size, "columns": self.columns, "render": maker.render, "echo": maker.echo}
+        told = json.dumps([settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True)
+        return samples.fingerprint(self.facts, told.encode())
