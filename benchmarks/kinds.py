@@ -2,11 +2,12 @@
 
     python benchmarks/kinds.py --out results/benchmarks/kinds.csv
 
-The same samples in all ways, in one run: image, signal and recipe shards, and `lowalt.Dataset`. The data set is small and made
-here: one chunk of ten motion models of eight subtypes at the six SNRs of the default. Times are processor times of one thread in random
-order, the least of three passes; reading includes the check of the sample's SHA-256. `new`: every sample of another motion
-model, so that its echoes are computed; otherwise the clean echoes are there, as from a training's second epoch on.
-Then networks are trained for some steps on made samples, with a worker beside the training: their waiting share is wall time.
+The same samples in all ways, in one run: image, signal and recipe shards, and `lowalt.Dataset`. The data set is small
+and made here: a chunk of ten motion models of eight subtypes at the six SNRs of the default. Times are processor times
+of one thread in random order, the least of three passes; reading includes the check of the sample's SHA-256. `new`:
+every sample of another motion model, so that its echoes are computed; otherwise the clean echoes are there, as in a
+training from its second epoch on. Then networks are trained for some steps on made samples, with a worker beside the
+training; their waiting share is wall time.
 """
 
 import argparse
