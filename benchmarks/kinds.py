@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
@@ -94,7 +95,7 @@ def waits(config: dict, folder: Path, steps: int) -> list[tuple]:
         block["network"] |= {"backbone": backbone}
         block["training"] |= {"steps": steps, "validate_every": 10**6, "batch": batch, "workers": 1}
         settings = {key: block[key] for key in ("network", "training", "augmentation")}
-        settings |= {"seed": 1, "size": size, "colour_map": config["images"]["colour_map"]}
+        settings |= {"seed": 1, "size": size, "colour_map": config["images"]["colour_map"], "classes": list(CATEGORIES)}
         sources = {
             part: DatasetSamples(Dataset(config), scheme.columns, folds("seen", part), size, placed=False)
             for part in ("train", "validation")

@@ -9,6 +9,7 @@ import pytest
 import torch
 import yaml
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
@@ -87,7 +88,7 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
     table = tmp_path / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
     settings = {key: block[key] for key in ("network", "training", "augmentation")}
-    settings |= {"seed": 1, "size": SIZE, "colour_map": "viridis"}
+    settings |= {"seed": 1, "size": SIZE, "colour_map": "viridis", "classes": list(CATEGORIES)}
     line = ["train", "--settings", json.dumps(settings), "--protocol", "seen", "--stations", "A", "B", "C",
             "--scheme", "AB:VRP+VT", "--schemes", str(table)]  # fmt: skip
     weights = []

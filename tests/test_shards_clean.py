@@ -130,7 +130,7 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
     echoes, powers = np.full((3, 1, 400), 1 + 1j, np.complex64), np.array([[1e-3], [2.0], [0.0]])
     write_shard(
         tmp_path / "unseen-train-00000.tar", rows, [3.0], {"by": "motion", "train": 1, "val": 1, "test": 1}, 3,
-        Network.from_settings(NETWORK), "train", "recipe", lambda *_: npy(echoes[:, 0]), powers,
+        Network.from_settings(NETWORK), "train", "recipe", lambda *_: npy(echoes[:, 0]), powers=powers,
     )  # fmt: skip
     with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
         name = next(name for name in archive.getnames() if name.endswith(".json"))

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.classes import label
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition import samples
@@ -21,7 +22,7 @@ from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.write import select
-from lowalt.targets.cloud import CATEGORIES, Cloud
+from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
@@ -84,7 +85,7 @@ class DatasetSamples:
         blank = [math.nan] * len(network.stations)
         places = []
         for number, level in chosen if placed else ():
-            entry = json.loads(record(rows[number], plan.snrs[level], fold, plan.seed, network))
+            entry = json.loads(record(rows[number], plan.snrs[level], fold, plan.seed, network, self.dataset.classes))
             places.append(geometry(entry, network))
         places = places or [(blank, blank)] * len(chosen)
         own = [rows[number] for number, _ in chosen]
@@ -96,7 +97,7 @@ class DatasetSamples:
             snr_db=np.array(snrs, float),
             group=np.array([row["group"] for row in own]),
             fold=np.array([fold] * len(own)),
-            label=np.array([CATEGORIES.index(row["category"]) for row in own], np.int64),
+            label=np.array([label(self.dataset.classes, row) for row in own], np.int64),
             range_m=np.array([place[0] for place in places]).reshape(len(own), -1),
             aspect_rad=np.array([place[1] for place in places]).reshape(len(own), -1),
         )
