@@ -107,7 +107,7 @@ def test_what_a_made_training_rests_on_is_in_its_identity(run, pair):
     other.clouds["Crow"].points[0, 0] += 1e-9
     changed = DatasetSamples(other, COLUMNS, folds, SIZE, placed=False).sha256()
     assert same[0] == same[1] != changed
-    with pytest.raises(InputError, match="the scheme needs 4"):
+    with pytest.raises(InputError, match="3 stations, the scheme needs"):
         DatasetSamples(other, [9], folds, SIZE, placed=False)
     with pytest.raises(InputError, match="no samples"):
         DatasetSamples(other, [0], set(), SIZE, placed=False)

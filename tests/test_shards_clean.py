@@ -143,6 +143,26 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
         clean.unpacked(entry, 8.0)
 
 
+def test_a_scene_with_a_canceller_gives_the_samples_of_its_signal_shards(tmp_path):
+    from lowalt.shards.build import write_run
+    from lowalt.shards.dataset import Dataset
+    from test_dataset import configuration
+
+    effects = {"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}, "canceller": {"kind": "mean"}}
+    config = configuration(effects=effects)
+    config["echo"] = {**config["echo"], "tolerance": 1e-3}
+    config["targets"] = {**config["targets"], "select": ["Owl"]}
+    config["motion"] = {**config["motion"], "models": 4}
+    scene = Dataset(config)
+    for kind in ("signal", "recipe"):
+        write_run(scene, tmp_path / kind, kind)
+    stored, packed = (ShardSet(tmp_path / kind / "shards" / "index.json") for kind in ("signal", "recipe"))
+    assert len(stored) == 8 and [stored.members(n) for n in range(8)] == [packed.members(n) for n in range(8)]
+    with pytest.raises(InputError, match="cell_noise"):
+        clean.refuse({"cell_noise": {}})
+    clean.refuse(effects)
+
+
 def test_damage_is_named_with_every_sample_that_it_reaches(published, tmp_path):
     import shutil
 

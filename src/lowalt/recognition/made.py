@@ -14,14 +14,16 @@ import numpy as np
 from lowalt.common.classes import label
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
+from lowalt.effects.set_noise import in_all_cells
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.schemes import SPECTRA
+from lowalt.recognition.schemes import columns_in
 from lowalt.recognition.views import geometry
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.write import select
+from lowalt.spectra.catalogue import named
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
@@ -58,13 +60,11 @@ class DatasetSamples:
 
         Every motion model's clean echoes are computed here, once, where they fit into CLEAN_BYTES: workers that are
         forked inherit them, and only noise and images are left for the steps.
-        Raises: InputError where nothing is left, or a station is missing.
+        Raises: InputError where nothing is left, or a station or spectrum is missing.
         """
-        self.dataset, self.columns, self.size = dataset, list(columns), size
-        stations = dataset.maker.network.stations
-        if max(columns) >= len(SPECTRA) * len(stations):
-            known = [station.name for station in stations]
-            raise InputError(f"dataset: stations {known}, the scheme needs {max(columns) // len(SPECTRA) + 1} of them")
+        self.dataset, self.size = dataset, size
+        stations = len(dataset.maker.network.stations)
+        self.columns = columns_in(columns, named(dataset.maker.render["spectra"]), stations, "dataset")
         self.rows, self.chosen, parts = [], [], []
         for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
             group, fold, part = name.split("-")
@@ -105,6 +105,9 @@ class DatasetSamples:
     def _prepare(self) -> None:
         """Compute the clean echoes of all motion models where they can be kept."""
         maker = self.dataset.maker
+        if in_all_cells(maker.echo["effects"]):
+            # Such a scene's echoes hold the noise of one SNR.
+            return
         used = sorted({number for number, _ in self.chosen})
         if 8 * len(maker.network.stations) * maker.network.symbols * len(used) <= CLEAN_BYTES:
             maker.kept = max(maker.kept, len(used))

@@ -20,7 +20,8 @@ from lowalt.shards.write import write_shard
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}, and companions, the effect's settings, in a scene with it.
+    Settings: seed, network, snr_db, split, shards {kind}; in a scene with these effects also companions, and for recipe
+    shards canceller: their settings.
     """
     options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     options.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -36,6 +37,7 @@ def write(arguments: list[str]) -> None:
     options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz beside it")
     given = options.parse_args(arguments)
     classes = _classes(given.settings)
+    canceller = given.settings.pop("canceller", None)
     beside = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
     (kind,) = pick(shards, "kind")
@@ -47,7 +49,7 @@ def write(arguments: list[str]) -> None:
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:
         content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
-    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, classes, powers)
+    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, classes, powers, canceller)
 
 
 def _classes(settings: dict) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from lowalt.common.config import merge
 from lowalt.common.files import slug
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import write_table
+from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
 from lowalt.shards.write import npy, write_shard
@@ -66,7 +67,10 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
         signal = maker.signal(rows[number], plan.snrs[level])
         return npy(signal) if kind == "signal" else maker.png(signal)
 
-    powers = None
+    powers, effects = None, maker.echo["effects"]
+    canceller = (effects["canceller"] or {}) if "canceller" in effects else None
+    if kind == "recipe":
+        refuse(effects)
     if kind == "recipe" and maker.echo["effects"]:
         powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
@@ -74,7 +78,7 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     for name in plan.folds(chunk):
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
         given = (rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
-        write_shard(paths[-1], *given, dataset.classes, powers)
+        write_shard(paths[-1], *given, dataset.classes, powers, canceller)
     return paths
 
 

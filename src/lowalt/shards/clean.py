@@ -2,9 +2,11 @@
 
 A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without noise, and the record of
 the same key has lists at `snr_db` and `noise`. In a scene with effects the record also names the powers that the SNRs
-refer to. From these follow record and signals of each sample, equal in every byte to those of a shard of signals.
+refer to, and the canceller that the noise passes. From these follow record and signals of each sample, equal in every
+byte to those of a shard of signals.
 """
 
+import functools
 import io
 import json
 import math
@@ -13,17 +15,34 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.noise.chunk import noisy_signals
 from lowalt.shards.record import NO_NOISE_DB, sample_key
 
 POWER = "power_w"
 """Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""
+CANCELLER = "canceller"
+"""Field of the record for the settings, as JSON text, of the canceller that the noise passes; absent without one."""
 
 
-def packed(record: bytes, key: str, snrs_db: Iterable[float], power_w: Iterable[float] | None = None) -> bytes:
+def refuse(effects: dict) -> None:
+    """Refuse a scene whose noise is not added to clean echoes of one range cell.
+
+    effects: the configuration's block. Raises: InputError naming the effect.
+    """
+    if in_all_cells(effects):
+        raise InputError(
+            "shards.kind: 'recipe' beside the effect 'cell_noise', whose echoes hold noise; expected signal or image"
+        )
+
+
+def packed(
+    record: bytes, key: str, snrs_db: Iterable[float], power_w: Iterable[float] | None, canceller: dict | None
+) -> bytes:
     """Return the record of a motion model, made from the record of one of its samples.
 
-    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w: see POWER.
+    key: the model's own; snrs_db: SNRs of its samples, +inf for no noise; power_w, canceller: see POWER and CANCELLER,
+    None where they are absent.
     """
     snrs = [float(snr) for snr in snrs_db]
     entry = json.loads(record)
@@ -31,6 +50,8 @@ def packed(record: bytes, key: str, snrs_db: Iterable[float], power_w: Iterable[
     entry["noise"] = [not math.isinf(snr) for snr in snrs]
     if power_w is not None:
         entry[POWER] = [float(power) for power in power_w]
+    if canceller is not None:
+        entry[CANCELLER] = json.dumps(canceller, sort_keys=True)
     return json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
 
 
@@ -51,7 +72,7 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
     """
     if snr_db not in snrs_of(entry):
         raise InputError(f"record of {entry['key']}: SNRs {snrs_of(entry)} dB, expected {snr_db} dB among them")
-    kept = {name: value for name, value in entry.items() if name != POWER}
+    kept = {name: value for name, value in entry.items() if name not in (POWER, CANCELLER)}
     kept |= {"key": sample_key(entry["subtype"], entry["model"], snr_db), "noise": not math.isinf(snr_db)}
     kept["snr_db"] = NO_NOISE_DB if math.isinf(snr_db) else snr_db
     return json.dumps(kept, separators=(",", ":"), allow_nan=False).encode()
@@ -60,7 +81,10 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
 def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:
     """Return the signals of one sample from a motion model's clean echoes, both (stations, symbols) complex64."""
     powers = np.array(entry[POWER])[:, None] if POWER in entry else None
-    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers)[0, 0]
+    behind = None
+    if CANCELLER in entry:
+        behind = functools.partial(behind_canceller, canceller=json.loads(entry[CANCELLER]))
+    return noisy_signals(clean[:, None], [entry], stations, [snr_db], entry["seed"], powers, behind)[0, 0]
 
 
 def complex_signals(stored: np.ndarray) -> np.ndarray:

@@ -42,14 +42,14 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
 def write_shard(
     path: str | Path, rows: list[dict], snrs: list[float], split: dict, seed: int, network: Network, wanted: str,
     kind: str, content: Callable[[int, int], bytes], classes: tuple[str, ...] = CATEGORIES,
-    powers: np.ndarray | None = None,
+    powers: np.ndarray | None = None, canceller: dict | None = None,
 ) -> dict:  # fmt: skip
     """Write `path` (.tar) and its table beside it; return the table's header.
 
     rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
     sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); classes: in
-    the order of their labels; powers (stations, rows) W: what SNRs refer to, where not to the echoes' own power (kind
-    "recipe").
+    the order of their labels; powers (stations, rows) W: what SNRs refer to, where not to the echoes' own power, and
+    canceller: settings of the one that noise passes (both kind "recipe").
     A recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
@@ -76,7 +76,7 @@ def write_shard(
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]
-                        text = packed(text, name, sorted(levels[number]), power_w)
+                        text = packed(text, name, sorted(levels[number]), power_w, canceller)
                     span = tar.add(name, text, EXTENSIONS[kind], content(number, level))
                     if kind == "recipe":
                         spans[number] = span

@@ -15,6 +15,7 @@ from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, named
+from lowalt.shards.clean import refuse
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named as spectra_named
 from lowalt.targets.records import load_records, load_table, missing_inputs
@@ -162,7 +163,9 @@ def _check_sizes(config: dict) -> None:
 
 
 def _check_input(config: dict) -> None:
-    """Refuse samples made on the spot beside a cache of the shards' images."""
+    """Refuse samples made on the spot beside a cache of the shards' images, and clean echoes of a scene without any."""
+    if config["shards"]["kind"] == "recipe":
+        refuse(config["effects"])
     block = config["recognition"]
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError("recognition.input: 'dataset' beside recognition.cache true, expected cache: false")

@@ -82,6 +82,8 @@ class Settings:
         """The fold of each sample, its name and its form, and whom its record names beside it."""
         snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
         beside = {"companions": effects["companions"] or {}} if "companions" in effects else {}
+        if self._config["shards"]["kind"] == "recipe" and "canceller" in effects:
+            beside["canceller"] = effects["canceller"] or {}
         blocks = self._blocks("seed", "network", "split", "shards")
         return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **beside)
 
