@@ -1,5 +1,7 @@
 """Looks for the tests of receiver and detection effects: a network, a frame, and echoes of one point."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
@@ -33,3 +35,8 @@ def received(module, given: dict, look: waveform.Frame, responses: np.ndarray, s
     samples = waveform.transmit(responses, look.sent)
     samples = module.receive({**module.DEFAULTS, **given}, samples, look, np.random.default_rng(seed))
     return waveform.demodulate(samples, look.sent)
+
+
+def checked(radar: Network, **effects: dict) -> SimpleNamespace:
+    """The scene that `check` looks at."""
+    return SimpleNamespace(network=radar, effects=effects)
