@@ -207,7 +207,7 @@ def test_land_has_the_closed_power_of_its_rings():
     station = network.station("A")
     found = clutter.cell_power(settings_of(reach_m=1000.0), network, station, np.array([200.0, 100.0, 60.0]))
     cell, height = network.cell_m, 25.0
-    edges = np.clip((np.arange(len(found))[:, None] + [-0.5, 0.5]) * cell, height, 1000.0)
+    edges = np.clip((np.arange(len(found))[:, None] + [-0.25, 0.75]) * cell, height, 1000.0)
     # sigma0 r dr dphi / r^4 with sigma0 = gamma h / r, all around.
     rings = 2 * np.pi * 0.03 * height / 3 * (edges[:, 0] ** -3 - edges[:, 1] ** -3)
     np.testing.assert_allclose(found, radar(network, station).scale ** 2 * rings, rtol=1e-6, atol=1e-30)
@@ -224,7 +224,7 @@ def test_land_under_both_beams_matches_a_sum_over_patches():
     normal = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
     side = np.array([-normal[1], normal[0], 0.0])
     for cell in (7, 30, 77):
-        r = (cell - 0.5 + radius[:, None]) * NETWORK.cell_m
+        r = (cell - 0.25 + radius[:, None]) * NETWORK.cell_m
         flat = np.sqrt(r**2 - place[2] ** 2)
         away = np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), -place[2] + 0 * flat * azimuth], -1)
         to_aim = (aim - place) / np.linalg.norm(aim - place)
@@ -288,9 +288,10 @@ def test_windblown_land_has_billingsleys_spectrum_and_ratio():
 def test_land_fills_the_range_cells_and_only_those_in_reach():
     view = seen(body([[0, 0, 0]]), x_m=200.0, y_m=100.0, z_m=60.0)
     settings = settings_of(law="rayleigh", wind_mps=0.0, reach_m=600.0)
+    centred = np.exp(0.5j * np.pi * np.arange(NETWORK.subcarriers) / NETWORK.subcarriers)
     total = 0.0
     for seed in range(60):
-        cells = np.fft.ifft(clutter.scatter(settings, view, np.random.default_rng(seed)), axis=1)
+        cells = np.fft.ifft(clutter.scatter(settings, view, np.random.default_rng(seed)) * centred, axis=1)
         assert abs(cells - cells[0]).max() < 1e-12 * abs(cells).max()
         total = total + abs(cells[0]) ** 2 / 60
     power = clutter.cell_power(settings, NETWORK, view.station, view.aim_m)

@@ -120,7 +120,7 @@ class Chain:
                 samples += other.own_samples[rows]
             if self._clutter is not None:
                 cut = self.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
-                samples = samples + self.sending.still(self._clutter, cut)[rows]
+                samples = samples + self.sending.still(self._clutter, cut, self._offset_cells)[rows]
         else:
             spectrum = self._echo(view, on, factor)
             for other in self.others:
@@ -237,6 +237,12 @@ class Chain:
     def _paths(self) -> list[ImagePath]:
         """All paths except the direct one, over the whole look."""
         return self._paths_of(self.view)
+
+    @property
+    def _offset_cells(self) -> float:
+        """How far the echoes of everything but the target stand beyond the centres of their range cells."""
+        offsets = [getattr(effect.module, "OFFSET_CELLS", 0.0) for effect in providing(self.channel, AddsEchoes)]
+        return offsets[0] if offsets else 0.0
 
     @cached_property
     def _clutter(self) -> np.ndarray | None:

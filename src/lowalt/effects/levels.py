@@ -12,6 +12,7 @@ import numpy as np
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import antenna
 from lowalt.effects.catalogue import NamedEffect
+from lowalt.effects.channel import patches
 from lowalt.effects.view import View
 
 
@@ -82,7 +83,8 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
 def _clutter(view: View, effect: NamedEffect, range_m: float) -> list[Level]:
     """Mean levels of the land: all of it, and in the target's range cell."""
     power = effect.module.mean_power(effect.settings, view)
-    own = power[min(round(range_m / view.network.cell_m), len(power) - 1)]
+    count = view.network.subcarriers
+    own = patches.with_side_lobes(power, count)[round(range_m / view.network.cell_m) % count]
     return [
         Level("land, all range cells", dbm(float(power.sum())), "dBm"),
         Level("land, the target's range cell", dbm(float(own)), "dBm"),

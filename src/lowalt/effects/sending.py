@@ -58,11 +58,15 @@ class Sending:
             return waveform.demodulate(samples, self.known[rows])
         return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) / self.known[rows]
 
-    def still(self, spectrum: np.ndarray, prefix: NamedEffect | None) -> np.ndarray:
-        """Return time samples (N, M) of responses (N, M); beyond a `prefix` cells begin with the previous symbol."""
+    def still(self, spectrum: np.ndarray, prefix: NamedEffect | None, offset_cells: float = 0.0) -> np.ndarray:
+        """Return time samples (N, M) of responses (N, M); beyond a `prefix` cells begin with the previous symbol.
+
+        offset_cells: how far the echoes stand beyond their cells' centres; the symbols are then so much later.
+        """
         if prefix is None:
             return waveform.transmit(spectrum, self.aired)
-        whole = np.ones_like(self.aired)
+        later = np.exp(-2j * np.pi * offset_cells * np.arange(spectrum.shape[1]) / spectrum.shape[1])
+        whole, spectrum = np.broadcast_to(later, self.aired.shape), spectrum * later.conj()
         symbols = waveform.transmit(whole, self.aired), waveform.transmit(whole, self.aired_before)
         # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
         cells = np.fft.ifft(np.fft.ifftshift(spectrum, axes=1), axis=1)

@@ -1,8 +1,8 @@
 """Echoes of the ground: a patch of land in every range cell, still as a whole and stirred by the wind.
 
 A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle). Its amplitude
-is compound Gaussian: a texture drawn once, times speckle whose still part stays and whose moving part has
-Billingsley's exponential Doppler spectrum. Each cell's patch stands at the cell's centre, which holds it whole.
+is compound Gaussian: a texture drawn once, like that of its neighbours, times speckle whose still part stays and whose
+moving part has Billingsley's exponential Doppler spectrum. Each patch has range side lobes (`patches`).
 """
 
 from functools import lru_cache
@@ -16,18 +16,23 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.effects.antenna import Element, gain, local_gain
+from lowalt.effects.channel import patches
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
     "laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable densities under change of scale, Ann. Prob. 3, "
-    "1975; windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6"
+    "1975; texture from cell to cell: Tough & Ward, J. Phys. D 32, 1999, its correlation length: estimate; "
+    "windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6"
 )
 DEFAULTS = {
     "gamma": 0.03, "clutter_to_signal_db": None, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5,
+    "correlation_m": 20.0,
 }  # fmt: skip
 
+OFFSET_CELLS = patches.OFFSET
+"""How far all of this effect's echoes stand beyond the centres of their range cells."""
 MPH = 0.44704
 """Metres per second in a statute mile per hour, the unit of Billingsley's formulas."""
 TAIL = 1e-3
@@ -51,7 +56,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def cell_power(
     settings: dict, network: Network, station: Station, aim_m: np.ndarray, element: Element | None = None
 ) -> np.ndarray:
-    """Return the mean power (cells,) (W) of the land in every slant-range cell out to `reach_m`, beyond M too.
+    """Return the mean power (cells,) (W) of the land in the ring of every slant-range cell to `reach_m`, beyond M too.
 
     element: the antenna elements' pattern, None for isotropic ones. The integral of G_T G_R sigma0 / r^4 over the
     cell's ring: Gauss-Legendre over its range, and over azimuth the trapezoidal rule, exact for the arrays'
@@ -77,9 +82,9 @@ def _rings(
     Along its line the arrays' pattern is a trigonometric polynomial, sum over k of c_k exp(j pi k kappa (Psi - Psi0)):
     across holds its terms without Psi0, integrated over azimuth; negative k are the others' conjugates.
     """
-    cells = int(reach_m * cells_per_m + 0.5)
+    cells = int(np.ceil(reach_m * cells_per_m + 0.5 - patches.OFFSET))
     node, weight = np.polynomial.legendre.leggauss(6)
-    edge = (np.arange(cells)[:, None] + [-0.5, 0.5]) / cells_per_m
+    edge = (np.arange(cells)[:, None] + [-0.5, 0.5] + patches.OFFSET) / cells_per_m
     low, high = np.clip(edge, height, reach_m).T
     r = 0.5 * (high + low)[:, None] + 0.5 * (high - low)[:, None] * node
     # The pattern is even in azimuth about the array's line, so half a circle holds all of it.
@@ -204,7 +209,8 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     network, station = view.network, view.station
     power = mean_power(settings, view)
     frequency = radar(network, station).centre_hz
-    uniform = 1.0 - rng.random((2, len(power)))
+    correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
+    uniform = patches.alike(1.0 - rng.random((2, len(power))), correlation)
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
     still, beta = windblown(settings["wind_mps"], frequency)
     waves = speckle(
@@ -215,7 +221,9 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     for first in range(0, len(power), network.subcarriers):
         some = slice(first, min(first + network.subcarriers, len(power)))
         cells[:, : some.stop - first] += lit[some] * waves[some].T
-    return np.fft.fft(cells, axis=1, out=cells)
+    np.fft.fft(cells, axis=1, out=cells)
+    cells *= patches.ramp(network.subcarriers)
+    return cells
 
 
 def target_power(view: View) -> float:
