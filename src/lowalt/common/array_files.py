@@ -13,7 +13,7 @@ UNREADABLE = (
     OSError, ValueError, KeyError, TypeError, EOFError, NotImplementedError, MemoryError, OverflowError, RuntimeError,
     SyntaxError, struct.error, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
 )  # fmt: skip
-"""What numpy and zipfile raise on a file that is no array file, or is damaged."""
+"""Errors that numpy and zipfile raise on a file that is damaged or no array file."""
 
 FREE_BYTES = 64 << 20
 """Up to this size a member of an archive may expand as it likes."""

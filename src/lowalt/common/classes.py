@@ -20,7 +20,7 @@ CATEGORIES = ("UAV", "Bird", "Vehicle", "Pedestrian")
 """The published classes in their label order, and what a target can be like."""
 
 AIRBORNE = ("UAV", "Bird")
-"""What flies; the other two stay on the ground."""
+"""Categories that fly; the other two stay on the ground."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9 _-]{0,39}")
 _PLURALS = {"UAV": "UAVs", "Bird": "birds", "Vehicle": "vehicles", "Pedestrian": "pedestrians"}

@@ -32,7 +32,7 @@ class Poses(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """What is added to a target's own motion at N symbols; every field may be None.
+    """Changes that are added to a target's own motion at N symbols; every field may be None.
 
     angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole target's place,
     global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.

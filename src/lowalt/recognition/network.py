@@ -127,7 +127,7 @@ class Recogniser(nn.Module):
         super().__init__()
         pick(block, *KEYS)
         self.backbone = backbone(scheme.backbone or block["backbone"], block["weights"], size)
-        # What comes out where the classifier was, which some networks widen once more after their last features.
+        # Features at the place of the classifier: some networks widen their last features once more.
         width = getattr(self.backbone, "head_hidden_size", self.backbone.num_features)
         if scheme.fusion == "attention" and width % block["heads"]:
             raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")

@@ -1,7 +1,7 @@
 """From settings to files: build a network and train it, read it back, evaluate it, predict with it.
 
 `model.pt` carries everything a model needs to be used again: scheme, protocol, network settings, image size and
-palettes beside the weights.
+palettes and the weights.
 """
 
 import json
@@ -48,7 +48,7 @@ def train(
     augment.check(settings["augmentation"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
     machine = Machine.here(block["precision"])
-    # What decides no weight is left out; the arithmetic stands as this machine does it.
+    # Settings that change no weight are left out; `precision` is the one that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
         scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
@@ -131,7 +131,7 @@ def check_size(samples: Samples, size: int) -> None:
 def evaluate(
     trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "", more: dict | None = None
 ) -> None:
-    """Write the predictions for all samples of a source, and beside them the run's record (.json).
+    """Write the predictions for all samples of a source, and the run's record (.json) in the same folder.
 
     settings: {batch, threads, precision, mirror}; trained_on: the run that trained the model, where it is another;
     more: what else the record is to say.

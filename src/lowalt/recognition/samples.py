@@ -26,7 +26,7 @@ from lowalt.spectra.catalogue import LISTED
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of each sample, one entry a sample; range_m and aspect_rad have a column a station."""
+    """Known facts of each sample, one entry a sample; range_m and aspect_rad have a column a station."""
 
     key: np.ndarray
     subtype: np.ndarray

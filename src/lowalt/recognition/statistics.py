@@ -17,7 +17,7 @@ third then."""
 
 
 class AlarmPart(NamedTuple):
-    """What false alarms are counted from, each (samples,): probability of the class looked for, label, motion model,
+    """Data false alarms are counted from, each (samples,): probability of the class looked for, label, motion model,
     subtype."""
 
     scores: np.ndarray

@@ -53,7 +53,7 @@ from lowalt.recognition.statistics import (
 DETECTIONS = (0.9, 0.95, 0.99)
 TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
             "samples_per_s", "precision", "ranks")  # fmt: skip
-"""What seeds.csv repeats from a training's record."""
+"""Columns that seeds.csv repeats from a training's record."""
 
 
 class Run:

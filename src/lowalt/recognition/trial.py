@@ -11,7 +11,7 @@ from lowalt.recognition.samples import Facts, ViewSamples, joined_views
 from lowalt.recognition.schemes import TABLE, Scheme, named
 
 BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
-"""What a candidate may change of the block `recognition`."""
+"""Keys of the block `recognition` that a candidate may change."""
 
 
 def part_of(samples: ViewSamples, numbers: np.ndarray) -> ViewSamples:

@@ -1,4 +1,4 @@
-"""What makes a recording unusable, found before anything is computed from it, each by its name.
+"""Faults that make a recording unusable; each has a name and is found before anything is computed.
 
 Swapped channels cannot be told in general: I and Q exchanged is the conjugate signal, which is as good a recording of a
 target that moves the other way, and a hovering or reciprocating target has both signs. Two cases can be told and are:

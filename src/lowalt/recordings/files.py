@@ -25,7 +25,7 @@ class Baseband(NamedTuple):
 
 
 class _Table(NamedTuple):
-    """What a file holds: values (samples, columns), names of the columns, the rate it states (Hz) or None."""
+    """Content of a file: values (samples, columns), names of the columns, the rate it states (Hz) or None."""
 
     values: np.ndarray
     names: tuple[str, ...]

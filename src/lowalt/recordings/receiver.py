@@ -1,4 +1,4 @@
-"""What a cheap continuous-wave receiver adds to the echo, each a setting: wander, static leak, noise, flicker, hum.
+"""Errors that a cheap continuous-wave receiver adds, a setting each: wander, static leak, noise, flicker, hum.
 
 Everything is relative to the echo's own mean power over the stretch, so that a setting means the same near and far.
 Nothing else of the twin knows of it.

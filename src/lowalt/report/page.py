@@ -33,7 +33,7 @@ SECTIONS = (
 """The sections in the order of the page.
 
 Each module has `values(run)`. It returns the values that its template shows, or None where the run has no such section.
-The template stands beside the module, under the same name.
+The template has the name of its module and lies in the same folder.
 """
 TEMPLATES = Path(__file__).parent
 

@@ -81,7 +81,7 @@ def _clouds_option(options: argparse.ArgumentParser) -> None:
 
 
 def _remaker(given: argparse.Namespace):
-    """What makes the samples of the index again."""
+    """Return the object that makes the samples of the index again."""
     # Imports wait: packing shards must not pay for the echo engine.
     from lowalt.shards.read import ShardSet
     from lowalt.shards.remake import CloudFolder, Remaker

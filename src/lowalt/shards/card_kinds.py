@@ -1,4 +1,4 @@
-"""What the data card says of each kind of shards."""
+"""Sentences of the data card about each kind of shards."""
 
 MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
 """Extension of the member beside the record."""

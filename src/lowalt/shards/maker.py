@@ -46,7 +46,7 @@ class Maker:
 
     @functools.cached_property
     def renderer(self) -> Renderer:
-        """What turns signals into tiles."""
+        """The renderer that turns signals into tiles."""
         return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
 
     def received(self, row: dict, snr_db: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:

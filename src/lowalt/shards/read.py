@@ -101,7 +101,7 @@ class ShardSet:
 
     @functools.cached_property
     def renderer(self) -> Renderer:
-        """What turns the signals of these shards into tiles, as the index says."""
+        """The renderer that turns the signals of these shards into tiles, with the settings of the index."""
         return Renderer.from_settings({key: self.index["render"][key] for key in ("network", "spectra", "images")})
 
     @property

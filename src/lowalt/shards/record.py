@@ -1,4 +1,4 @@
-"""What a sample says about itself: its key, its place in the shuffled order, its JSON record.
+"""The record of a sample: its key, its place in the shuffled order, its JSON record.
 
 Every field has one type in all records, and no value is missing, so that tables with typed columns (Arrow) hold them.
 """

@@ -1,4 +1,4 @@
-"""SHA256SUMS beside the index: one line for every other file of a data set, in the form of `sha256sum`.
+"""SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form of `sha256sum`.
 
 Each checksum stands in a file that is written later: a sample's in its shard's table, the tables' and shards' in the
 index, the index's and the data card's here. SHA256SUMS itself needs none: its text follows from the files it names,

@@ -43,7 +43,7 @@ SHA256 = {
 differ in their line ends."""
 
 PINNED_BYTES = {"07/07_12.amc": 187_672}
-"""Of these files only so many bytes are pinned: the known copy of 07_12.amc ends within its last frame, frame 245."""
+"""Number of bytes that are pinned of a file: the known copy of 07_12.amc ends within its last frame, frame 245."""
 
 
 def checksum(name: str, path: Path) -> str:

@@ -125,7 +125,7 @@ def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height
 
 
 KEYS = ("gait", "speed_mps", "stature_m", "rate_hz", "person")
-"""Keys of a gait record, beside those every record has; `person` says in words who walks."""
+"""Keys that a gait record has in addition to those of every record; `person` says in words who walks."""
 
 _RANGES = {"speed_mps": (0.05, 6.0), "stature_m": (0.5, 2.6), "rate_hz": (20, 10_000)}
 

@@ -49,7 +49,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What a look at a file found; lengths in metres along the file's axes.
+    """Result of an inspection of a file; lengths in metres along the file's axes.
 
     `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
     `pieces` the names with triangles and extents (3,), `components` from the largest down.
@@ -95,7 +95,7 @@ def _alike(one: Component, other: Component) -> bool:
 
 
 def _may_be(component: Component, up: int, whole: np.ndarray, category: str) -> str:
-    """What one component may be by its own shape and size."""
+    """Return the kind of part that one component may be, by its shape and size."""
     extent = component.extent
     if category == "UAV":
         across = np.delete(extent, up).max()

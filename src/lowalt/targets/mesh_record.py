@@ -1,4 +1,4 @@
-"""What a mesh record may say, checked before any file is opened.
+"""The keys and values of a mesh record, checked before any file is opened.
 
 All places are in metres along the axes of the mesh file (after `unit`, before scaling). The order of keys and parts
 means nothing. Keys:
@@ -143,7 +143,7 @@ def _ancestors(name: str, parts: dict[str, dict]) -> list[str]:
 
 
 def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) -> str | None:
-    """What is wrong with one part beyond its form, or None."""
+    """Return the fault of a part whose form is right, or None."""
     kind = part["kind"]
     if kind == "body":
         return None if "meshes" in part and len(part) == 2 else "a body has a kind and meshes, nothing else"

@@ -59,7 +59,7 @@ def pieces(path: Path, groups: bool = False) -> list[Piece]:
             place = np.round(place, 12)
             mesh = scene.geometry[name]
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
-                # What is not finite is refused later, by name.
+                # Values that are not finite are refused later, by name.
                 with np.errstate(invalid="ignore"):
                     vertices = portable.applied(place[:3, :3], mesh.vertices) + place[:3, 3]
                 faces = np.asarray(mesh.faces)

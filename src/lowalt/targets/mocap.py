@@ -191,7 +191,7 @@ def front(motion: Motion, direction: np.ndarray) -> Motion:
 
 KEYS = ("skeleton", "motion", "first_frame", "last_frame", "rate_hz", "scale", "max_acceleration_mps2",
         "max_mismatch_m", "licence", "attribution", "where", "note")  # fmt: skip
-"""Keys of a recording's record, beside those every record has; `where` says where a user gets the files."""
+"""Keys that a recording's record has in addition to those of every record; `where` says where a user gets the files."""
 
 
 def check_record(merged: dict, extra: dict, where: str) -> dict:

@@ -12,7 +12,7 @@ from lowalt.targets.surfaces import box, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
 SIZES = ("motor diagonal", "span over ducts", "span over rotors")
-"""What the published size may stand for: largest distance between motor axes, or that over the ducts or blade tips."""
+"""Meanings of the published size: largest distance between motor axes, or that over the ducts or blade tips."""
 
 _COMMON = {
     "propeller_diameter": "length", "blade_count": "count", "blade_chord": "length",

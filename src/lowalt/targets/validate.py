@@ -11,7 +11,7 @@ from lowalt.targets.cloud import Cloud, read
 
 
 def summary(cloud: Cloud) -> str:
-    """Return one line on a cloud: subtype, source, points beside the published count, extent, parts, normals."""
+    """Return one line on a cloud: subtype, source, points and the published count, extent, parts, normals."""
     kinds = [f"{len(cloud.parts_of(kind))} {kind}" for kind in dict.fromkeys(cloud.kinds)]
     extent = " x ".join(f"{value:.3f}" for value in np.ptp(cloud.points, axis=0))
     normals = np.isfinite(cloud.normals).all(1).mean()

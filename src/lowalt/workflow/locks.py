@@ -1,4 +1,4 @@
-"""Locks that outlive no run: Snakemake's own lock, with a record of its owner beside it.
+"""Locks that end with their run: Snakemake's own lock, and a record of its owner in the same folder.
 
 Snakemake locks a working directory by files that stay when it is killed. Here each pair of lock files has a third with
 the owner (`owner.py`), so the next run takes the files of a dead owner away and refuses with the name of a living one.

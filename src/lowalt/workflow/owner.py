@@ -1,6 +1,6 @@
 """Who holds a run's lock: a process named so that it is recognised, or known to be dead, after any crash.
 
-A process id alone is used again by the system, so its start time stands beside it; the boot id tells whether the
+The system reuses process ids, so the record also holds the start time of the process; the boot id tells whether the
 machine has started anew since; host and process-id namespace tell whether the id can be looked up here at all.
 """
 

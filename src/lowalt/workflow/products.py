@@ -14,7 +14,7 @@ from lowalt.workflow.run import Run
 from lowalt.workflow.sources import near
 
 FIDELITY = "results/fidelity-exact/transfer.csv"
-"""What training on echoes at a tolerance costs: a product of other runs, named in the error where it is missing."""
+"""Loss of accuracy by training on echoes at a tolerance; other runs make it, and an error names it where missing."""
 
 TABLES = (
     "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
@@ -94,7 +94,7 @@ class Products:
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """What shards are packed from: noisy signals, for images their tiles too, or clean echoes; no more is made."""
+        """Files that shards are packed from: noisy signals, for images their tiles too, or clean echoes."""
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
         kind = self._config["shards"]["kind"]
         if kind == "recipe":
@@ -110,7 +110,7 @@ class Products:
         return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": f"{base}/motion/{chunk}.csv"}
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """What training and evaluation read: images shrunk to the scheme's size, the shards, or what samples are made
+        """Files of training and evaluation: images shrunk to the scheme's size, the shards, or what samples are made
         from."""
         base = f"results/{self._run.data}"
         if self._config["recognition"].get("input") == "dataset":
@@ -124,7 +124,7 @@ class Products:
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """What one training reads: `samples`, and those of other runs that are trained on too."""
+        """Files that one training reads: `samples`, and those of other runs that are trained on too."""
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         names = self._config["recognition"].get("extra", [])
         extra = [path for name in names for path in self._extra(name, size)]

@@ -40,7 +40,7 @@ class Settings:
         return self._text("cloud", wildcards.subtype, seed=self._config["seed"], record=record)
 
     def motion(self, wildcards: Any) -> str:
-        """What motion models are drawn from: region, masts, and the published ranges of a group's subtypes."""
+        """Data that motion models are drawn from: region, masts, and the published ranges of a group's subtypes."""
         block, stations = self._config["motion"], self._config["network"]["stations"]
         return self._text(
             "motion", wildcards.group,
@@ -88,11 +88,11 @@ class Settings:
         return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **beside)
 
     def cost_table(self, wildcards: Any) -> str:
-        """What the echo is timed with."""
+        """Settings with which the echo is timed."""
         return self._text("cost_table", **self._blocks("network", "motion", "seed", "cost"))
 
     def cost_pixels(self, wildcards: Any) -> str:
-        """What the echo is timed with, and the images whose pixels are compared."""
+        """Settings with which the echo is timed, and the images whose pixels are compared."""
         return self._text("cost_pixels", **self._blocks("network", "motion", "spectra", "images", "seed", "cost"))
 
     def views(self, wildcards: Any) -> str:

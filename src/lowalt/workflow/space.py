@@ -18,7 +18,7 @@ COLUMNS = ("rule", "runs", "disk_base_bytes", "disk_unit_bytes", "memory_base_mi
 
 @dataclass(frozen=True)
 class Figures:
-    """What one job of a rule needs: outputs (bytes) and peak memory (bytes) as lines in its units."""
+    """Needs of one job of a rule: outputs (bytes) and peak memory (bytes) as lines in its units."""
 
     disk_base: float
     disk_unit: float
@@ -47,7 +47,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Need:
-    """What a run needs: bytes it adds to the disk, bytes its largest job and its largest concurrent jobs hold."""
+    """Needs of a run: bytes it adds to the disk, bytes its largest job and its largest concurrent jobs hold."""
 
     disk: float
     largest_job: float

@@ -91,7 +91,7 @@ class Trial:
         return checksums(self.folder / "results" / self.name())
 
     def remarks(self) -> str:
-        """What of a disturbed run's output must not be there, or "clear"."""
+        """Return the part of a disturbed run's output that must not be there, or "clear"."""
         return "; ".join(text for text in LOUD if text in self.said) or "clear"
 
 
