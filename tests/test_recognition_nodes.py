@@ -4,10 +4,12 @@ import json
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
 
 from lowalt.recognition import schemes
+from lowalt.workflow.run import Run
 from test_recognition_training import views, with_training
 
 pytestmark = pytest.mark.slow
@@ -28,6 +30,24 @@ def launched(arguments, nodes, processes):
     for launcher in launchers:
         said = launcher.communicate(timeout=300)[0]
         assert launcher.returncode == 0, said[-3000:]
+
+
+def test_the_workflow_s_launcher_trains_to_the_bytes_of_plain_torchrun(views, tmp_path):
+    """The words that the rule `train` puts between `python -m` and the module (`recognition.processes: 2`)."""
+    settings = json.dumps(with_training(steps=4, validate_every=2))
+    line = ["train", "--settings", settings, "--views", str(views), "--protocol", "seen", "--scheme", "A:VRP"]
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
+    line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out"]
+    launched([*line, str(tmp_path / "plain")], 1, 2)
+    config = SimpleNamespace(config={"recognition": {"processes": 2}})
+    words = Run.launcher.fget(SimpleNamespace(processes=Run.processes.fget(config))).split()
+    command = [sys.executable, "-m", *words, "lowalt.recognition", *line, str(tmp_path / "rule")]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)
+    assert run.returncode == 0, run.stderr[-3000:]
+    assert json.loads((tmp_path / "rule/run.json").read_text())["ranks"] == 2
+    assert (tmp_path / "rule/model.pt").read_bytes() == (tmp_path / "plain/model.pt").read_bytes()
 
 
 def test_two_nodes_of_one_process_train_to_the_bytes_of_one_node_of_two(views, tmp_path):

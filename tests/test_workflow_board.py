@@ -43,6 +43,16 @@ def test_progress_of_a_running_job_counts_as_its_part():
     assert "left" not in board_of(done=0).line("echo", 115.0, lambda log: None)
 
 
+def test_no_time_left_is_named_before_a_tenth_of_a_job_is_done():
+    """After 60 s of compiling and 1 % of the steps, an estimate would be of an hour and a half."""
+    lines = {}
+    for steps in (1, 9, 10, 50):
+        progress_of = {"0.log": progress.Progress(steps, 100, "steps")}.get
+        lines[steps] = board_of(done=0).line("echo", 160.0, progress_of)
+    assert lines[1] == "echo  0/10; seen/0 1/100 steps" and "left" not in lines[9]
+    assert lines[10].startswith("echo  0/10, 1:39:00 left; ") and lines[50].startswith("echo  0/10, 19:00 left; ")
+
+
 def test_the_last_job_of_a_stage_says_so_and_an_unknown_job_nothing():
     board = Board({"echo": 2}, 0.0)
     assert [board.start(number, Job("echo", "", "", 1.0)) for number in (1, 2)] == [True, False]

@@ -79,7 +79,7 @@ def next_jobs(job):
     if rule == "shard":
         return {("views", "24", *names)} | INDEX
     after = {
-        "index": CARD | VIEWS | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
+        "index": CARD | REPORT, "views": TRAIN | EVALUATE, "freeze": TRAIN | EVALUATE,
         "train": {("evaluate", *names)}, "evaluate": TABLES, "tables": REPORT, "gallery": REPORT, "distances": REPORT,
         "configuration": CARD | REPORT, "report_manifest": REPORT, "card": set(), "report": set(),
     }  # fmt: skip
@@ -97,6 +97,14 @@ def with_what_follows(jobs, images=True):
     if not images:
         return found - TILES
     return found | {("tiles", job[1], job[3]) for job in found if job[0] == "shard"}
+
+
+def grown(part):
+    """The jobs of one more chunk of each group, and those that read all chunks."""
+    own = {(rule, group, part) for group in GROUPS for rule in ("motion", "noise", "tiles")}
+    own |= {("echo", group, part, station) for group in GROUPS for station in STATIONS}
+    own |= {(*work, group, fold, part) for work in (("shard",), ("views", "24")) for group in GROUPS for fold in FOLDS}
+    return own | INDEX | CARD | FREEZE | TRAIN | EVALUATE | TABLES | REPORT | MANIFEST | SETTINGS
 
 
 # --- the changes ---
@@ -134,6 +142,9 @@ CHANGES = {
     "SNR list": Change(NOISE | SHARD, overlay={"noise": {"snr_db": [9, float("inf")]}}),
     "spectra": Change(TILES | INDEX, overlay={"spectra": {"vrp": {"hop": 2}}}),
     "colour map": Change(TILES | INDEX | TRAIN, overlay={"images": {"colour_map": "magma"}}),
+    "more motion models": Change(
+        set(), ("Missing output files",), overlay={"motion": {"models": 30}}, expected=grown("00002")
+    ),
     "split": Change(SHARD, overlay={"split": {"val": 2, "train": 7}}),
     "kind of shards": Change(
         set(),

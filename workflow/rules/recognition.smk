@@ -8,7 +8,8 @@ rule views:
     input:
         unpack(products.reduced),
         code=code("lowalt.recognition", "lowalt.recognition.views"),
-        index="results/{run}/shards/index.json",
+        # All that is read of the index follows from the shard and from `render`; it grows where chunks are added.
+        index=ancient("results/{run}/shards/index.json"),
         shard="results/{run}/shards/{group}-{fold}-{part}.tar",
     output:
         "results/{run}/views/{size}/{group}-{fold}-{part}.npz",
@@ -20,6 +21,7 @@ rule views:
         "../../envs/environment.yaml"
     params:
         settings=settings.views,
+        render=settings.index,
         reduced=options.reduced_chunk,
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
@@ -77,15 +79,16 @@ rule train:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    threads: config["recognition"]["training"]["threads"]
+    threads: config["recognition"]["training"]["threads"] * RUN.processes
     params:
         settings=settings.training,
+        launcher=RUN.launcher,
         source=options.samples,
         extra=options.extra,
         events="--tensorboard" if config["recognition"]["tensorboard"] else "",
         stations=RUN.stations,
     shell:
-        "python -m lowalt.recognition train --settings {params.settings:q} {params.source} {params.extra}"
+        "python -m {params.launcher} lowalt.recognition train --settings {params.settings:q} {params.source} {params.extra}"
         " --frozen {input.frozen:q}"
         " --schemes {input.schemes:q} --stations {params.stations} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
         " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"

@@ -11,6 +11,9 @@ from lowalt.common.progress import Progress
 Reader = Callable[[str], Progress | None]
 """Reads how far a job is from its log."""
 
+LEAST_PART = 0.1
+"""Part of a job that must be done before the first estimate: a job starts with modules and machine code to compile."""
+
 
 @dataclass
 class Job:
@@ -96,7 +99,7 @@ class Board:
         found = {key: read(job.log) for key, job in now_running.items()}
         parts = sum(progress.done / progress.total for progress in found.values() if progress and progress.total)
         done, spent = stage.done + parts, now - stage.started
-        if done > 0 and spent > 0:
+        if spent > 0 and (stage.done or parts >= LEAST_PART):
             head += f", {pace(stage.done / spent)}" if stage.done else ""
             head += f", {span((stage.total - done) * spent / done)} left"
         texts = [_running(job, found[key]) for key, job in now_running.items()]

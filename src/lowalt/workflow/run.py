@@ -124,6 +124,17 @@ class Run:
             for seed in block["seeds"]
         ]
 
+    @property
+    def processes(self) -> int:
+        """Processes that share one training."""
+        return self.config["recognition"].get("processes", 1)
+
+    @property
+    def launcher(self) -> str:
+        """What stands between `python -m` and the training's module: torchrun's own module for several processes."""
+        alone = self.processes == 1
+        return "" if alone else f"torch.distributed.run --standalone --nproc-per-node {self.processes} -m"
+
     @cached_property
     def priced(self) -> list[str]:
         """The trainings whose accuracy is set against their cost: the unseen protocol, the first training seed."""

@@ -35,11 +35,11 @@ def checksums(folder: Path) -> dict[str, str]:
 
 
 def copy_project(project: Path, folder: Path) -> None:
-    """Copy what a run reads, without results and without compiled files."""
+    """Copy what a run reads, without results and bytecode; with the machine code that the project has compiled."""
     for name in PARTS:
         source = project / name
         if source.is_dir():
-            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
+            shutil.copytree(source, folder / name, ignore=shutil.ignore_patterns("*.pyc", "*.egg-info"))
         else:
             shutil.copy(source, folder / name)
 
@@ -56,7 +56,7 @@ class Trial:
         """Start the run as a leader of its own process group and return its main process."""
         command = [sys.executable, "-m", "snakemake", "--cores", str(self.options.cores), "--configfile"]
         command += [*self.options.configfile, *(["--", *self.options.targets] if self.options.targets else [])]
-        # Compiled machine code and bytecode stay out of the trial's own, perhaps small, disk.
+        # Bytecode stays out of the trial's own, perhaps small, disk.
         environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "LOWALT_SPACE": "off"}
         environment["PYTHONDONTWRITEBYTECODE"] = "1"
         descriptor, self.output = tempfile.mkstemp(prefix="lowalt-trial-")
