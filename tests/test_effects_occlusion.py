@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from lowalt.common.config import canonical, load_yaml
 from lowalt.common.errors import InputError
@@ -213,7 +214,7 @@ def test_capsules_agree_with_points_along_the_ray():
 def test_strength_scales_and_a_target_without_its_surfaces_is_refused(tmp_path):
     view, _ = built("DJI Mini 2")
     hidden = occlusion.hidden(view)
-    assert (occlusion.visible({"strength": 1.0, "thin_waves": 0.0}, view) == ~hidden).all()
+    assert (occlusion.visible({"strength": 1.0, "blades": "opaque"}, view) == ~hidden).all()
     assert abs(occlusion.visible({**occlusion.DEFAULTS, "strength": 1e-9}, view) - 1).max() < 1e-8
     assert occlusion.idle({"strength": 0.0})
     with pytest.raises(
@@ -279,16 +280,29 @@ def test_the_surfaces_of_a_users_mesh_lie_where_its_cloud_does(name):
     assert 0.2 < found.mean() < 0.8
 
 
-@pytest.mark.parametrize("name, widest, narrow", [("DJI Mini 2", 0.03, True), ("EH 216 S", 0.5, False)])
-def test_narrow_blades_hide_nothing(name, widest, narrow):
+@pytest.mark.parametrize("name, widest", [("DJI Mini 2", 0.03), ("EH 216 S", 0.5)])
+def test_blades_hide_by_their_width_over_the_wavelength(name, widest):
     view, _ = built(name)
-    widths = occlusion.blade_widths_m(view.cloud, view.occluders)
-    assert set(widths) == set(view.cloud.parts_of("rotor"))
-    wavelength = 299792458.0 / view.network.carrier_hz
-    assert min(widths.values()) > 0.003 and max(widths.values()) < widest
-    assert (max(widths.values()) < 0.5 * wavelength) == narrow
-    opaque, bent = occlusion.hidden(view), occlusion.hidden(view, 0.5)
-    assert (bent.sum() < opaque.sum()) == narrow and not (bent & ~opaque).any()
-    only_blades = np.isin(view.occluders["vertex_part"][view.occluders["faces"][:, 0]], list(widths))
-    bare = {**view.occluders, "faces": view.occluders["faces"][~only_blades]}
-    assert (occlusion.hidden(view, 1e6) == occlusion.hidden(replace(view, occluders=bare))).all()
+    blades = occlusion.blades_m(view.cloud, view.occluders)
+    assert set(blades) == set(view.cloud.parts_of("rotor"))
+    widths, radii = np.array(list(blades.values())).T
+    assert widths.min() > 0.003 and widths.max() < widest and (radii > 2 * widths).all()
+    share = occlusion.through_blades(view)
+    assert (share > 0.7) == (name == "DJI Mini 2") and 0.01 < share < 0.97
+    whole, rest, behind = (occlusion.hidden(view, by) for by in ("all", "rest", "blades"))
+    assert (whole == (rest | behind)).all() and (behind & ~rest).any()
+    factor = occlusion.visible({"strength": 1.0, "blades": "bent"}, view)
+    assert (factor[rest] == 0).all() and (factor[~whole] == 1).all()
+    assert factor[behind & ~rest] == pytest.approx(share)
+    assert (occlusion.visible({"strength": 1.0, "blades": "transparent"}, view) == ~rest).all()
+    # Toward short waves blades become opaque, toward long ones nothing.
+    for carrier, low, high in ((4.9e13, 0.0, 1e-2), (4.9e6, 0.98, 1.0)):
+        assert low <= occlusion.through_blades(replace(view, network=replace(NETWORK, carrier_hz=carrier))) <= high
+
+
+@pytest.mark.parametrize("width", [0.002, 0.011, 0.06, 0.3])
+def test_what_passes_a_strip_is_the_rest_of_the_fresnel_integral(width):
+    distance, wave = 0.12, 0.061
+    x = np.linspace(-0.5 * width, 0.5 * width, 20_001)
+    slit = np.sqrt(1j / (wave * distance)) * trapezoid(np.exp(-1j * np.pi * x**2 / (wave * distance)), x)
+    assert occlusion.passed(width, distance, wave) == pytest.approx(abs(1 - slit) ** 2, rel=1e-6)

@@ -1,11 +1,12 @@
 """Self-occlusion: points that the target's own surfaces hide from a station do not echo.
 
 Straight rays, point by point and symbol by symbol, against the surfaces of all parts as they turn; shadows are sharp.
-Blades narrower than half a wavelength hide nothing: waves bend around them.
+Waves bend around blades, which pass the share that a strip of their width leaves on its axis.
 Waves on other paths (a ground reflection) are taken to be hidden where the direct one is.
 """
 
 import numpy as np
+from scipy.special import fresnel
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
@@ -14,11 +15,12 @@ from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5 (shadowing); "
+    "blades: Born & Wolf, Principles of Optics, 7th ed. 1999, 8.3.2 (Babinet's principle) and 8.7.3 (Fresnel's "
+    "integrals); the rest, geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5; "
     "visible points by their depth on a screen: Catmull, A Subdivision Algorithm for Computer Display of Curved "
     "Surfaces, 1974, computed here at the points themselves"
 )
-DEFAULTS = {"strength": 1.0, "thin_waves": 0.5}
+DEFAULTS = {"strength": 1.0, "blades": "bent"}
 
 
 def idle(settings: dict) -> bool:
@@ -26,26 +28,46 @@ def idle(settings: dict) -> bool:
     return settings["strength"] == 0
 
 
-def blade_widths_m(cloud: Cloud, surfaces: dict) -> dict[int, float]:
-    """Return each rotor's mean blade width (m), by part: one side's area over its diameter."""
+def blades_m(cloud: Cloud, surfaces: dict) -> dict[int, tuple[float, float]]:
+    """Return each rotor's mean blade width and its radius (m), by part: one side's area over its diameter."""
     corners = surfaces["vertices"][surfaces["faces"]]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     part = surfaces["vertex_part"][surfaces["faces"][:, 0]]
-    widths = {}
+    found = {}
     for rotor in cloud.parts_of("rotor"):
         mine = part == rotor
         away = corners[mine].reshape(-1, 3) - cloud.hinges[rotor]
         if len(away):
-            diameter = 2.0 * np.linalg.norm(np.cross(away, cloud.axes[rotor]), axis=1).max()
+            radius = float(np.linalg.norm(np.cross(away, cloud.axes[rotor]), axis=1).max())
             sides = 2.0 if surfaces["closed"][rotor] else 1.0
-            widths[rotor] = float(area[mine].sum() / (sides * diameter))
-    return widths
+            found[rotor] = float(area[mine].sum() / (sides * 2.0 * radius)), radius
+    return found
 
 
-def hidden(view: View, thin_waves: float = 0.0) -> np.ndarray:
+def passed(width_m: float, distance_m: float, wavelength_m: float) -> float:
+    """Return the power share of a wave on the axis of the shadow of a long strip, at this distance behind it.
+
+    By Babinet's principle the strip's field is the free one less that of a slit of its width: |1 - (1 + j) F(v)|^2 with
+    the Fresnel integral F = C - jS and v = width / sqrt(2 wavelength distance). Source: Born & Wolf, 8.3.2 and 8.7.3.
+    """
+    sine, cosine = fresnel(width_m / np.sqrt(2.0 * wavelength_m * distance_m))
+    return float(abs(1.0 - (1.0 + 1j) * (cosine - 1j * sine)) ** 2)
+
+
+def through_blades(view: View) -> float:
+    """Return the factor on a two-way amplitude behind a blade: its power share, the mean over the craft's rotors.
+
+    The rotor's radius is taken as the distance behind the blade, and the phase is left out.
+    """
+    wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
+    found = [passed(width, radius, wavelength) for width, radius in blades_m(view.cloud, view.occluders).values()]
+    return float(np.mean(found)) if found else 0.0
+
+
+def hidden(view: View, by: str = "all") -> np.ndarray:
     """Return whether each point is hidden from the station, (N, L) bool.
 
-    thin_waves: blades narrower than this many wavelengths hide nothing.
+    by: surfaces that count: all of them, the rotors' blades, or the rest.
 
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
@@ -69,9 +91,8 @@ def hidden(view: View, thin_waves: float = 0.0) -> np.ndarray:
     start = points + np.where(known[:, None], offset[:, None] * cloud.normals, 0.0)
     range_m = np.linalg.norm(view.aim_m - place)
     toward = np.where(known, 0.0, offset / range_m)
-    wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
-    thin = [rotor for rotor, width in blade_widths_m(cloud, surfaces).items() if width < thin_waves * wavelength]
-    faces = surfaces["faces"][~np.isin(surfaces["vertex_part"][surfaces["faces"][:, 0]], thin)]
+    blade = np.isin(surfaces["vertex_part"][surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
+    faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
     closed = surfaces["closed"][surfaces["vertex_part"][faces[:, 0]]]
     triangles(
         place, np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.asarray(part, np.int64), start,
@@ -83,6 +104,12 @@ def hidden(view: View, thin_waves: float = 0.0) -> np.ndarray:
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
 
+    Behind bent blades it is the share that goes around them instead.
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
-    return 1.0 - settings["strength"] * hidden(view, settings["thin_waves"])
+    if settings["blades"] == "opaque" or view.nodes or not view.cloud.parts_of("rotor"):
+        return 1.0 - settings["strength"] * hidden(view)
+    lost = hidden(view, "rest").astype(float)
+    if settings["blades"] == "bent":
+        lost = np.maximum(lost, (1.0 - through_blades(view)) * hidden(view, "blades"))
+    return 1.0 - settings["strength"] * lost
