@@ -101,6 +101,7 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
+	$(BIN)/python benchmarks/interval_coverage.py --out results/benchmarks/interval_coverage.csv
 
 bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 short jobs: results/benchmarks/scheduling.csv
 	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/scheduling.csv

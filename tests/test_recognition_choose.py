@@ -96,8 +96,9 @@ def test_tables_say_what_the_predictions_say(tmp_path):
     assert float(base["kept_percent"]) == 100.0
     assert [float(base[name]) for name in ("difference_points",)] == [0.0]
     assert float(better["difference_points"]) == 30.0
-    # Seeds differ by ten points, and each candidate's are drawn apart: 1.96 sqrt(2) 10 / sqrt(3) on either side.
-    assert float(better["low"]) == pytest.approx(14, abs=5) and float(better["high"]) == pytest.approx(46, abs=5)
+    # Seeds differ by ten points, and each candidate's are drawn apart: 2.78 sqrt(2) 10 / sqrt(3) on either side, by
+    # Student's quantile of four degrees of freedom.
+    assert float(better["low"]) == pytest.approx(7.3, abs=3) and float(better["high"]) == pytest.approx(52.7, abs=3)
     with (tmp_path / "choices_subtypes.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 40 and {row["kept_percent"] for row in rows} == {"100.00"}

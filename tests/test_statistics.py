@@ -1,6 +1,8 @@
 """Statistics of predictions: exact small cases, laws, coverage of the intervals, an independent slow reference."""
 
 import math
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.common.streams import stream
-from lowalt.recognition import statistics
+from lowalt.recognition import intervals, statistics
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+import interval_coverage
 
 
 def test_accuracy_and_confusion_count_what_a_loop_counts():
@@ -31,7 +36,7 @@ def test_bootstrap_interval_covers_the_truth_of_clustered_samples_and_a_naive_on
         rng = stream(trial, "coverage")
         values = np.repeat(rng.random(80) < 0.8, 6).astype(float)
         clusters = np.repeat(np.arange(80), 6)
-        _, low, high = statistics.bootstrap(clusters, values, rng, repeats=400)
+        _, low, high = intervals.bootstrap(clusters, values, rng, repeats=400)
         inside += low <= 0.8 <= high
         half = 1.96 * values.std() / math.sqrt(len(values))
         naive += abs(values.mean() - 0.8) <= half
@@ -43,14 +48,14 @@ def test_bootstrap_depends_on_the_generator_alone_and_not_on_names_of_clusters()
     values = stream(2, "values").random(60)
     numbers = np.repeat(np.arange(20), 3)
     names = np.array([f"model {number:03d}" for number in numbers])
-    one = statistics.bootstrap(numbers, values, stream(3, "b"), 300)
-    assert one == statistics.bootstrap(names, values, stream(3, "b"), 300)
-    assert one != statistics.bootstrap(names, values, stream(4, "b"), 300)
+    one = intervals.bootstrap(numbers, values, stream(3, "b"), 300)
+    assert one == intervals.bootstrap(names, values, stream(3, "b"), 300)
+    assert one != intervals.bootstrap(names, values, stream(4, "b"), 300)
     assert one.low <= one.value <= one.high
 
 
 def test_a_constant_difference_has_an_interval_of_no_width():
-    interval = statistics.bootstrap(np.arange(10), np.full(10, 0.25), stream(5, "b"), 50)
+    interval = intervals.bootstrap(np.arange(10), np.full(10, 0.25), stream(5, "b"), 50)
     assert interval == (0.25, 0.25, 0.25)
 
 
@@ -65,7 +70,12 @@ def nested(rng, seeds, subtypes, models, spreads):
 
 @pytest.mark.parametrize(
     ("spreads", "whole", "width"),
-    [((0.0, 0.0, 1.0), False, 0.1), ((0.0, 1.0, 0.0), True, 1 / math.sqrt(20)), ((1.0, 0.0, 0.0), True, 1.0)],
+    # Student's quantiles of 4 and of 19 degrees of freedom, of two schemes with three seeds and of 20 subtypes.
+    [
+        ((0.0, 0.0, 1.0), False, 0.1),
+        ((0.0, 1.0, 0.0), True, 2.093 / 1.96 / math.sqrt(20)),
+        ((1.0, 0.0, 0.0), True, 2.776 / 1.96),
+    ],
     ids=["motion models", "subtypes", "seeds"],
 )
 def test_an_interval_is_as_wide_as_the_level_that_varies_makes_it(spreads, whole, width):
@@ -73,13 +83,20 @@ def test_an_interval_is_as_wide_as_the_level_that_varies_makes_it(spreads, whole
     found, names = [], np.repeat(np.arange(20), 5)
     for trial in range(40):
         one = nested(stream(trial, "one"), 3, 20, 5, spreads)
-        low, high = statistics.strict_difference(
+        low, high = intervals.strict_difference(
             one, np.zeros_like(one), np.full(100, 6), names, whole, stream(trial, "draw"), 600
         )[1:]
         # The standard error of this trial's own values, where only seeds vary.
-        own = one.mean(1).std(ddof=1) / math.sqrt(3) if spreads[0] else width
+        own = width * one.mean(1).std(ddof=1) / math.sqrt(3) if spreads[0] else width
         found.append((high - low) / (2 * 1.96 * own))
     assert np.mean(found) == pytest.approx(1.0, abs=0.06)
+
+
+@pytest.mark.parametrize("level", ["seeds", "subtypes", "models of known subtypes", "all three"])
+def test_a_95_percent_interval_holds_the_truth_about_that_often(level):
+    """Three seeds, 20 subtypes: 93 to 97 % should hold it, give or take two standard errors of 400 trials, 1.1 % each."""
+    share = interval_coverage.held(interval_coverage.CASES[level], 400, 200, stream(11, "coverage", level))
+    assert 0.93 - 0.022 <= share <= 0.97 + 0.022
 
 
 def test_a_difference_that_only_the_subtypes_decide_is_not_called_certain():
@@ -87,8 +104,8 @@ def test_a_difference_that_only_the_subtypes_decide_is_not_called_certain():
     names = np.repeat(np.arange(5), 40)
     one = np.tile(np.where(names == 0, 1.0, -0.2), (3, 1))
     given = (one, np.zeros_like(one), np.full(200, 6), names)
-    plain = statistics.strict_difference(*given, False, stream(1, "draw"))
-    strict = statistics.strict_difference(*given, True, stream(1, "draw"))
+    plain = intervals.strict_difference(*given, False, stream(1, "draw"))
+    strict = intervals.strict_difference(*given, True, stream(1, "draw"))
     assert -0.06 < plain.low < plain.value < plain.high < 0.14
     assert strict.value == plain.value == pytest.approx(0.04)
     assert strict.low < -0.15 and strict.high > 0.4
@@ -96,14 +113,14 @@ def test_a_difference_that_only_the_subtypes_decide_is_not_called_certain():
 
 def test_a_motion_model_brings_one_value_however_many_snrs_it_has():
     motion = np.array(["b", "a", "b", "a", "b"])
-    first, count, shares = statistics.model_shares(motion, [np.array([1, 0, 0, 1, 1]), np.ones(5)])
+    first, count, shares = intervals.model_shares(motion, [np.array([1, 0, 0, 1, 1]), np.ones(5)])
     assert motion[first].tolist() == ["a", "b"] and count.tolist() == [2, 3]
     np.testing.assert_allclose(shares, [[1 / 2, 2 / 3], [1, 1]])
 
 
 def test_the_95_percent_interval_of_a_mean_is_196_standard_errors_wide_on_either_side():
     values = stream(3, "normal").standard_normal(400)
-    value, low, high = statistics.bootstrap(np.arange(400), values, stream(4, "b"), 20_000)
+    value, low, high = intervals.bootstrap(np.arange(400), values, stream(4, "b"), 20_000)
     error = values.std() / 20
     assert (high - value) / error == pytest.approx(1.96, rel=0.04)
     assert (value - low) / error == pytest.approx(1.96, rel=0.04)

@@ -33,8 +33,9 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
 from lowalt.common.network import station_names
 from lowalt.common.streams import stream
+from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
-from lowalt.recognition.statistics import accuracy_by, paired_difference, pareto
+from lowalt.recognition.statistics import accuracy_by, pareto
 from lowalt.recognition.tables import Run, snr_text
 
 COLUMNS = (

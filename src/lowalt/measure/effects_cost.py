@@ -19,7 +19,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.effects.catalogue import PLACES
 from lowalt.measure.effects_samples import read_samples
-from lowalt.recognition.statistics import paired_difference
+from lowalt.recognition.intervals import paired_difference
 
 COLUMNS = (
     "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",
@@ -72,7 +72,7 @@ def difference(
     """Return accuracy with less accuracy without in percentage points, and the ends of its 95 % interval.
 
     without, with_it: (K, S) bool, the same samples; motion: (K,) names of motion models, which are resampled whole.
-    Source: as `lowalt.recognition.statistics.bootstrap`.
+    Source: as `lowalt.recognition.intervals.bootstrap`.
     """
     found = paired_difference(np.repeat(motion, without.shape[1]), with_it.ravel(), without.ravel(), rng)
     return tuple(100 * value for value in found)

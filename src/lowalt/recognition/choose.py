@@ -26,9 +26,10 @@ from lowalt.common.files import slug
 from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition import predictions
+from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.statistics import accuracy_by, model_shares, strict_difference
+from lowalt.recognition.statistics import accuracy_by
 
 TABLE = "config/choices/default.yaml"
 PAIRS = folds("unseen", "train") | folds("unseen", "validation")

@@ -1,13 +1,13 @@
-"""Numbers from predictions: accuracy, confusion, intervals, tests, calibration, false alarms. NumPy and SciPy only.
+"""Numbers from predictions: accuracy, confusion, calibration, thresholds and false alarms. NumPy only.
 
-Motion models, not samples, are the independent units: all SNRs of a motion model share its echo, so intervals
-resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007). What is claimed of
-schemes also resamples training seeds and, of unseen subtypes, the subtypes (`strict_difference`).
+Intervals of means and differences are those of `lowalt.recognition.intervals`.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+
+from lowalt.recognition.intervals import model_weights
 
 LOOKED_FOR = 0
 """Label of the class whose detection and false alarms are counted: the first, of the default the UAVs."""
@@ -43,97 +43,6 @@ def accuracy_by(groups: np.ndarray, correct: np.ndarray) -> dict:
 def confusion(labels: np.ndarray, guesses: np.ndarray, classes: int) -> np.ndarray:
     """Counts (classes, classes), true class by row, guessed class by column."""
     return np.bincount(labels * classes + guesses, minlength=classes**2).reshape(classes, classes)
-
-
-class Interval(NamedTuple):
-    """A value with the bounds of its 95 % interval."""
-
-    value: float
-    low: float
-    high: float
-
-
-def bootstrap(
-    clusters: np.ndarray, values: np.ndarray, generator: np.random.Generator, repeats: int = 4000
-) -> Interval:
-    """Mean of `values` (samples,) with the percentile interval from resampling whole clusters (samples,).
-
-    Source: Efron and Tibshirani, An Introduction to the Bootstrap, 1993, ch. 13; clusters as in the module's docstring.
-    """
-    _, place = np.unique(clusters, return_inverse=True)
-    count = np.bincount(place).astype(float)
-    total = np.bincount(place, weights=values)
-    means = np.empty(repeats)
-    for repeat in range(repeats):
-        chosen = generator.integers(0, len(count), len(count))
-        means[repeat] = total[chosen].sum() / count[chosen].sum()
-    low, high = np.quantile(means, [0.025, 0.975])
-    return Interval(float(np.mean(values)), float(low), float(high))
-
-
-def paired_difference(
-    clusters: np.ndarray, one: np.ndarray, other: np.ndarray, generator: np.random.Generator
-) -> Interval:
-    """Mean of one - other, two measures (samples,) of the same samples, with its interval as `bootstrap` gives it."""
-    return bootstrap(clusters, np.asarray(one, float) - other, generator)
-
-
-def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the first sample (models,) and the number of samples (models,) of each motion model, and its share of
-    correct samples by seed (seeds, models), so that a motion model brings one value.
-
-    motion (samples,): name of the motion model; correct: (samples,) of every training seed.
-    """
-    _, first, place, count = np.unique(motion, return_index=True, return_inverse=True, return_counts=True)
-    sums = np.array([np.bincount(place, weights=row) for row in correct])
-    return first, count, sums / count
-
-
-def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """How often each of the seeds is drawn, (repeats, seeds), as a share of the draws.
-
-    Deviations from equal shares are stretched by sqrt(n / (n - 1)): plain resampling of n values gives their mean only
-    (n - 1) / n of its variance, a third too little for three seeds. Source: Davison and Hinkley, Bootstrap Methods and
-    their Application, 1997, section 2.
-    """
-    if seeds == 1:
-        return np.ones((repeats, 1))
-    shares = generator.multinomial(seeds, np.full(seeds, 1 / seeds), repeats) / seeds
-    return 1 / seeds + (shares - 1 / seeds) * np.sqrt(seeds / (seeds - 1))
-
-
-def _model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """How often each motion model is drawn, (repeats, models): of all, or where `whole` within subtypes drawn first."""
-    if not whole:
-        return generator.multinomial(len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats).astype(float)
-    names, place = np.unique(subtypes, return_inverse=True)
-    drawn = generator.multinomial(len(names), np.full(len(names), 1 / len(names)), repeats)
-    weights = np.zeros((repeats, len(subtypes)))
-    for number in range(len(names)):
-        mine = np.flatnonzero(place == number)
-        # A subtype that is drawn twice brings its motion models twice, each time drawn anew.
-        weights[:, mine] = generator.multinomial(drawn[:, number] * len(mine), np.full(len(mine), 1 / len(mine)))
-    return weights
-
-
-def strict_difference(
-    one: np.ndarray, other: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
-    generator: np.random.Generator, repeats: int = 4000,
-) -> Interval:  # fmt: skip
-    """Mean of one - other over seeds and samples, with the 95 % interval that resamples seeds, subtypes and models.
-
-    one, other (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of the
-    two are drawn apart, since equal seeds train two schemes from unlike draws. count (models,): samples of each model;
-    subtypes (models,): the subtype each belongs to. whole_subtypes: draw subtypes before their motion models, for
-    results that are to hold for other subtypes. With one seed the interval is of these trained networks alone.
-    Source: as `bootstrap`; nested levels as in Davison and Hinkley 1997, section 3.8.
-    """
-    weights = _model_weights(subtypes, whole_subtypes, repeats, generator) * count
-    weights /= weights.sum(1, keepdims=True)
-    means = [((weights @ shares.T) * _seed_weights(len(shares), repeats, generator)).sum(1) for shares in (one, other)]
-    low, high = np.quantile(means[0] - means[1], [0.025, 0.975])
-    value = np.average(one.mean(0) - other.mean(0), weights=count)
-    return Interval(float(value), float(low), float(high))
 
 
 def calibration(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -> dict[str, float]:
@@ -201,12 +110,12 @@ def alarm_intervals(
 
     validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
     models of both parts and, where `whole_subtypes`, subtypes of the test part; thresholds are set on what it draws.
-    Source: as `strict_difference`.
+    Source: `lowalt.recognition.intervals.strict_difference`.
     """
 
     def sample_weights(part: AlarmPart, whole: bool) -> np.ndarray:
         _, first, place = np.unique(part.motion, return_index=True, return_inverse=True)
-        return _model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
+        return model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
 
     judged, set_on = sample_weights(test[0], whole_subtypes), sample_weights(validation[0], False)
     wanted = validation[0].labels == LOOKED_FOR

@@ -32,6 +32,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.common.streams import stream
 from lowalt.recognition import predictions
+from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
@@ -44,9 +45,7 @@ from lowalt.recognition.statistics import (
     calibration,
     confusion,
     measurable,
-    model_shares,
     reliability,
-    strict_difference,
     threshold,
 )
 

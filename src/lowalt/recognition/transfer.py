@@ -21,7 +21,7 @@ import numpy as np
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition.statistics import paired_difference
+from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.tables import Run, snr_text
 
 COLUMNS = (
