@@ -94,7 +94,7 @@ def test_an_interval_is_as_wide_as_the_level_that_varies_makes_it(spreads, whole
 
 @pytest.mark.parametrize("level", ["seeds", "subtypes", "models of known subtypes", "all three"])
 def test_a_95_percent_interval_holds_the_truth_about_that_often(level):
-    """Three seeds, 20 subtypes: 93 to 97 % should hold it, give or take two standard errors of 400 trials, 1.1 % each."""
+    """93 to 97 % should hold it, give or take two standard errors of 400 trials, 1.1 % each."""
     share = interval_coverage.held(interval_coverage.CASES[level], 400, 200, stream(11, "coverage", level))
     assert 0.93 - 0.022 <= share <= 0.97 + 0.022
 
