@@ -1,4 +1,6 @@
 # lowalt: from records of targets to a benchmark and its report. One rule file a stage, in pipeline order.
+import sys
+
 from snakemake.utils import min_version
 
 min_version("9.0")
@@ -24,6 +26,7 @@ include: "workflow/rules/report.smk"
 
 
 onstart:
+    print(RUN.sources, file=sys.stderr)
     space_check.before(workflow, RUN.plan, config)
 
 

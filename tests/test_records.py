@@ -138,7 +138,7 @@ def test_too_few_points_for_the_parts_are_refused(tmp_path, written):
 
 
 def test_unknown_missing_and_repeated_subtypes_are_refused(tmp_path):
-    with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected one of"):
+    with pytest.raises(InputError, match=r"mine\.yaml: unknown subtype 'Dodo', expected a key `row` or one of"):
         load(tmp_path, {"Dodo": {"source": "builtin"}})
     with pytest.raises(InputError, match=r"no record for \['AITO M9 2024'"):
         load_records(TABLE, [file for file in FILES if file.stem != "vehicle"])

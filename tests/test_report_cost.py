@@ -15,6 +15,7 @@ from lowalt.report.figures.echo_cost import figure
 from lowalt.report.figures.echo_cost import main as draw
 from lowalt.report.page import rendered
 from lowalt.report.sections.echo_cost import summary
+from lowalt.targets.records import load_table
 from lowalt.tiles.render import Renderer
 
 TARGETS = Path(__file__).parents[1] / "config/targets.csv"
@@ -120,8 +121,8 @@ def test_the_command_writes_a_table_and_a_figure(cloud, tmp_path):
     table.append(measured_row(method="FINUFFT", tolerance="1e-09", seconds="5e-2", points="400"))
     lines = [",".join(MEASURED), *(",".join(row[name] for name in MEASURED) for row in table)]
     (tmp_path / "cost.csv").write_text("\n".join(lines) + "\n")
-    arguments = ["--settings", json.dumps(SETTINGS), "--table", str(tmp_path / "cost.csv"), "--clouds",
-                 str(tmp_path / "craft.npz"), "--targets", str(TARGETS)]  # fmt: skip
+    settings = json.dumps(SETTINGS | {"published": load_table(TARGETS)})
+    arguments = ["--settings", settings, "--table", str(tmp_path / "cost.csv"), "--clouds", str(tmp_path / "craft.npz")]
     main([*arguments, "--out", str(tmp_path / "pixels.csv")])
     draw(["--table", str(tmp_path / "cost.csv"), "--pixels", str(tmp_path / "pixels.csv"), "--figure",
           str(tmp_path / "cost.png")])  # fmt: skip

@@ -6,7 +6,6 @@
 rule cost_table:
     input:
         code=code("lowalt.measure.echo_cost"),
-        targets=config["targets"]["table"],
         clouds=products.cost_clouds,
     output:
         "results/{run}/cost.csv",
@@ -22,13 +21,12 @@ rule cost_table:
     shell:
         "OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1"
         " python -m lowalt.measure.echo_cost --settings {params.settings:q} --clouds {input.clouds:q}"
-        " --targets {input.targets:q} --out {output:q} 2> {log:q}"
+        " --out {output:q} 2> {log:q}"
 
 
 rule cost_pixels:
     input:
         code=code("lowalt.measure.echo_pixels"),
-        targets=config["targets"]["table"],
         table="results/{run}/cost.csv",
         clouds=products.cost_clouds,
     output:
@@ -43,7 +41,7 @@ rule cost_pixels:
         settings=settings.cost_pixels,
     shell:
         "python -m lowalt.measure.echo_pixels --settings {params.settings:q} --table {input.table:q}"
-        " --clouds {input.clouds:q} --targets {input.targets:q} --out {output:q} 2> {log:q}"
+        " --clouds {input.clouds:q} --out {output:q} 2> {log:q}"
 
 
 rule cost_figure:

@@ -23,7 +23,7 @@ from lowalt.effects.received import Scene, observe, received_signal, with_cross_
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
-from lowalt.targets.records import load_records
+from lowalt.targets.records import records_of
 
 REPEATS = 3
 
@@ -42,7 +42,7 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
     Clouds and motion are made as the workflow makes them, so a sample is the one the data set holds.
     Raises: InputError for a subtype the scene does not have.
     """
-    records = load_records(config["targets"]["table"], config["targets"]["records"])
+    records = records_of(config["targets"], inputs)
     select = config["targets"]["select"]
     records = {name: record for name, record in records.items() if not select or name in select}
     unknown = [name for name, _ in named if name not in records]

@@ -24,7 +24,6 @@ from lowalt.measure import echo_baselines
 from lowalt.motion import poses
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.cloud import Cloud, read
-from lowalt.targets.records import load_table
 
 COLUMNS = (
     "method", "category", "subtype", "points", "range_m", "tolerance", "seconds", "relative_error", "proved_bound",
@@ -136,13 +135,13 @@ def main(arguments: list[str]) -> None:
     """Measure and write the table."""
     options = parser("lowalt.measure.echo_cost", __doc__.splitlines()[0])
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files, best one of each category")
-    options.add_argument("--targets", required=True, help="table of published targets (config/targets.csv)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
-    network, motion, seed, block = pick(given.settings, "network", "motion", "seed", "cost")
+    keys = ("network", "motion", "seed", "cost", "published")
+    network, motion, seed, block, published = pick(given.settings, *keys)
     block |= {"motion": motion, "seed": seed}
     network = Network.from_settings(network)
-    rows = measure(network, [read(path) for path in given.clouds], load_table(given.targets), block)
+    rows = measure(network, [read(path) for path in given.clouds], published, block)
     write_csv(given.out, COLUMNS, rows)
 
 

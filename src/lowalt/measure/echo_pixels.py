@@ -21,7 +21,6 @@ from lowalt.echo import echo_signal
 from lowalt.measure.echo_cost import sample
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud, read
-from lowalt.targets.records import load_table
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images
 
@@ -107,15 +106,14 @@ def main(arguments: list[str]) -> None:
     options = parser("lowalt.measure.echo_pixels", __doc__.splitlines()[0])
     options.add_argument("--table", required=True, help="table of lowalt.measure.echo_cost (.csv)")
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files, the same as that table's")
-    options.add_argument("--targets", required=True, help="table of published targets (config/targets.csv)")
     options.add_argument("--out", required=True, help="table of changed pixels to write (.csv)")
     given = options.parse_args(arguments)
-    keys = ("network", "motion", "spectra", "images", "seed", "cost")
-    network, motion, spectra, images, seed, block = pick(given.settings, *keys)
+    keys = ("network", "motion", "spectra", "images", "seed", "cost", "published")
+    network, motion, spectra, images, seed, block, published = pick(given.settings, *keys)
     block |= {"motion": motion, "seed": seed}
     measured = read_csv(given.table, *NEEDED)
     renderer = Renderer(Network.from_settings(network), Spectra.from_settings(spectra), Images.from_settings(images))
-    rows = pixels(renderer, [read(path) for path in given.clouds], load_table(given.targets), block)
+    rows = pixels(renderer, [read(path) for path in given.clouds], published, block)
     write_csv(given.out, COLUMNS, [row | {"time_saved": saved(measured, row)} for row in rows])
 
 

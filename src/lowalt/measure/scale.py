@@ -17,7 +17,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import station_names
 from lowalt.common.plan import Plan
 from lowalt.recognition.schemes import named
-from lowalt.targets.records import load_table
+from lowalt.targets.records import records_of
 
 DATA_RULES = ("motion", "echo", "noise", "tiles", "shard", "index")
 COLUMNS = (
@@ -32,7 +32,7 @@ def samples_of(config: dict) -> tuple[int, int]:
 
     Raises: InputError where its plan is refused.
     """
-    plan = Plan.of(config, load_table(config["targets"]["table"]))
+    plan = Plan.of(config, {name: item["published"] for name, item in records_of(config["targets"]).items()})
     models = plan.models * sum(map(len, plan.groups.values()))
     return models, models * len(plan.snrs)
 

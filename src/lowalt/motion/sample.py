@@ -80,7 +80,7 @@ def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dic
         duration = len(cloud.track) / cloud.record["track_rate_hz"]
         row["start_s"] = rng.uniform(0.0, duration)
         row["playback"] = 1.0
-        if cadence == "tied":
+        if "tied" in (cadence, cloud.record.get("cadence")):
             row["playback"] = speed / cloud.record["track_speed_mps"]
 
 

@@ -25,7 +25,7 @@ from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
 from lowalt.shards.write import npy
 from lowalt.targets.cloud import Cloud
-from lowalt.targets.records import load_records
+from lowalt.targets.records import records_of
 
 
 class Sample(NamedTuple):
@@ -81,7 +81,7 @@ class Dataset:
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:
-            records = load_records(config["targets"]["table"], config["targets"]["records"])
+            records = records_of(config["targets"], inputs)
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)

@@ -1,7 +1,8 @@
 """The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is given.
 
-Only the body is here: segment lengths, how the curves of `gait_walk` and `gait_run` turn the bones, and the cloud.
-Axes: x right, y front, z up, metres; the root's mean position is the origin.
+A cyclist (`cyclist`) and a dog (`quadruped`) are made likewise, from nodes of their own. Only the human body is here:
+segment lengths, how the curves of `gait_walk` and `gait_run` turn the bones, and the cloud. Axes: x right, y front, z
+up, metres; the root's mean position is the origin.
 """
 
 import hashlib
@@ -13,7 +14,7 @@ from lowalt.common import portable
 from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.portable import product
-from lowalt.targets import gait_run, gait_walk
+from lowalt.targets import cyclist, gait_run, gait_walk, quadruped, record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation
 
@@ -109,25 +110,55 @@ def cycle_m(kind: str, stature_m: float, speed_mps: float, frames: int) -> tuple
     return forward_kinematics(root - portable.mean(root, 0), turned, bones_m(stature_m)), duration, stride
 
 
-def stance_speed_mps(cycle: np.ndarray, rate_hz: float, speed_mps: float, height_m: float = 0.02) -> float:
+def stance_speed_mps(
+    cycle: np.ndarray, rate_hz: float, speed_mps: float, height_m: float = 0.02, feet: list[int] = FEET
+) -> float:
     """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of the ground.
 
-    `cycle` (F, 31, 3) cyclic, front +y, horizontal progress left out; `speed_mps` is added back. Zero would be a
-    foot that stands still. The ground is the feet's lowest point.
+    `cycle` (F, L, 3) cyclic, `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps`
+    is added back. Zero would be a foot that stands still. The ground is the feet's lowest point.
     """
-    feet = cycle[:, FEET]
-    velocity = (np.roll(feet, -1, axis=0) - np.roll(feet, 1, axis=0)) * rate_hz / 2
+    places = cycle[:, feet]
+    velocity = (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)) * rate_hz / 2
     velocity[..., 1] += speed_mps
-    lowest = feet[..., 2].argmin(axis=1)
-    frames = np.arange(len(feet))
-    down = feet[frames, lowest, 2] < feet[..., 2].min() + height_m
+    lowest = places[..., 2].argmin(axis=1)
+    frames = np.arange(len(places))
+    down = places[frames, lowest, 2] < places[..., 2].min() + height_m
     return float(portable.mean(portable.norm(velocity[frames, lowest, :2])[down]))
 
 
-KEYS = ("gait", "speed_mps", "stature_m", "rate_hz", "person")
-"""Keys that a gait record has in addition to those of every record; `person` says in words who walks."""
+KEYS = record_schema.keys("gait")
+"""Keys that a gait record has in addition to those of every record; `person` says in words who walks. `stature_m` of a dog is
+its height at the withers; `mass_kg` is a dog's alone."""
 
-_RANGES = {"speed_mps": (0.05, 6.0), "stature_m": (0.5, 2.6), "rate_hz": (20, 10_000)}
+_RANGES = {"speed_mps": (0.05, 15.0), "stature_m": (0.15, 2.6), "rate_hz": (20, 10_000), "mass_kg": (2, 120)}
+
+
+def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], float, float]:
+    """One cycle (frames, L, 3) in metres, the nodes' names, its duration (s) and the distance it covers (m)."""
+    kind, stature, speed = record.get("gait"), record["stature_m"], record["speed_mps"]
+    if kind not in ("cycle", "trot"):
+        if stature < 0.5:
+            raise InputError(f"gait: stature_m is {stature}, expected 0.5 m or more of a person")
+        if speed > 6:
+            raise InputError(f"gait: speed_mps is {speed}, expected 6 m/s or less of a person")
+        track, duration, stride = cycle_m(kind, stature, speed, frames)
+        return track, NODES, duration, stride
+    if kind == "cycle":
+        track, names, stride = cyclist.cycle_m(stature, frames)
+        duration = stride / speed
+    else:
+        track, names, duration, stride = quadruped.cycle_m(stature, record["mass_kg"], speed, frames)
+    middle = (track[..., 2].max() + track[..., 2].min()) / 2
+    return track - [0, 0, middle], names, duration, stride
+
+
+def _gait_facts(record: dict, names: tuple[str, ...], track: np.ndarray, rate_hz: float, speed_mps: float) -> dict:
+    """What a record says of the feet; or of wheels, which turn with the speed whatever `motion.cadence` is."""
+    if record["gait"] == "cycle":
+        return {"cadence": "tied"}
+    feet = FEET if names == NODES else [number for number, name in enumerate(names) if name.endswith("paw")]
+    return {"stance_foot_speed_mps": stance_speed_mps(track, rate_hz, speed_mps, feet=feet)}
 
 
 def check_record(merged: dict, extra: dict, where: str) -> dict:
@@ -142,16 +173,22 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
         raise InputError(f"{where}: unknown keys {unknown}, expected some of {sorted(KEYS)}")
     if like(merged) != "Pedestrian":
         raise InputError(f"{where}: source is 'gait' for a target like a {like(merged)}, expected builtin or mesh")
-    result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged, "points": len(NODES)}
+    result = {"stature_m": merged["published"]["hgt_m"], "rate_hz": 400, **merged}
+    if result.get("gait") == "trot":
+        result = {"mass_kg": 30, **result}
+    elif "mass_kg" in result:
+        raise InputError(f"{where}: mass_kg is given with gait {result.get('gait')!r}, expected it with trot alone")
     for key, (low, high) in _RANGES.items():
         value = result.get(key)
+        if key == "mass_kg" and key not in result:
+            continue
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
             raise InputError(f"{where}: {key} is {value!r}, expected a number from {low} to {high}")
     try:
-        cycle_m(result.get("gait"), result["stature_m"], result["speed_mps"], 2)
+        names = _cycle(result, 8)[1]
     except InputError as error:
         raise InputError(f"{where}: {error}") from None
-    return result
+    return result | {"points": len(names)}
 
 
 def record_files(record: dict) -> list[str]:
@@ -160,21 +197,20 @@ def record_files(record: dict) -> list[str]:
 
 
 def gait_cloud(record: dict, seed: int) -> Cloud:
-    """Return the built-in pedestrian's cloud: one cycle of walking or running on the 31 nodes.
+    """Return the cloud of a built-in pedestrian, cyclist or dog: one cycle of its nodes.
 
     `record` is a merged record that `check_record` has passed. The cloud's record says cycle (s), stride (m),
     cadence, height of the origin above ground (m) and foot speed in stance (m/s). The model has no randomness, so
     `seed` is only noted.
     """
-    kind, stature, speed = record["gait"], record["stature_m"], record["speed_mps"]
-    duration = cycle_m(kind, stature, speed, 2)[1]
+    duration = _cycle(record, 2)[2]
     # A whole number of frames a cycle: the rate gives way by less than a frame, the duration does not.
-    track, duration, stride = cycle_m(kind, stature, speed, max(2, round(duration * record["rate_hz"])))
+    track, names, duration, stride = _cycle(record, max(2, round(duration * record["rate_hz"])))
     rate = len(track) / duration
     facts = {
         "track_rate_hz": rate, "cycle_s": duration, "stride_m": stride, "track_speed_mps": stride / duration,
         "cadence_steps_per_min": 120 / duration, "origin_height_m": float(-track[..., 2].min()),
-        "stance_foot_speed_mps": stance_speed_mps(track, rate, stride / duration),
+        **_gait_facts(record, names, track, rate, stride / duration),
         "checksum": hashlib.sha256(json.dumps(record, sort_keys=True).encode()).hexdigest(), "seed": seed,
     }  # fmt: skip
-    return node_cloud(track, record | facts)
+    return node_cloud(track, record | facts, names)

@@ -1,12 +1,14 @@
 """Gallery: all clouds in one picture, coloured by part: a line-up at one scale a category, then each by itself."""
 
 import argparse
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.command import run
 from lowalt.common.files import replacing
+from lowalt.targets import cyclist, quadruped
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS
 
@@ -49,15 +51,23 @@ def colours(cloud: Cloud) -> np.ndarray:
     return result
 
 
+def bones(names: tuple[str, ...]) -> list[tuple[int, int]]:
+    """Return the pairs of nodes that bones or bars join, by the names of a cloud's parts; none for other clouds."""
+    if names == NODES:
+        return [(node, parent) for node, parent in enumerate(PARENTS) if parent >= 0]
+    numbers = {name: number for number, name in enumerate(names)}
+    chains = [chain for chain in (*cyclist.CHAINS, *quadruped.CHAINS) if set(chain) <= set(numbers)]
+    return [(numbers[one], numbers[other]) for chain in chains for one, other in pairwise(chain)]
+
+
 def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
     """Draw one cloud into matplotlib axes in metres, `shift` (m) to the right, nearer points in front."""
     seen = shown(cloud)
     order = np.argsort(seen[:, 2])
     # Nodes of a skeleton are told apart by the bones between them.
-    for node, parent in enumerate(PARENTS if cloud.names == NODES else ()):
-        if parent >= 0:
-            x, y = seen[[node, parent], :2].T
-            axes.plot(x + shift, y, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
+    for bone in bones(cloud.names):
+        x, y = seen[list(bone), :2].T
+        axes.plot(x + shift, y, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
     axes.scatter(seen[order, 0] + shift, seen[order, 1], c=colours(cloud)[order], s=size, linewidths=0)
 
 

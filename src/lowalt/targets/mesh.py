@@ -179,8 +179,10 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
             size = np.full(3, measured_m(record["size_is"], parts, kinds))
         except InputError as error:
             raise InputError(f"{record['subtype']}: {error}") from None
-        # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
-        _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit)
+        if record["size_is"] == "motor diagonal":
+            # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
+            # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
+            _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit)
     for axis in range(3):
         _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis], 1 / limit, limit)
     whole = float((high - low).max())

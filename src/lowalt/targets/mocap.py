@@ -15,6 +15,7 @@ from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
 from lowalt.common.portable import applied, product
+from lowalt.targets import record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
 from lowalt.targets.input_files import check_file_name
@@ -189,8 +190,7 @@ def front(motion: Motion, direction: np.ndarray) -> Motion:
     return Motion(root - portable.mean(root, 0), product(spin, motion.turned), motion.bones_m, motion.rate_hz)
 
 
-KEYS = ("skeleton", "motion", "first_frame", "last_frame", "rate_hz", "scale", "max_acceleration_mps2",
-        "max_mismatch_m", "licence", "attribution", "where", "note")  # fmt: skip
+KEYS = record_schema.keys("mocap")
 """Keys that a recording's record has in addition to those of every record; `where` says where a user gets the files."""
 
 

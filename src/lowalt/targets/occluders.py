@@ -123,6 +123,8 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
         # Clears a point's own triangle by more than rounding, and stays on it where a point stands by its corner.
         offset = 1e-9 * np.ptp(merged(surfaces).vertices, axis=0).max()
         return from_surfaces(surfaces, np.full(record["points"], offset), np.array([not part.cuts for part in parts]))
+    if record.get("gait") in ("cycle", "trot"):
+        raise InputError(f"{record['subtype']}: gait {record['gait']} has no surfaces, expected no effect `occlusion`")
     if source in ("gait", "mocap"):
         return from_bones(float(record.get("stature_m", record["published"]["hgt_m"])))
     if source != "mesh":

@@ -1,7 +1,9 @@
 """Records: what each subtype is made from, read from the table of published values and from record files.
 
-A record file is YAML, one record a published name. Later files replace earlier ones, whole records at a time. What
-only one source understands (a mesh's unit, a recording's trim) is checked by that source's own `check_record`.
+A record file is YAML, one record a name. Later files replace earlier ones, whole records at a time; files of the
+configuration's key `targets.own` come last. A record may have a key `row`, whose cells replace those of the subtype's
+row in the table of targets or make a new row: one file is then a whole new target. What only one source understands (a
+mesh's unit, a recording's trim) is checked by that source's own `check_record`.
 """
 
 import csv
@@ -14,9 +16,10 @@ from lowalt.common.classes import AIRBORNE, classes_of, like
 from lowalt.common.errors import InputError
 from lowalt.common.files import text_file
 from lowalt.common.yaml_files import load_yaml
+from lowalt.targets import record_schema
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
-COMMON_KEYS = ("source", "points", "rcs_m2_per_point", "like")
+COMMON_KEYS = record_schema.keys(record_schema.COMMON)
 """Keys every record may have; `source` it must have. Each source adds its own."""
 
 MOST_POINTS = 20_000
@@ -85,8 +88,23 @@ def read_records(path: str | Path) -> dict[str, dict]:
     return records
 
 
-def load_records(table_path: str | Path, record_paths: list[str | Path]) -> dict[str, dict]:
-    """Return every subtype's merged and checked record, in the table's order.
+def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dict]:
+    """Return the merged records of the block `targets` of a configuration: those of its `own` files come last.
+
+    inputs: the folder of the user's files, in which a record's files must stand where `where_missing` is "builtin".
+    Raises: InputError as `load_records`.
+    """
+    own = [path for path in targets.get("own", {}).values() if path is not None]
+    falls = targets.get("where_missing") == "builtin"
+    return load_records(targets["table"], [*targets["records"], *own], inputs, falls)
+
+
+def load_records(
+    table_path: str | Path, record_paths: list[str | Path], inputs: str | Path | None = None, fall_back: bool = False
+) -> dict[str, dict]:
+    """Return every subtype's merged and checked record, in the table's order; new rows come last.
+
+    fall_back: where a record names files that the folder `inputs` lacks, take the subtype's record before it.
 
     A merged record is the record as written, with `subtype`, `category`, `group` (seen or unseen), `published` (the
     table's row), and the defaults of `points` (the published count) and `rcs_m2_per_point` (1 m2).
@@ -94,16 +112,48 @@ def load_records(table_path: str | Path, record_paths: list[str | Path]) -> dict
     names twice, an unknown key, a value out of range, a subtype that no file has a record of.
     """
     table = load_table(table_path)
-    chosen: dict[str, tuple[str, dict]] = {}
+    chosen: dict[str, list[tuple[str, dict]]] = {}
     for path in record_paths:
         for name, record in read_records(path).items():
+            where = f"{path}: {name}"
+            if "row" in record:
+                table[name] = with_row(table.get(name), name, record["row"], where)
             if name not in table:
-                raise InputError(f"{path}: unknown subtype {name!r}, expected one of {list(table)}")
-            chosen[name] = (f"{path}: {name}", record)
+                raise InputError(f"{path}: unknown subtype {name!r}, expected a key `row` or one of {list(table)}")
+            chosen.setdefault(name, []).append((where, {key: item for key, item in record.items() if key != "row"}))
     missing = [name for name in table if name not in chosen]
     if missing:
         raise InputError(f"no record for {missing} in {[str(path) for path in record_paths]}, expected one each")
-    return {name: merge(row, chosen[name][1], chosen[name][0]) for name, row in table.items()}
+    classes_of(table)
+    return {name: _last(row, chosen[name], inputs, fall_back) for name, row in table.items()}
+
+
+def _last(row: dict, given: list[tuple[str, dict]], inputs: str | Path | None, fall_back: bool) -> dict:
+    """The last of a subtype's records, or with `fall_back` the last whose files are all in the folder."""
+    where, record = given[-1]
+    found = merge(row, record, where)
+    if fall_back and len(given) > 1 and missing_inputs({row["name"]: found}, inputs):
+        return _last(row, given[:-1], inputs, fall_back)
+    return found
+
+
+def with_row(row: dict | None, name: str, cells: object, where: str) -> dict:
+    """Return a row of the table of targets, None for a new one, with the cells of a record's key `row` in it.
+
+    Raises: InputError naming `where`, the column and the value that is missing, unknown or no positive number.
+    """
+    columns = (*_WORDS, *_WHOLE, *_NUMBERS)
+    known = [column for column in columns if column not in ("name", "idx")]
+    if not isinstance(cells, dict) or set(cells) - set(known):
+        raise InputError(f"{where}: row is {cells!r}, expected cells of the columns {known}")
+    changed = {
+        column: cell if cell is None else _cell(f"{where}: row", column, str(cell)) for column, cell in cells.items()
+    }
+    blank = dict.fromkeys(columns) | {"name": name, "unseen_protocol": "seen", "points_in_published_cloud_approx": 150}
+    result = (row or blank) | changed
+    if not result["category"] or result["unseen_protocol"] not in ("seen", "unseen"):
+        raise InputError(f"{where}: row is {cells!r}, expected a category and unseen_protocol seen or unseen")
+    return result
 
 
 def merge(row: dict, record: dict, where: str) -> dict:
@@ -125,7 +175,10 @@ def merge(row: dict, record: dict, where: str) -> dict:
     if isinstance(rcs, bool) or not isinstance(rcs, (int, float)) or not (math.isfinite(rcs) and rcs >= 0):
         raise InputError(f"{where}: rcs_m2_per_point is {rcs!r}, expected square metres >= 0")
     extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}
-    return _source(source).check_record(merged, extra, where)
+    found = _source(source).check_record(merged, extra, where)
+    record_schema.check(record_schema.COMMON, record, where)
+    record_schema.check(source, extra, where)
+    return found
 
 
 def _check_like(merged: dict, where: str) -> None:

@@ -78,16 +78,16 @@ def rotation(axis: str, angle_rad: np.ndarray) -> np.ndarray:
     return result
 
 
-def node_cloud(track_m: np.ndarray, record: dict) -> Cloud:
+def node_cloud(track_m: np.ndarray, record: dict, names: tuple[str, ...] = NODES) -> Cloud:
     """Return the cloud of a cyclic recording: one part a node, the track's first frame as points.
 
-    `track_m` (F, 31, 3) metres, body-centred; `record` the cloud's record, with `track_rate_hz` and
-    `rcs_m2_per_point`. Nodes have no surface, so normals are NaN.
+    `track_m` (F, L, 3) metres, body-centred; `names` of the L nodes; `record` the cloud's record, with `track_rate_hz`
+    and `rcs_m2_per_point`. Nodes have no surface, so normals are NaN.
     """
-    count = len(NODES)
+    count = len(names)
     nothing = np.full((count, 3), np.nan)
     return Cloud(
-        points=track_m[0].copy(), part=np.arange(count), kinds=("node",) * count, names=NODES,
+        points=track_m[0].copy(), part=np.arange(count), kinds=("node",) * count, names=names,
         parents=np.full(count, -1), hinges=nothing, axes=nothing.copy(), normals=nothing.copy(),
         rcs_m2=np.full(count, float(record["rcs_m2_per_point"])), record=record, track=track_m,
     )  # fmt: skip

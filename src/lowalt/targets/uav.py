@@ -7,12 +7,15 @@ What a layout needs is in FIGURES; where a number below is a plain factor it onl
 import numpy as np
 
 from lowalt.common import portable
+from lowalt.targets import aircraft
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import box, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
-SIZES = ("motor diagonal", "span over ducts", "span over rotors")
-"""Meanings of the published size: largest distance between motor axes, or that over the ducts or blade tips."""
+DIAGONALS = ("motor diagonal", "span over ducts", "span over rotors")
+"""Meanings of a multirotor's published size: largest distance between motor axes, or that over the ducts or blade tips."""
+SIZES = (*DIAGONALS, *dict.fromkeys(aircraft.SIZES.values()))
+"""Meanings of the published size of all craft."""
 
 _COMMON = {
     "propeller_diameter": "length", "blade_count": "count", "blade_chord": "length",
@@ -27,6 +30,7 @@ FIGURES = {
     "radial": _COMMON | {"camera_diameter": "length", "battery_length": "length"},
     "cabin": _COMMON | {"coaxial_gap": "length"},
     "tanker": _QUAD | {"tank_diameter": "length", "tank_length": "length", "lance_length": "length"},
+    **aircraft.FIGURES,
 }
 """The figures each layout needs and what each is: a length (m), a count or a ratio."""
 
@@ -36,6 +40,10 @@ MOVING_SHARE = 0.4
 def fault(record: dict) -> str | None:
     """Return what makes a merged record no craft that could fly or be sampled, or None."""
     figures = {name: value["si"] for name, value in record["figures"].items()}
+    if record["model"] in aircraft.LAYOUTS:
+        return aircraft.fault(record)
+    if record["size_is"] not in DIAGONALS:
+        return f"size_is is {record['size_is']!r}, expected one of {DIAGONALS} with model {record['model']}"
     if record["size_is"] == "span over ducts" and record["model"] != "ducted":
         return f"size_is is 'span over ducts', expected model ducted, not {record['model']}"
     if motor_diagonal(record) <= 0 or record["published"]["size_m"] < motor_diagonal(record):
@@ -194,6 +202,7 @@ def tanker(record: dict, f: dict) -> list[Part]:
 
 LAYOUTS = {
     "folding": folding, "ducted": ducted, "raised": raised, "radial": radial, "cabin": cabin, "tanker": tanker,
+    **aircraft.LAYOUTS,
 }  # fmt: skip
 
 

@@ -16,11 +16,16 @@ FIGURES = {
         "front_overhang": "length", "ground_clearance": "length", "hood_height": "ratio", "belt_height": "ratio",
         "deck_height": "ratio", "windshield_base": "ratio", "roof_front": "ratio", "roof_rear": "ratio",
         "rear_glass_base": "ratio", "roof_width": "ratio",
-    }
+    },
+    "bus": {
+        "wheel_base": "length", "track": "length", "tyre_width": "length", "rolling_diameter": "length",
+        "front_overhang": "length", "ground_clearance": "length",
+    },
 }  # fmt: skip
-"""Figures of a car. Heights are ratios to its height, stations along the car ratios to its length from the front
-bumper, `roof_width` to its width. Length, width and height are the published ones. `rolling_diameter` is the tyre's,
-used where the record says `wheel_size: rolling`; by default the wheel has the published (rim) diameter."""
+"""Figures of a car, and of a bus, which is one box. Heights are ratios to its height, stations along the car ratios to
+its length from the front bumper, `roof_width` to its width. Length, width and height are the published ones.
+`rolling_diameter` is the tyre's, used where the record says `wheel_size: rolling`; by default the wheel has the
+published (rim) diameter."""
 
 SPOKES = 5
 MOVING_SHARE = 0.35
@@ -37,14 +42,19 @@ def fault(record: dict) -> str | None:
         )
     if f["track"] >= table["wid_m"]:
         return f"figures.track is {f['track']:.4g} m, expected less than the {table['wid_m']} m width"
+    if record["points"] < 5:
+        return f"points is {record['points']}, expected at least one for each of 5 parts"
+    return None if record["model"] == "bus" else _profile_fault(f, table)
+
+
+def _profile_fault(f: dict, table: dict) -> str | None:
+    """What makes the figures of a car's side view no car's, or None."""
     stations = [f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")]
     if not 0.18 < stations[0] < stations[1] < stations[2] < stations[3] < 1:
         return f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 to 1"
     heights = [f["ground_clearance"] / table["hgt_m"], f["hood_height"], f["belt_height"]]
     if not heights[0] < heights[1] <= heights[2] < 1 or not heights[0] < f["deck_height"] < 1:
         return f"figures ground_clearance, hood and belt are {heights} of the height, expected rising and below 1"
-    if record["points"] < 5:
-        return f"points is {record['points']}, expected at least one for each of 5 parts"
     return None
 
 
@@ -84,6 +94,14 @@ def _greenhouse(length: float, width: float, height: float, f: dict) -> Surface:
         z = belt + up * (height / 2 - belt)
         rings.append(np.stack([loop[:, 0], loop[:, 1] + middle, np.full(32, z)], 1))
     return loft(np.array(rings))
+
+
+def _coach(length: float, width: float, height: float, f: dict) -> Surface:
+    """The body of a bus: one box with rounded edges and a slightly slanted front."""
+    floor, top = -height / 2 + f["ground_clearance"], height / 2
+    rows = [(0.5, 0.9, floor + 0.1 * height, 0.86 * top), (0.492, 0.98, floor, 0.95 * top), (0.47, 1.0, floor, top),
+            (-0.49, 1.0, floor, top), (-0.5, 0.95, floor + 0.05 * height, 0.96 * top)]  # fmt: skip
+    return hull([(length * y, w * width / 2, low, high) for y, w, low, high in rows], exponent=7.0, sides=32)
 
 
 def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
@@ -137,6 +155,6 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     # No station looks up at a car: the underside between the sills would only take points from what is seen.
     floor = f["ground_clearance"] + 0.06 * height
     wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
-    body = Part("body", "body", (_lower(length, width, height, f), _greenhouse(length, width, height, f)),
-                cuts=tuple(wells))  # fmt: skip
+    skins = (_lower, _greenhouse) if record["model"] == "car" else (_coach,)
+    body = Part("body", "body", tuple(skin(length, width, height, f) for skin in skins), cuts=tuple(wells))
     return [body, *wheels], {"wheel_diameter_m": diameter, "origin_height_m": height / 2}

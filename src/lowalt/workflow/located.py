@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 KEYS = (
-    ("targets", "table"), ("targets", "records"), ("recognition", "table"), ("report", "published"),
+    ("targets", "table"), ("targets", "records"), ("targets", "own"),
+    ("recognition", "table"), ("report", "published"),
     ("report", "effect_scenes"), ("report", "accuracy"),
 )  # fmt: skip
-"""Block and key of every file, or list of files, that comes with the checkout."""
+"""Block and key of every file, or list or mapping of files, that comes with the checkout."""
 
 
 def located(config: dict, checkout: Path) -> dict:
@@ -24,6 +25,8 @@ def located(config: dict, checkout: Path) -> dict:
 
 
 def _found(value: Any, checkout: Path) -> Any:
+    if isinstance(value, dict):
+        return {name: _found(item, checkout) for name, item in value.items()}
     if isinstance(value, list):
         return [_found(item, checkout) for item in value]
     if isinstance(value, str) and not Path(value).exists() and (checkout / value).exists():

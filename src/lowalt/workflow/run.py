@@ -18,7 +18,7 @@ from lowalt.recognition.schemes import Scheme, columns_in, named
 from lowalt.shards.clean import refuse
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named as spectra_named
-from lowalt.targets.records import load_records, load_table, missing_inputs
+from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.settings import Images
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
@@ -47,7 +47,7 @@ class Run:
         Raises: InputError naming key, value and what was expected, or each file of the user's that is missing.
         """
         check(config, schema)
-        records = load_records(config["targets"]["table"], config["targets"]["records"])
+        records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
         classes, plan = classes_of(published), Plan.of(config, published)
         _check_heights(config["motion"]["height_m"], published, classes)
@@ -69,6 +69,7 @@ class Run:
 
             check_effects(config)
         lacking = missing_inputs(chosen, inputs)
+        _check_some(config["targets"], inputs)
         if lacking:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         _check_data(config)
@@ -76,6 +77,14 @@ class Run:
         for name in block.get("extra", []):
             _check_extra(config, name, classes)
         return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
+
+    @property
+    def sources(self) -> str:
+        """One line on what the clouds are made from: built-in models, and each subtype of a file of the user's."""
+        own = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
+        if not own:
+            return f"targets: {len(self.records)} built-in"
+        return f"targets: {len(self.records) - len(own)} built-in; from files: {', '.join(own)}"
 
     @property
     def name(self) -> str:
@@ -193,7 +202,7 @@ def _check_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
     differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
     if differ:
         raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
-    others = classes_of(load_table(other["targets"]["table"]))
+    others = classes_of({name: record["published"] for name, record in records_of(other["targets"]).items()})
     if others != classes:
         raise InputError(f"recognition.extra: run {name!r} has the classes {others}, expected {classes}")
     if own["seed"] == other["seed"]:
@@ -201,6 +210,17 @@ def _check_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
             f"recognition.extra: run {name!r} has this run's seed {own['seed']}, so its motion models would be those "
             "that are tested; expected another seed"
         )
+
+
+def _check_some(targets: dict, inputs: str | None) -> None:
+    """Refuse a folder of inputs without any file that records name, where built-in models may take their places."""
+    if targets.get("where_missing") != "builtin":
+        return
+    named = records_of({**targets, "where_missing": "refuse"})
+    real = {name: record for name, record in named.items() if record["source"] in ("mesh", "mocap")}
+    lacking = [name for name, record in real.items() if missing_inputs({name: record}, inputs)]
+    if real and len(lacking) == len(real):
+        raise InputError(f"inputs: {inputs}, expected a folder with the files of at least one of {lacking}")
 
 
 def _check_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:

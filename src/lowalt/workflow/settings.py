@@ -30,6 +30,10 @@ class Settings:
     def _blocks(self, *names: str) -> dict:
         return {name: self._config[name] for name in names}
 
+    @property
+    def _published(self) -> dict[str, dict]:
+        return {name: record["published"] for name, record in self._run.records.items()}
+
     def configuration(self, wildcards: Any) -> str:
         """The whole configuration."""
         return self._text("configuration", **self._config)
@@ -88,12 +92,14 @@ class Settings:
         return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **beside)
 
     def cost_table(self, wildcards: Any) -> str:
-        """Settings with which the echo is timed."""
-        return self._text("cost_table", **self._blocks("network", "motion", "seed", "cost"))
+        """Settings with which the echo is timed, and the rows of the table of targets."""
+        blocks = self._blocks("network", "motion", "seed", "cost")
+        return self._text("cost_table", **blocks, published=self._published)
 
     def cost_pixels(self, wildcards: Any) -> str:
-        """Settings with which the echo is timed, and the images whose pixels are compared."""
-        return self._text("cost_pixels", **self._blocks("network", "motion", "spectra", "images", "seed", "cost"))
+        """Settings with which the echo is timed, the rows of the table of targets, and the images whose pixels are compared."""
+        blocks = self._blocks("network", "motion", "spectra", "images", "seed", "cost")
+        return self._text("cost_pixels", **blocks, published=self._published)
 
     def views(self, wildcards: Any) -> str:
         """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""
@@ -154,5 +160,4 @@ class Settings:
 
     def report(self, wildcards: Any) -> str:
         """The whole configuration, and the published values of each subtype."""
-        published = {name: record["published"] for name, record in self._run.records.items()}
-        return self._text("report", config=self._config, published=published)
+        return self._text("report", config=self._config, published=self._published)

@@ -17,7 +17,7 @@ from lowalt.common.csv_tables import read_csv, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.plan import Plan
 from lowalt.common.splits import FOLDS
-from lowalt.targets.records import load_records
+from lowalt.targets.records import records_of
 from lowalt.workflow.space import COLUMNS, units
 
 OUTPUTS = {
@@ -55,7 +55,7 @@ def line(points: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _plan(config: dict) -> Plan:
-    records = load_records(config["targets"]["table"], config["targets"]["records"])
+    records = records_of(config["targets"])
     return Plan.of(config, {name: record["published"] for name, record in records.items()})
 
 

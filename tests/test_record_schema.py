@@ -1,0 +1,80 @@
+"""The schema of records: it knows the keys that the code knows, describes each, and design/targets.md shows them."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.common.errors import InputError
+from lowalt.targets import bird, builtin, document, record_schema, uav, vehicle
+from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_record import ALL_AXES, SIZES
+from lowalt.targets.records import SOURCES, load_table, merge
+
+ROOT = Path(__file__).parents[1]
+TABLE = load_table(ROOT / "config/targets.csv")
+SCHEMA = record_schema.schema()
+
+
+def test_sections_are_the_sources_and_their_keys_those_of_the_code():
+    assert set(SCHEMA["sources"]) == {record_schema.COMMON, *SOURCES}
+    assert set(record_schema.keys("builtin")) == {key for known in builtin._KEYS.values() for key in known}
+    definitions = SCHEMA["$defs"]
+    assert definitions["unit"]["anyOf"][0]["enum"] == list(UNITS_M)
+    assert set(definitions["flap"]["properties"]) == set(bird.FLAP)
+    mesh = SCHEMA["sources"]["mesh"]["properties"]
+    assert mesh["size_is"]["enum"] == [*SIZES, ALL_AXES]
+    words = SCHEMA["sources"]["builtin"]["properties"]
+    for module in (uav, bird, vehicle):
+        assert all(layout in words["model"]["description"] for layout in module.FIGURES)
+    assert all(size in words["size_is"]["description"] for size in uav.SIZES)
+
+
+def test_the_page_holds_the_tables_of_the_schema():
+    page = (ROOT / "design/targets.md").read_text()
+    assert document.rewritten(page) == page, "run: python -m lowalt.targets.document design/targets.md"
+    for section in SCHEMA["sources"].values():
+        for name, key in section["properties"].items():
+            assert f"| `{name}`" in page and key["description"] in page
+
+
+def test_pictures_and_files_that_the_page_names_are_there():
+    import re
+
+    page = (ROOT / "design/targets.md").read_text()
+    pictures = re.findall(r"!\[[^]]*\]\(([^)]+)\)", page)
+    assert len(pictures) >= 2 and all((ROOT / "design" / name).is_file() for name in pictures)
+    for name in re.findall(r"`((?:config|src)/[^`*{]+\.(?:yaml|csv|py))`", page):
+        assert (ROOT / name).is_file(), name
+
+
+def test_a_page_without_marks_and_a_key_without_meaning_are_refused(monkeypatch):
+    with pytest.raises(InputError, match="expected the marks"):
+        document.rewritten("no marks")
+    bare = {"$defs": SCHEMA["$defs"], "sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
+    monkeypatch.setattr(document, "schema", lambda: bare)
+    with pytest.raises(InputError, match="gait has no description"):
+        document.tables()
+
+
+@pytest.mark.parametrize(
+    ("file", "name", "change", "message"),
+    [
+        ("pedestrian", "Walking Pedestrian 1", {"person": 3}, r"here: person: 3 is not of type 'string'"),
+        ("uav", "DJI Mini 2", {"sources": {"maker": 1}}, r"here: sources.maker: 1 is not of type 'string'"),
+        ("uav", "DJI Mini 2", {"colour": "red"}, r"unknown keys \['colour'\]"),
+        ("uav", "DJI Mini 2", {"like": "Boat"}, r"like is 'Boat'"),
+    ],
+)
+def test_values_of_another_type_are_refused_by_key(file, name, change, message):
+    record = yaml.safe_load((ROOT / f"config/targets/{file}.yaml").read_text())[name]
+    assert merge(TABLE[name], record, "here")
+    with pytest.raises(InputError, match=message):
+        merge(TABLE[name], record | change, "here")
+
+
+def test_all_shipped_records_of_files_fit_the_schema():
+    real = yaml.safe_load((ROOT / "config/targets/real.yaml").read_text())
+    assert len(real) >= 15
+    for name, record in real.items():
+        merge(TABLE[name], record, name)

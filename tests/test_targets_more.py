@@ -1,0 +1,167 @@
+"""Targets beyond the published forty: their records alone add them, and they move as their kind does."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lowalt.common import portable
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.motion import positions
+from lowalt.motion.sample import draw
+from lowalt.targets import cyclist, quadruped
+from lowalt.targets.gallery import bones
+from lowalt.targets.limbs import circle, joint
+from lowalt.targets.make import make
+from lowalt.targets.records import load_records, records_of
+
+ROOT = Path(__file__).parents[1]
+CONFIG = load([ROOT / "config/default.yaml", ROOT / "config/more.yaml"], ROOT / "workflow/schemas/config.schema.yaml")
+RECORDS = records_of(CONFIG["targets"])
+LEGS = ("left fore", "right hind", "right fore", "left hind")
+MORE = list(RECORDS)[40:]
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    return {name: make(RECORDS[name], None, 1) for name in MORE}
+
+
+def test_the_forty_stay_as_they_are():
+    plain = CONFIG["targets"]
+    assert load_records(plain["table"], plain["records"]) == {name: RECORDS[name] for name in list(RECORDS)[:40]}
+    assert len(MORE) == 8 and {RECORDS[name]["category"] for name in MORE} == {
+        "UAV", "Fixed-wing", "Helicopter", "Vehicle", "Cyclist", "Animal", "Balloon"
+    }  # fmt: skip
+
+
+def test_each_is_as_large_as_its_row_says(clouds):
+    for name, extent in {
+        "Cessna 172S": (11.0, None, None), "JOUAV CW-15": (3.54, None, None), "City bus": (2.55, 12.0, 3.1),
+        "Weather balloon": (1.8, 1.8, None),
+    }.items():  # fmt: skip
+        found = np.ptp(clouds[name].points, axis=0)
+        for value, wanted in zip(found, extent, strict=True):
+            assert wanted is None or value == pytest.approx(wanted, rel=0.01)
+    rotor = clouds["MD 520N"]
+    blades = rotor.points[rotor.part == 1]
+    assert portable.norm(blades[:, :2] - rotor.hinges[1, :2]).max() == pytest.approx(8.33 / 2, rel=0.01)
+    turns = np.unique(np.round(np.degrees(np.arctan2(blades[:, 1], blades[:, 0])) / 72) % 5)
+    assert len(turns) == 5 and len(blades) % 5 == 0
+    hexacopter = clouds["Yuneec H520"]
+    assert hexacopter.kinds.count("rotor") == 6
+    reach = portable.norm(hexacopter.hinges[1:, :2])
+    assert np.allclose(reach, 0.48 / 2)
+
+
+def test_a_propeller_turns_about_the_axis_to_the_front(clouds):
+    cloud = clouds["Cessna 172S"]
+    row = {"subtype": "x", "model": 0, "rate_hz": 40.0, "phase_0_rad": 0.0, "x_m": 0.0, "y_m": 0.0, "z_m": 0.0,
+           "vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0, "yaw_rad": 0.0, "pitch_rad": 0.0, "roll_rad": 0.0}  # fmt: skip
+    now, half, whole = positions(cloud, row, np.array([0.0, 1 / 80, 1 / 40]))[:, cloud.part == 1]
+    assert np.allclose(now, whole, atol=1e-9) and np.allclose(now[:, 1], half[:, 1], atol=1e-9)
+    hub = cloud.hinges[1]
+    assert np.allclose((now - hub)[:, [0, 2]], -(half - hub)[:, [0, 2]], atol=1e-9)
+
+
+def drawn(cloud, name, cadence="free", seed=1):
+    settings = {"region": {"mast_clearance_m": 0}, "height_m": CONFIG["motion"]["height_m"], "tilt_deg": 20.0,
+                "cadence": cadence}  # fmt: skip
+    corners = np.array([[0.0, 0], [100, 0], [0, 100]])
+    return draw(stream(seed, "draw"), cloud, RECORDS[name]["published"], np.zeros((1, 2)), corners, settings)
+
+
+def test_motion_is_drawn_for_all_of_them_and_wheels_follow_the_road(clouds):
+    rows = {name: drawn(cloud, name) for name, cloud in clouds.items()}
+    assert 60 <= rows["Cessna 172S"]["z_m"] <= 300 and 30 <= rows["Weather balloon"]["z_m"] <= 500
+    assert np.isnan(rows["Weather balloon"]["rate_hz"]) and 35 <= rows["Cessna 172S"]["rate_hz"] <= 45
+    for name, cloud in clouds.items():
+        assert np.isfinite(positions(cloud, rows[name] | {"model": 0}, np.linspace(0, 1, 5))).all()
+    row, bus = rows["City bus"], np.hypot(rows["City bus"]["vx_mps"], rows["City bus"]["vy_mps"])
+    assert row["rate_hz"] == pytest.approx(bus / (np.pi * 0.96))
+    # The walker keeps its pace under `free`, the bicycle's wheels cannot.
+    speed = np.hypot(rows["Road cyclist"]["vx_mps"], rows["Road cyclist"]["vy_mps"])
+    assert rows["Road cyclist"]["playback"] == pytest.approx(speed / 6.0) and rows["Labrador"]["playback"] == 1
+
+
+def test_a_rolling_wheel_touches_the_ground_without_slip():
+    frames = 4800
+    track, names, ahead = cyclist.cycle_m(1.78, frames)
+    assert ahead == pytest.approx(3 * np.pi * 0.678)
+    rim = track[:, names.index("rear rim 1")]
+    velocity = (np.roll(rim, -1, 0) - np.roll(rim, 1, 0)) * frames / 2 + [0, ahead, 0]
+    low = rim[:, 2].argmin()
+    assert rim[low, 2] == pytest.approx(0, abs=1e-6)
+    assert np.abs(velocity[low]).max() < 0.01 * ahead
+    assert velocity[rim[:, 2].argmax(), 1] == pytest.approx(2 * ahead, rel=1e-4)
+
+
+def test_bones_keep_their_lengths_and_cycles_close(clouds):
+    for name, pairs in {
+        "Road cyclist": [("hip", "knee", 0.245 * 1.78), ("knee", "ankle", 0.285 * 1.78)],
+        "Labrador": [("fore shoulder", "fore elbow", 0.36 * 0.57), ("hind knee", "hind hock", 0.44 * 0.57)],
+    }.items():
+        cloud = clouds[name]
+        for one, other, length in pairs:
+            for side in ("left", "right"):
+                ends = [cloud.track[:, cloud.names.index(f"{side} {word}")] for word in (one, other)]
+                flat = (ends[0] - ends[1])[:, 1:]
+                assert np.allclose(np.sqrt((flat**2).sum(1)), length, rtol=1e-9)
+        steps = portable.norm(np.diff(np.concatenate([cloud.track, cloud.track[:1]]), axis=0))
+        assert steps[-1].max() <= 1.05 * steps[:-1].max()
+        assert bones(cloud.names)
+
+
+def test_a_dog_trots_with_diagonal_legs_together_and_still_feet():
+    height, mass, speed = 0.57, 30, 2.2
+    track, names, duration, stride = quadruped.cycle_m(height, mass, speed, 1000)
+    assert stride == pytest.approx(speed * duration)
+    paws = {
+        name: track[:, names.index(f"{name} paw")] for name in ("left fore", "right hind", "right fore", "left hind")
+    }
+    lift = {name: paw[:, 2] - paw[:, 2].min() for name, paw in paws.items()}
+    assert np.allclose(lift["left fore"], lift["right hind"]) and np.allclose(lift["right fore"], lift["left hind"])
+    assert np.allclose(lift["left fore"], np.roll(lift["right fore"], 500))
+    down = lift["left fore"] == 0
+    assert down.mean() == pytest.approx(quadruped.STANCE, abs=0.003)
+    moves = np.diff(paws["left fore"][:, 1]) * 1000 / duration + speed
+    assert np.abs(moves[down[1:] & down[:-1]]).max() < 1e-9
+    fastest = 5.5 * mass**0.24 / 3.6
+    assert quadruped.stride_hz(mass, fastest) == pytest.approx(269 / 60 * mass**-0.14)
+    with pytest.raises(InputError, match=r"quadruped of 0.2 m at 3.0 m/s: limb: ends are"):
+        quadruped.cycle_m(0.2, 30, 3.0, 8)
+
+
+def test_a_joint_lies_at_both_lengths_on_the_side_asked_for():
+    ends = np.array([[0.0, 0.1, 0.0], [0.0, -0.3, 0.2]])
+    start = np.array([[0.0, 0.0, 1.0]] * 2)
+    for bend in (1, -1):
+        found = joint(start, ends, 0.6, 0.7, bend)
+        assert np.allclose(portable.norm(found - start), 0.6) and np.allclose(portable.norm(found - ends), 0.7)
+        assert (np.sign(found[:, 1] - (start + ends)[:, 1] / 2) == bend).all()
+    with pytest.raises(InputError, match=r"expected what bones of 0\.3 and 0\.3 m reach"):
+        joint(start, ends, 0.3, 0.3, 1)
+    assert np.allclose(circle(np.array([0.0, 0.25]), 2.0), [[0, 0, 2], [0, 2, 0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "message"),
+    [
+        ("Cessna 172S", {"size_is": "motor diagonal"}, "expected 'wing span' with model plane"),
+        ("Cessna 172S", {"row": {"category": "Fixed-wing", "n_rotors_or_wings": 2}}, "expected n_rotors_or_wings 1"),
+        ("Yuneec H520", {"size_is": "wing span"}, "with model radial"),
+        ("Labrador", {"mass_kg": 500}, "mass_kg is 500, expected a number from 2 to 120"),
+        ("Road cyclist", {"mass_kg": 30}, "expected it with trot alone"),
+        ("Road cyclist", {"gait": "walk", "speed_mps": 9.0}, "speed_mps is 9.0, expected 6 m/s or less of a person"),
+    ],
+)
+def test_records_that_make_no_such_target_are_refused(tmp_path, name, change, message):
+    import yaml
+
+    record = yaml.safe_load((ROOT / "config/targets/more.yaml").read_text())[name]
+    record["row"] |= change.get("row", {})
+    (tmp_path / "wrong.yaml").write_text(yaml.safe_dump({name: record | {**change, "row": record["row"]}}))
+    with pytest.raises(InputError, match=message):
+        records_of({**CONFIG["targets"], "own": {"wrong": str(tmp_path / "wrong.yaml")}})
