@@ -128,8 +128,8 @@ def stance_speed_mps(
 
 
 KEYS = record_schema.keys("gait")
-"""Keys that a gait record has in addition to those of every record; `person` says in words who walks. `stature_m` of a dog is
-its height at the withers; `mass_kg` is a dog's alone."""
+"""Keys that a gait record has in addition to those of every record; `person` says in words who walks. `stature_m` of a
+dog is its height at the withers; `mass_kg` is a dog's alone."""
 
 _RANGES = {"speed_mps": (0.05, 15.0), "stature_m": (0.15, 2.6), "rate_hz": (20, 10_000), "mass_kg": (2, 120)}
 

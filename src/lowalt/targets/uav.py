@@ -13,7 +13,7 @@ from lowalt.targets.surfaces import box, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
 DIAGONALS = ("motor diagonal", "span over ducts", "span over rotors")
-"""Meanings of a multirotor's published size: largest distance between motor axes, or that over the ducts or blade tips."""
+"""Meanings of a multirotor's published size: largest distance between motor axes, over the ducts or over blade tips."""
 SIZES = (*DIAGONALS, *dict.fromkeys(aircraft.SIZES.values()))
 """Meanings of the published size of all craft."""
 

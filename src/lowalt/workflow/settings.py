@@ -97,7 +97,7 @@ class Settings:
         return self._text("cost_table", **blocks, published=self._published)
 
     def cost_pixels(self, wildcards: Any) -> str:
-        """Settings with which the echo is timed, the rows of the table of targets, and the images whose pixels are compared."""
+        """Settings with which the echo is timed, rows of the table of targets, and the images that are compared."""
         blocks = self._blocks("network", "motion", "spectra", "images", "seed", "cost")
         return self._text("cost_pixels", **blocks, published=self._published)
 
