@@ -30,6 +30,16 @@ COLUMNS = ("trial", "kind", "moment_s", "running", "outcome", "said", "identical
 SMALL_MB, LARGE_MB = 3, 60
 
 
+def room_mb(written_mb: float, share: float) -> float:
+    """Return the room of a disk (MB) that a run of `written_mb` fills: from SMALL_MB to LARGE_MB, evenly in logarithm.
+
+    share: where between the two, in [0, 1). A run that writes less than the largest disk holds gets smaller ones.
+    """
+    largest = min(LARGE_MB, 0.8 * written_mb)
+    smallest = min(SMALL_MB, largest / 2)
+    return smallest * (largest / smallest) ** share
+
+
 def killed(trial: Trial, kinds: Iterator[str], length_s: float, left: int, choose: random.Random) -> list[dict]:
     """Disturb a run until it has finished or `left` disturbances are done; return a row for each."""
     rows = []
@@ -85,12 +95,13 @@ def campaign(options: argparse.Namespace, work: Path) -> Iterator[dict]:
         if status:
             raise InputError(f"the undisturbed run ended with {ended(status)}:\n{trial.said[-3000:]}")
         length_s, expected, done, number = time.monotonic() - begun, trial.whole(), 0, 0
+        written_mb = trial.written_mb()
         print(f"undisturbed: {length_s:.0f} s, {len(expected)} files", file=sys.stderr, flush=True)
         for _ in range(options.disks):
             number += 1
             folder = work / f"disk-{number}"
             folder.mkdir()
-            megabytes = SMALL_MB * (LARGE_MB / SMALL_MB) ** choose.random()
+            megabytes = room_mb(written_mb, choose.random())
             with _small_disk(folder):
                 trial = Trial(project, folder, options, None)
                 room = shutil.disk_usage(folder).used + int(1e6 * megabytes)

@@ -90,6 +90,11 @@ class Trial:
         """Checksums of the finished run."""
         return checksums(self.folder / "results" / self.name())
 
+    def written_mb(self) -> float:
+        """Size of all files of the finished run (MB)."""
+        files = (path for path in (self.folder / "results" / self.name()).rglob("*") if path.is_file())
+        return sum(path.stat().st_size for path in files) / 1e6
+
     def remarks(self) -> str:
         """Return the part of a disturbed run's output that must not be there, or "clear"."""
         return "; ".join(text for text in LOUD if text in self.said) or "clear"

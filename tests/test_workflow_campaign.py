@@ -1,0 +1,61 @@
+"""The campaign's own logic: disks that a run really fills, and files that two runs must share to the byte."""
+
+import random
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.workflow.campaign import LARGE_MB, SMALL_MB, room_mb
+from lowalt.workflow.disturb import disturb, workers
+from lowalt.workflow.trial import checksums
+
+
+@pytest.mark.parametrize("written_mb", [0.5, 5, 40, 5000])
+def test_every_disk_is_too_small_for_the_run_and_holds_something(written_mb):
+    rooms = [room_mb(written_mb, share / 100) for share in range(100)]
+    assert rooms == sorted(rooms) and rooms[0] > 0 and rooms[-1] < written_mb
+    assert max(rooms) <= LARGE_MB
+    if written_mb == 5000:
+        assert rooms[0] == SMALL_MB and rooms[-1] > 0.9 * LARGE_MB
+
+
+def test_files_that_hold_times_are_not_compared_and_all_others_are(tmp_path):
+    names = ["clouds/crow.npz", "logs/a.log", "benchmarks/echo/a.jsonl", "predictions/seen/a/0.csv"]
+    names += ["predictions/seen/a/0.json", "stages.csv", "shards/index.json", "models/seen/a/0/run.json"]
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(name)
+    found = checksums(tmp_path)
+    assert set(found) == {"clouds/crow.npz", "predictions/seen/a/0.csv", "shards/index.json"}
+    (tmp_path / names[0]).write_text("x")
+    assert checksums(tmp_path)[names[0]] != found[names[0]]
+
+
+def test_a_killed_worker_is_one_that_computes_and_no_process_of_another_run(tmp_path):
+    """A shell that waits for a stage stands for Snakemake; a second one is none of its business."""
+    (tmp_path / "lowalt").mkdir()
+    (tmp_path / "lowalt/__init__.py").write_text("")
+    (tmp_path / "lowalt/echo.py").write_text("import time; time.sleep(60)")
+    command = ["bash", "-c", f"{sys.executable} -m lowalt.echo; true"]
+    runs = [psutil.Popen(command, cwd=tmp_path, start_new_session=True, stderr=subprocess.DEVNULL) for _ in range(2)]
+    try:
+        stop = time.monotonic() + 60
+        while not all(workers(run) for run in runs) and time.monotonic() < stop:
+            time.sleep(0.02)
+        (other,) = workers(runs[1])
+        assert disturb("worker", runs[0], random.Random(0), None) == "echo"
+        assert runs[0].wait(60) == 0 and other.is_running()
+        with pytest.raises(InputError, match="'flood'"):
+            disturb("flood", runs[1], random.Random(0), None)
+        assert disturb("all", runs[1], random.Random(0), None) == "echo"
+        assert runs[1].wait(60) == -signal.SIGKILL and not workers(runs[1])
+    finally:
+        for run in runs:
+            for process in [*workers(run), run]:
+                if process.is_running():
+                    process.kill()
