@@ -1,0 +1,74 @@
+"""The container's definition holds all that a run reads, and installs what it needs: shown without a container engine.
+
+Instructions and copied files are read from envs/Dockerfile; a dry run stands on those files alone.
+"""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+KNOWN = {"FROM", "RUN", "WORKDIR", "COPY", "ENTRYPOINT", "CMD", "ENV", "LABEL"}
+
+
+def instructions() -> list[tuple[str, str]]:
+    """Instruction and rest of every line of the Dockerfile that is neither empty nor a comment."""
+    text = (ROOT / "envs/Dockerfile").read_text().replace("\\\n", " ")
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    return [tuple(line.split(maxsplit=1)) for line in lines]
+
+
+def copied(folder: Path) -> Path:
+    """The working directory of the container as its COPY lines make it."""
+    for name, rest in instructions():
+        if name == "COPY":
+            *sources, target = rest.split()
+            for source in sources:
+                place = folder / target / (source if target == "./" else "")
+                place.parent.mkdir(parents=True, exist_ok=True)
+                ignored = shutil.ignore_patterns("__pycache__", "*.egg-info")
+                if (ROOT / source).is_dir():
+                    shutil.copytree(ROOT / source, folder / target, ignore=ignored)
+                else:
+                    shutil.copy(ROOT / source, place)
+    return folder
+
+
+def test_instructions_are_known_and_begin_with_a_python_that_the_package_allows():
+    found = instructions()
+    assert {name for name, _ in found} <= KNOWN and found[0][0] == "FROM"
+    version = re.fullmatch(r"python:3\.(\d+)-slim", found[0][1])
+    asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
+    assert int(version[1]) >= int(asked.removeprefix(">=3."))
+
+
+def test_run_lines_are_shell_and_install_extras_that_exist_from_files_copied_before():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    there: set[str] = set()
+    for name, rest in instructions():
+        if name == "COPY":
+            there |= set(rest.split()[:-1])
+        if name == "RUN":
+            subprocess.run(["bash", "-n", "-c", rest], check=True)
+            words = shlex.split(rest)
+            if "pip" in words:
+                asked = re.fullmatch(r"\.\[(.*)\]", words[-1])[1].split(",")
+                assert {"workflow", "recognition"} <= set(asked) <= set(extras)
+                assert {"pyproject.toml", "src", "envs"} <= there
+
+
+@pytest.mark.workflow
+def test_a_run_can_be_planned_from_what_the_container_holds(tmp_path):
+    folder = copied(tmp_path / "lowalt")
+    environment = os.environ | {"PYTHONPATH": str(folder / "src")}
+    command = [sys.executable, "-m", "snakemake", "-n", "--cores", "all"]
+    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, (run.stdout + run.stderr)[-3000:]
+    assert "train" in run.stdout + run.stderr
