@@ -199,13 +199,28 @@ class Chain:
         )  # fmt: skip
 
     def _samples(self, view: View, on: frozenset[str], factor: np.ndarray | float, rows) -> np.ndarray:
-        """Time samples (N, M) of the target's echo, with its motion inside a symbol and its cut by the cyclic prefix.
+        """Time samples (N, M) of the target's echo, with its motion inside a symbol and its cut by the prefix."""
+        if "symbol_motion" not in on:
+            still = np.zeros(1), np.ones((1, view.network.subcarriers))
+            return self._summed(view, on, factor, rows, still)
+        moving = self.by_need["symbol_motion"].module
+        samples = self._summed(view, on, factor, rows, moving.instants(view, self.error))
+        bent = np.flatnonzero(moving.bent(view))
+        if len(bent):
+            part = view.at(view.times_s[bent])
+            own = factor if np.ndim(factor) == 0 else np.broadcast_to(factor, (len(samples), factor.shape[1]))[bent]
+            numbers = np.arange(len(self.view.times_s))[rows][bent]
+            samples[bent] = self._summed(part, on, own, numbers, moving.every_sample(part))
+        return samples
 
-        Points are summed in groups that lose equally many samples, and instants of a symbol are interpolated.
+    def _summed(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows, times: tuple[np.ndarray, np.ndarray]
+    ) -> np.ndarray:
+        """Time samples (N, M) of the target's echo from its response at instants of a symbol.
+
+        times: the instants (Q,) s and their interpolation weights (Q, M). Points are summed in groups that lose equally many samples.
         """
-        delays, weights = np.zeros(1), np.ones((1, view.network.subcarriers))
-        if "symbol_motion" in on:
-            delays, weights = self.by_need["symbol_motion"].module.instants(view, self.error)
+        delays, weights = times
         groups: list[tuple[int, np.ndarray | float]] = [(0, factor)]
         if "cyclic_prefix" in on:
             cut = self.by_need["cyclic_prefix"]

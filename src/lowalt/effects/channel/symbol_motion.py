@@ -1,7 +1,7 @@
 """Motion inside a symbol: points move while an OFDM symbol lasts, so their subcarriers leak into each other.
 
 A symbol is interpolated between a few instants. A recording is linear between its frames; a symbol in which a frame
-begins is interpolated as if the motion were smooth there.
+begins has a bend there, which no interpolation follows, and is computed at each of its samples.
 """
 
 import numpy as np
@@ -54,6 +54,21 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
         return np.nan_to_num(louder * ((1.0 + stretch) * (phase + edge) + stretch), nan=np.inf)
 
 
+def bent(view: View) -> np.ndarray:
+    """Return whether a recording's frame begins within each symbol, (N,) bool; never for other targets."""
+    if not view.nodes:
+        return np.zeros(len(view.times_s), np.bool_)
+    ends = view.times_s[:, None] + [0.0, duration_s(view)]
+    place = (view.row["start_s"] + view.row["playback"] * ends) * view.cloud.record["track_rate_hz"]
+    return np.floor(place[:, 0]) != np.floor(place[:, 1])
+
+
+def every_sample(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Return a symbol's own samples as instants (M,) s, with their weights (M, M)."""
+    samples = view.network.subcarriers
+    return np.arange(samples) * (duration_s(view) / samples), np.eye(samples)
+
+
 def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
     """Return instants (Q,) s within a symbol and their interpolation weights (Q, M) at its M samples.
 
@@ -80,6 +95,6 @@ def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
         need = 1.0 + (np.log(4.0 * np.sqrt(samples) / (error * (rho - 1.0))) + largest) / np.log(rho)
         count = min(count, max(int(np.ceil(need)), 1))
     if count >= samples:
-        return np.arange(samples) * (2 * half / samples), np.eye(samples)
+        return every_sample(view)
     weights = interpolation.weights(count, 2.0 * np.arange(samples) / samples - 1.0)
     return half * (interpolation.points(count) + 1.0), weights.T

@@ -1,0 +1,56 @@
+"""A recording's frame that begins inside a symbol, against a sum over every time sample."""
+
+import numpy as np
+import pytest
+
+from lowalt.common.network import Network
+from lowalt.effects import waveform
+from lowalt.effects.channel import symbol_motion
+from lowalt.effects.received import observe, received_signal
+from lowalt.effects.response import response
+from lowalt.targets.cloud import Cloud
+from test_effects_bounds import network, scene, target
+
+NODES = np.array([[0.0, 0, 0], [0.2, 0, 0.3], [-0.1, 0.2, 0.8]])
+
+
+def recorded(frames_hz: float, symbols: int = 4) -> tuple[Network, Cloud, dict]:
+    """A recording of four frames that jump to and fro, and a radar with long symbols."""
+    radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=symbols, symbol_interval_s=1e-4)
+    _, row = target(NODES, x_m=60.0)
+    rng = np.random.default_rng(5)
+    empty = np.full((3, 3), np.nan)
+    cloud = Cloud(
+        points=NODES, part=np.arange(3), kinds=("node",) * 3, names=("a", "b", "c"), parents=np.full(3, -1),
+        hinges=empty, axes=empty, normals=empty, rcs_m2=np.ones(3), track=NODES + 0.01 * rng.normal(size=(4, 3, 3)),
+        record={"subtype": "Thing", "category": "Pedestrian", "source": "", "checksum": "", "track_rate_hz": frames_hz},
+    )  # fmt: skip
+    return radio, cloud, row | {"playback": 1.0, "start_s": 0.3e-4, "category": "Pedestrian"}
+
+
+@pytest.mark.parametrize("tolerance", [None, 1e-3])
+@pytest.mark.parametrize("frames_hz", [9e3, 40e3, 700.0])
+def test_a_frame_may_begin_inside_a_symbol(frames_hz, tolerance):
+    radio, cloud, row = recorded(frames_hz)
+    station, asked = radio.stations[0], scene(radio, {"symbol_motion": {}}, tolerance)
+    heard, view = received_signal(asked, station, cloud, row), observe(asked, station, cloud, row)
+    sent = waveform.sent(asked.stream("waveform", row, "A"), radio.symbols, radio.subcarriers)
+    samples = np.empty((radio.symbols, radio.subcarriers), complex)
+    for i in range(radio.subcarriers):
+        later = view.at(view.times_s + i / (radio.subcarriers * radio.subcarrier_spacing_hz))
+        whole = waveform.transmit(response(radio, station, later.places, cloud.rcs_m2, view.aim_m), sent)
+        samples[:, i] = whole[:, i]
+    cells = np.fft.ifft(waveform.demodulate(samples, sent), axis=1)
+    truth = cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
+    assert abs(heard.signal - truth).max() <= (tolerance or 1e-10) * abs(truth).max()
+
+
+def test_only_symbols_in_which_a_frame_begins_are_bent():
+    radio, cloud, row = recorded(9e3, symbols=40)
+    view = observe(scene(radio, {}), radio.stations[0], cloud, row)
+    fine = row["start_s"] + view.times_s[:, None] + np.linspace(0, 1 / 15e3, 2001)
+    frames = np.floor(fine * 9e3)
+    assert (symbol_motion.bent(view) == (frames[:, -1] != frames[:, 0])).all()
+    assert 0 < symbol_motion.bent(view).sum() < 40
+    still, plain = target(NODES, x_m=60.0)
+    assert not symbol_motion.bent(observe(scene(radio, {}), radio.stations[0], still, plain)).any()
