@@ -31,6 +31,9 @@ class Station:
     position_m: tuple[float, float, float]
     normal_rad: float
     frequency_hz: float
+    transmitter: "Station | None" = None
+    receiver: "Station | None" = None
+    """The two stations of a link, which has the receiver's place and the transmitter's frequency; else None."""
 
     @property
     def horizontal(self) -> np.ndarray:
@@ -39,12 +42,26 @@ class Station:
         return np.array([-sine, cosine, 0.0])
 
 
+def _link(name: str, place: dict, known: dict[str, Station]) -> Station:
+    """The station `place["receive"]` as the receiver of what `place["transmit"]` sends."""
+    ends = [place["transmit"], place["receive"]]
+    if not set(ends) <= set(known) or ends[0] == ends[1]:
+        raise InputError(f"network: stations.{name}: from {ends[0]!r} to {ends[1]!r}, expected two of {sorted(known)}")
+    sends, hears = (known[end] for end in ends)
+    return Station(name, hears.position_m, hears.normal_rad, sends.frequency_hz, sends, hears)
+
+
 def station_names(block: dict) -> list[str]:
     """Return the names of the stations of a `network` block in their one order, the alphabetical one.
 
     Settings travel as JSON with sorted keys, so no other order would reach every stage.
     """
     return sorted(block["stations"])
+
+
+def masts_m(block: dict) -> list[list[float]]:
+    """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have none."""
+    return [place["position_m"][:2] for place in block["stations"].values() if "position_m" in place]
 
 
 @dataclass(frozen=True)
@@ -83,6 +100,7 @@ class Network:
         """Build the network from the configuration's `network` block.
 
         Sub-bands follow each other in the alphabetical order of the stations: f_{k+1} = f_k + (M - 1 + guard) df.
+        A link {transmit, receive} between two stations has the sub-band of the one that sends.
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         keys = {
@@ -93,13 +111,17 @@ class Network:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
         step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
         stations = []
-        for index, name in enumerate(station_names(block)):
+        names = station_names(block)
+        for index, name in enumerate(name for name in names if "transmit" not in block["stations"][name]):
             place = block["stations"][name]
             position = tuple(float(value) for value in place["position_m"])
             if len(position) != 3 or not all(map(math.isfinite, position)):
                 raise InputError(f"network: stations.{name}.position_m is {position}, expected three finite metres")
             normal = math.radians(place["normal_deg"])
             stations.append(Station(name, position, normal, block["carrier_hz"] + index * step))
+        known = {station.name: station for station in stations}
+        stations += [_link(name, block["stations"][name], known) for name in names if name not in known]
+        stations.sort(key=lambda station: station.name)
         return cls(
             carrier_hz=block["carrier_hz"],
             subcarrier_spacing_hz=block["subcarrier_spacing_hz"],

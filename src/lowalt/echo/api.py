@@ -163,6 +163,11 @@ def _check_tolerance(tolerance, sample: str) -> None:
 
 def _prepare(network, station, motion, rcs_m2, aim_m, paths, sample):
     """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines, paths)."""
+    if station.transmitter is not None:
+        raise InputError(
+            f"{_named(sample)}station {station.name} is a link between two stations, expected a station that hears "
+            "itself; scenes with effects.direct_path have links"
+        )
     scene = check(network, station, motion, rcs_m2, aim_m, sample)
     radio = radar(network, station)
     refs = reference(scene.translation[:, scene.part[0] if len(scene.part) else 0], radio)

@@ -34,9 +34,11 @@ LISTED = (
     "channel/symbol_motion",
     "channel/cyclic_prefix",
     "channel/companions",
+    "channel/direct_path",
     "channel/clutter",
     "receiver/receiver_noise",
     "receiver/cell_noise",
+    "receiver/link_offset",
     "receiver/timing_offset",
     "receiver/clock_offset",
     "receiver/carrier_offset",
@@ -73,6 +75,10 @@ BY_NEED = ("squint", "wavefront", "symbol_motion", "cyclic_prefix")
 
 ONE_OSCILLATOR = ("clock_offset", "carrier_offset")
 """Effects that draw the same error of one oscillator, and so share a stream."""
+
+
+LOOK_WIDE = ("link_offset",)
+"""Effects past the motion whose draws are the same for all stations of a look."""
 
 
 class NamedEffect(NamedTuple):

@@ -7,7 +7,7 @@ from lowalt.common.network import Network
 from lowalt.effects.catalogue import called, providing
 from lowalt.effects.interface import Checks
 
-STILL = ("clutter", "transmit_leakage")
+STILL = ("clutter", "transmit_leakage", "direct_path")
 """Effects that add something that stands still."""
 
 
@@ -33,6 +33,11 @@ def check(config: dict) -> CheckedScene:
         {effect.name: effect.settings for effect in effects},
         tuple(float(snr) for snr in config["noise"]["snr_db"]),
     )
+    links = [station.name for station in scene.network.stations if station.transmitter is not None]
+    if links and "direct_path" not in config["effects"]:
+        raise InputError(
+            f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
+        )
     noisy = [snr for snr in scene.snr_db if snr != float("inf")]
     if "receiver_noise" in scene.effects and noisy:
         raise InputError(

@@ -3,6 +3,7 @@
 The costs are measured when the command runs, on one motion model of each category of the scene, at its first station.
 """
 
+import math
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,15 +12,16 @@ import numpy as np
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.hardware import describe
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.common.network import SPEED_OF_LIGHT, Network, masts_m
 from lowalt.common.streams import stream
 from lowalt.common.timing import median_s
 from lowalt.echo import echo_signal, method_text
 from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
-from lowalt.effects.levels import levels, table
+from lowalt.effects.levels import dbm, levels, table
 from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
+from lowalt.effects.view import View
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
@@ -53,7 +55,7 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
         for name, record in records.items():
             firsts.setdefault(record["published"]["category"], (name, 0))
         named = list(firsts.values())
-    masts = np.array([place["position_m"][:2] for place in config["network"]["stations"].values()], dtype=float)
+    masts = np.array(masts_m(config["network"]), dtype=float)
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
     result = []
     for name, model in named:
@@ -94,6 +96,8 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
     station = scene.network.station(station_name)
     cloud = with_cross_sections(scene, sample.cloud)
     view = observe(scene, station, cloud, sample.row, sample.occluders)
+    if station.transmitter is not None:
+        return link_lines(scene, view, sample)
     own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, scene.tolerance)
     received = received_signal(scene, station, sample.cloud, sample.row, sample.occluders)
     range_m = np.linalg.norm(view.aim_m - np.asarray(station.position_m))
@@ -112,6 +116,21 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
         f"  against the target's echo alone: rms change {moved:.2g}, other range cell in {other:.1%} of symbols"
     )
     return lines
+
+
+def link_lines(scene: Scene, view: View, sample: Sample) -> list[str]:
+    """Return lines on one sample of a link between two stations: geometry, Doppler factor, level of the echo."""
+    station = view.station
+    ends = [np.asarray(one.position_m) - view.aim_m for one in (station.transmitter, station)]
+    out, back = (float(np.linalg.norm(one)) for one in ends)
+    angle = math.acos(float(np.clip(ends[0] @ ends[1] / (out * back), -1.0, 1.0)))
+    power = received_signal(scene, station, sample.cloud, sample.row, sample.occluders).power
+    return [
+        f"{sample.row['subtype']}, model {sample.row['model']}, link {station.name}: {out:.0f} m and {back:.0f} m",
+        f"  bistatic angle {math.degrees(angle):.0f} degrees: Doppler is {math.cos(angle / 2):.2f} of 2 v / lambda "
+        "along the bisector; all physics named is computed",
+        f"  echo of this sample, mean |Y_bin|^2: {dbm(power):.1f} dBm",
+    ]
 
 
 def prefix_line(scene: Scene, range_m: float) -> str:

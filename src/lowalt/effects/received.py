@@ -17,7 +17,7 @@ from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need
-from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
+from lowalt.effects.catalogue import BY_NEED, LOOK_WIDE, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
 from lowalt.effects.interface import (
     AddsEchoes,
@@ -94,15 +94,17 @@ def received_signal(
     share = scene.tolerance if scene.tolerance is None or not asked else 0.5 * scene.tolerance
     cloud = with_cross_sections(scene, cloud)
     view = observe(scene, station, cloud, row, occluders)
-    if not beyond:
+    link = station.transmitter is not None
+    if not beyond and not link:
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
         return Received(own.signal, own.cell, arriving(own.signal), [])
-    chain = Chain(beyond, view, lambda name: scene.stream(name, row, station.name))
-    exact = share is None or math.isinf(chain.amplification)
+    chain = Chain(beyond, view, partial(_drawn, scene, row, station.name))
+    # Bounds and the engine are those of a station that receives its own signal.
+    exact = share is None or math.isinf(chain.amplification) or link
     weighed = bool(providing(beyond, WeighsPoints)) or view.beams is not None
     own = None
     # The engine is asked only where the chain does not compute the same echo anyway.
-    if not exact or (chain.bent and not weighed):
+    if not link and (not exact or (chain.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     chain.others = others(scene, chain, cloud, row, clouds or {})
@@ -165,7 +167,7 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
 
 
 def _drawn(scene: Scene, row: dict, station: str, name: str) -> np.random.Generator:
-    return scene.stream(name, row, station)
+    return scene.stream(name, row) if name in LOOK_WIDE else scene.stream(name, row, station)
 
 
 def largest_of(outcome: Outcome) -> float:

@@ -50,22 +50,28 @@ def response(
     and come back by any; factor: real factor on every point's two-way amplitude, (N, L); squint: the arrays' phases
     follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves; error:
     largest error of interpolation and truncation together, relative to the sum of peak amplitudes.
-    Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion.
+    A link goes out by its transmitter's array and comes back by its receiver's; it has no other paths.
+    Raises: InputError for a point in the station, or a link with other paths. Source: paper Eqs. 4, 7 and 24;
+    Jacobi-Anger expansion; Willis, Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
     radio = radar(network, station)
-    refs = reference(places[:, 0], radio)
-    aims = aim_cosines(np.asarray(aim_m, np.float64), radio.station, radio.sine, radio.cosine)
-    shared = network, station.name, radio, refs, places[:, 0], aims
-    chosen = [_PathFactors(*shared, path) for path in (ImagePath(places), *paths)]
+    if station.transmitter is not None and paths:
+        raise InputError(f"station {station.name}: {len(paths)} further paths, expected none on a link between two")
+    seen = [ImagePath(places), *paths]
+    chosen, refs = _end(network, station, seen, aim_m)
+    sending = chosen
+    if station.transmitter is not None:
+        sending, _ = _end(network, station.transmitter, seen, aim_m)
+        refs = _one_way(network, station, places[:, 0]) + _one_way(network, station.transmitter, places[:, 0])
     strength = np.atleast_2d(radio.scale * np.sqrt(rcs_m2) * factor)
-    symmetric = network.transmit == network.receive
+    symmetric = network.transmit == network.receive and station.transmitter is None
     pairs = _pairs(len(chosen), symmetric)
     own = np.exp(-2j * np.pi * refs[:, 4])
     # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
     # table. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
     kappas, weights = _frequencies(network, radio, squint, error / 2)
     rest = 10.0 ** np.floor(np.log10(error / 10))
-    out = [path.one_way(network.transmit, kappas, squint, wavefront, rest) for path in chosen]
+    out = [path.one_way(network.transmit, kappas, squint, wavefront, rest) for path in sending]
     back = out if symmetric else [path.one_way(network.receive, kappas, squint, wavefront, rest) for path in chosen]
     widest = max(float(abs(excess).max()) for _, excess in (*out, *back))
     reach = _round_up(radio.cells * widest)
@@ -79,6 +85,22 @@ def response(
     result = np.empty((len(places), radio.subcarriers), np.complex128)
     response_loops.spread(sums, own, refs[:, 5].astype(np.int64), refs[:, 6].copy(), table, weights, result)
     return result
+
+
+def _end(network: Network, station: Station, paths: Sequence[ImagePath], aim_m: np.ndarray) -> tuple[list, np.ndarray]:
+    """The paths as one station's arrays see them, and the ranges of the first path's first point from it."""
+    radio = radar(network, station)
+    origin = paths[0].places[:, 0]
+    refs = reference(origin, radio)
+    aims = aim_cosines(np.asarray(aim_m, np.float64), radio.station, radio.sine, radio.cosine)
+    return [_PathFactors(network, station.name, radio, refs, origin, aims, path) for path in paths], refs
+
+
+def _one_way(network: Network, station: Station, origin: np.ndarray) -> np.ndarray:
+    """Reference ranges with the turns and range cells of one way. Halves of doubles are exact, and so are these."""
+    radio = radar(network, station)
+    halves = {name: 0.5 * getattr(radio, name) for name in ("turns", "turns_lo", "cells", "cells_lo")}
+    return reference(origin, radio._replace(**halves))
 
 
 class _PathFactors:

@@ -129,9 +129,10 @@ class View:
         return (np.linalg.norm(self.middles - self.middles[:, :1], axis=2) + self.radii).max(axis=1)
 
     def nearest_m(self) -> np.ndarray:
-        """Return a lower bound (N, P) of the range of any point of each part (m)."""
-        centre = np.linalg.norm(self.middles - np.asarray(self.station.position_m), axis=2)
-        return np.maximum(centre - self.radii, 0.0)
+        """Return a lower bound (N, P) of the range of any point of each part (m), on a link from the nearer end."""
+        ends = [end for end in (self.station, self.station.transmitter) if end is not None]
+        centres = [np.linalg.norm(self.middles - np.asarray(end.position_m), axis=2) for end in ends]
+        return np.maximum(np.min(centres, axis=0) - self.radii, 0.0)
 
 
 def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturbation:

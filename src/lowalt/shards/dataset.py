@@ -15,6 +15,7 @@ import numpy as np
 
 from lowalt.common.classes import classes_of, label
 from lowalt.common.errors import InputError
+from lowalt.common.network import masts_m
 from lowalt.common.plan import GROUPS, Plan
 from lowalt.common.splits import FOLDS, fold
 from lowalt.common.streams import stream
@@ -93,8 +94,7 @@ class Dataset:
             wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
             clouds = made_clouds(wanted, config["seed"], Path(inputs) if inputs else None)
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
-        stations = config["network"]["stations"].values()
-        self._masts = np.array([place["position_m"][:2] for place in stations], float)
+        self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}

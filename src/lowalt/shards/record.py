@@ -12,7 +12,7 @@ from lowalt import __version__
 from lowalt.common.classes import CATEGORIES, label
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
-from lowalt.common.network import Network
+from lowalt.common.network import Network, Station
 from lowalt.common.portable import dot, norm
 from lowalt.common.streams import digest
 
@@ -55,22 +55,31 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
     """Return what each station sees of the target's reference point at the first symbol.
 
     range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis; radial_mps,
-    positive receding; NaN where the row has no place, as a measured target's. Source: paper, Eq. 4, written with
-    direction cosines.
+    positive receding; NaN where the row has no place, as a measured target's. A link has the means of both stations'
+    ranges and speeds, and the cosines of its receiver. Source: paper, Eq. 4, written with direction cosines.
     """
     result = {}
     for station in network.stations:
-        offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
-        distance = float(norm(offset))
-        towards = offset / distance if distance != 0 else np.zeros(3)
-        speed = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
-        result[station.name] = {
-            "range_m": distance,
-            "psi": float(dot(towards, station.horizontal)),
-            "omega": float(towards[2]),
-            "radial_mps": float(dot(towards, speed)),
-        }
+        seen = _seen(row, station)
+        if station.transmitter is not None:
+            sent = _seen(row, station.transmitter)
+            seen |= {name: 0.5 * (seen[name] + sent[name]) for name in ("range_m", "radial_mps")}
+        result[station.name] = seen
     return result
+
+
+def _seen(row: dict, station: Station) -> dict[str, float]:
+    """What one station's place and array see of the target's reference point."""
+    offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
+    distance = float(norm(offset))
+    towards = offset / distance if distance != 0 else np.zeros(3)
+    speed = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
+    return {
+        "range_m": distance,
+        "psi": float(dot(towards, station.horizontal)),
+        "omega": float(towards[2]),
+        "radial_mps": float(dot(towards, speed)),
+    }
 
 
 def record(

@@ -64,7 +64,7 @@ class Run:
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
         _check_sizes(config)
-        if config["effects"]:
+        if config["effects"] or any("transmit" in place for place in config["network"]["stations"].values()):
             from lowalt.effects.checks import check as check_effects
 
             check_effects(config)

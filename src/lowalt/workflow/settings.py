@@ -7,6 +7,7 @@ wildcards of a job and can stand in a rule's `params:`. A text is made once: Sna
 from typing import Any
 
 from lowalt.common.config import canonical
+from lowalt.common.network import masts_m
 from lowalt.effects.set_noise import in_all_cells
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -45,11 +46,11 @@ class Settings:
 
     def motion(self, wildcards: Any) -> str:
         """Data that motion models are drawn from: region, masts, and the published ranges of a group's subtypes."""
-        block, stations = self._config["motion"], self._config["network"]["stations"]
+        block = self._config["motion"]
         return self._text(
             "motion", wildcards.group,
             seed=self._config["seed"],
-            masts_m=[place["position_m"][:2] for place in stations.values()],
+            masts_m=masts_m(self._config["network"]),
             motion={key: block[key] for key in MOTION if key in block},
             published={
                 name: self._run.records[name]["published"] for name in self._run.plan.groups[wildcards.group]

@@ -23,5 +23,10 @@ def element(settings: dict) -> Element:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's two-way amplitude: the element's power gain in its direction."""
-    return gain(element(settings), view.station, view.places)
+    """Return the factor (N, L) on every point's two-way amplitude: the element's power gain in its direction.
+
+    On a link it is the geometric mean of both stations' gains.
+    """
+    own = gain(element(settings), view.station, view.places)
+    sends = view.station.transmitter
+    return own if sends is None else np.sqrt(own * gain(element(settings), sends, view.places))

@@ -70,9 +70,11 @@ def disciplined(settings: dict) -> tuple[tuple[float, float], ...]:
 
 
 def phase(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """Return the drawn phase (N, M) in rad at every sample's instant."""
+    """Return the drawn phase (N, M) in rad at every sample's instant; on a link that of two oscillators."""
     points = disciplined(settings)
     look = (*frame.sent.shape, frame.network.symbol_interval_s, frame.sample_s)
+    if frame.station.transmitter is not None:
+        return _oscillator.phase(points, look, None, rng) - _oscillator.phase(points, look, None, rng)
     return _oscillator.phase(points, look, frame.delay_s if settings["shared"] else None, rng)
 
 

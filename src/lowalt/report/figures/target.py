@@ -9,7 +9,7 @@ from PIL import Image
 
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.common.network import Network, masts_m
 from lowalt.common.streams import stream
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
@@ -73,7 +73,7 @@ def _marks(panel, cloud: Cloud, view: tuple[str, int, int], middle: np.ndarray, 
 
 def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
     """One motion model of the target, drawn as the motion stage draws them."""
-    masts = np.array([place["position_m"][:2] for place in config["network"]["stations"].values()])
+    masts = np.array(masts_m(config["network"]))
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
     row = draw(stream(seed, "show", cloud.subtype), cloud, cloud.record["published"], masts, corners, config["motion"])
     return {**row, "group": cloud.record.get("group", "seen"), "model": 0}

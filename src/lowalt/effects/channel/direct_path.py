@@ -1,0 +1,80 @@
+"""The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
+
+It stands still, at the delay of the masts' distance, and enters by both arrays' side lobes, since their beams point at
+the target. Stations that receive their own signal have none; their leakage is `transmit_leakage`. A scene with links
+names this effect, without loss or with it; everything physical that is not modelled between two stations is refused.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Station
+from lowalt.echo.pointwise.terms import aim_cosines
+from lowalt.echo.radar import radar
+from lowalt.effects.antenna import gain
+from lowalt.effects.checks import CheckedScene
+from lowalt.effects.view import View
+
+SOURCE = (
+    "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, Bistatic Radar, 2nd ed. "
+    "1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the bisector)"
+)
+DEFAULTS = {"loss_db": 0.0}
+
+MONOSTATIC = (
+    "cross_sections", "occlusion", "ground_reflection", "walls", "clutter", "cyclic_prefix", "line_of_sight",
+    "pointing_error", "transmit_leakage",
+)  # fmt: skip
+"""Effects that are modelled for a station that hears itself only."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the direct path is lost; links hear their target alone."""
+    return settings["loss_db"] is None
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a network without links, or effects that are not modelled between two stations."""
+    if all(station.transmitter is None for station in scene.network.stations):
+        raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
+    refused = sorted(set(MONOSTATIC) & set(scene.effects))
+    if scene.effects.get("fluctuation", {}).get("pattern"):
+        refused.append("fluctuation with pattern: true")
+    if refused:
+        raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
+
+
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the frequency response (N, M) of the direct path, zero for a station that receives its own signal.
+
+    Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P / elements) lambda /
+    (4 pi d) times both sums. Source: Friis 1946. Nothing is drawn.
+    """
+    network, hears, sends = view.network, view.station, view.station.transmitter
+    shape = len(view.times_s), network.subcarriers
+    if sends is None:
+        return np.zeros(shape, np.complex128)
+    away = np.asarray(hears.position_m) - np.asarray(sends.position_m)
+    distance = float(np.linalg.norm(away))
+    elements = np.prod(network.transmit) * np.prod(network.receive)
+    level = np.sqrt(network.power / elements) * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi * distance)
+    level *= _array(view, sends, network.transmit, hears) * _array(view, hears, network.receive, sends)
+    if view.element is not None:
+        ends = ((sends, hears), (hears, sends))
+        gains = [gain(view.element, one, np.asarray(other.position_m, float)) for one, other in ends]
+        level *= np.sqrt(np.prod(gains))
+    frequency = hears.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+    turned = np.exp(-2j * np.pi * frequency * (distance / SPEED_OF_LIGHT)) * level * 10 ** (-settings["loss_db"] / 20)
+    return np.broadcast_to(turned, shape).copy()
+
+
+def _array(view: View, station: Station, counts: tuple[int, int], other: Station) -> complex:
+    """Sum over a station's array, steered to the target, toward another station."""
+    radio = radar(view.network, station)
+    axes = radio.station, radio.sine, radio.cosine
+    toward = aim_cosines(np.asarray(other.position_m, np.float64), *axes)
+    steered = aim_cosines(np.asarray(view.aim_m, np.float64), *axes)
+    total = 1.0 + 0.0j
+    for count, seen, aimed in zip(counts, toward, steered, strict=True):
+        total *= np.exp(1j * np.pi * radio.kappa * np.arange(count) * (seen - aimed)).sum()
+    return total
