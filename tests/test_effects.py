@@ -252,6 +252,8 @@ def random_case(rng):
     )  # fmt: skip
     points = int(rng.choice([2, 3, 6, 20]))
     cloud, row = target(rng, points, 10 ** rng.uniform(-3, 0.3), wheel_hz=10 ** rng.uniform(-1, 2.3))
+    if rng.random() < 0.15:
+        cloud, row = recording_of(rng, cloud), row | {"start_s": rng.random(), "playback": 1.0}
     range_m, angle = 10 ** rng.uniform(0.9, 4), rng.uniform(-1.4, 1.4)
     row |= {
         "x_m": range_m * np.cos(angle),
@@ -267,8 +269,19 @@ def random_case(rng):
     return radio, cloud, row, effects, 10 ** rng.uniform(-4, -0.5)
 
 
+def recording_of(rng, cloud):
+    """The cloud's points as nodes of a recording of three frames, which may begin inside a symbol."""
+    count = len(cloud.points)
+    empty, names = np.full((count, 3), np.nan), tuple(f"node {index}" for index in range(count))
+    track = cloud.points + 10 ** rng.uniform(-4, -1) * rng.normal(size=(3, count, 3))
+    return replace(
+        cloud, part=np.arange(count), kinds=("node",) * count, names=names, parents=np.full(count, -1), hinges=empty,
+        axes=empty, track=track, record=cloud.record | {"track_rate_hz": 10 ** rng.uniform(0, 4)},
+    )  # fmt: skip
+
+
 def random_company(rng):
-    """Further effects for a random scene: a ground path, clutter and its canceller, and a linear receiver."""
+    """Further effects for a random scene: a ground path, clutter, a linear receiver, noise in all cells, detection."""
     static = {"kind": str(rng.choice(["mean", "pulse", "exponential"])), "order": int(rng.integers(1, 4)),
               "memory": rng.uniform(0.1, 0.99)}  # fmt: skip
     company = {
@@ -280,7 +293,11 @@ def random_company(rng):
         "iq_imbalance": {"gain_db": rng.uniform(0.0, 3.0), "phase_deg": rng.uniform(-10.0, 10.0)},
         "timing_offset": {"sigma_s": 1e-8}, "clock_offset": {"sigma_ppm": 10 ** rng.uniform(-3, 1)},
         "carrier_offset": {"sigma_ppm": 0.02}, "receiver_noise": {"noise_figure_db": rng.uniform(0.0, 9.0)},
+        "cell_noise": {"snr_db": rng.uniform(-10.0, 40.0)},
     }  # fmt: skip
+    if rng.random() < 0.2:
+        kind = str(rng.choice(["ca", "os", "none"]))
+        company["detector"] = {"cfar": kind, "training": 1, "guard": 0, "false_alarm": 0.1, "gate_cells": 1}
     kept = {name: values for name, values in company.items() if rng.random() < 0.4}
     return kept | ({"canceller": static} if "clutter" in kept and rng.random() < 0.7 else {})
 

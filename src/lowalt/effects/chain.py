@@ -218,7 +218,8 @@ class Chain:
     ) -> np.ndarray:
         """Time samples (N, M) of the target's echo from its response at instants of a symbol.
 
-        times: the instants (Q,) s and their interpolation weights (Q, M). Points are summed in groups that lose equally many samples.
+        times: the instants (Q,) s and their interpolation weights (Q, M). Points are summed in groups that lose equally
+        many samples.
         """
         delays, weights = times
         groups: list[tuple[int, np.ndarray | float]] = [(0, factor)]

@@ -102,6 +102,8 @@ def received_signal(
     # Bounds and the engine are those of a station that receives its own signal.
     exact = share is None or math.isinf(chain.amplification) or link
     weighed = bool(providing(beyond, WeighsPoints)) or view.beams is not None
+    # Noise that an effect sets by this power must not depend on the engine's approximations.
+    weighed = weighed or "cell_noise" in chain.names
     own = None
     # The engine is asked only where the chain does not compute the same echo anyway.
     if not link and (not exact or (chain.bent and not weighed)):
