@@ -112,6 +112,12 @@ def test_stages_before_the_first_training_do_without_torch():
     subprocess.run([sys.executable, "-c", program], env=environment, check=True)
 
 
+def test_trainings_of_more_images_start_first():
+    run = run_of({"recognition": {"schemes": ["A:VRP+TRP+VT", "ABC:VRP+TRP+VT"]}})
+    places = {scheme: run.images_of_job(SimpleNamespace(scheme=scheme)) for scheme in run.schemes_by_slug}
+    assert places == {"a-vrp-trp-vt": 3, "abc-vrp-trp-vt": 9}
+
+
 def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_is_not():
     assert (run_of().launcher, run_of().processes) == ("", 1)
     run = run_of({"recognition": {"processes": 4}})

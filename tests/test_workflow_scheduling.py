@@ -102,6 +102,17 @@ def test_unfinished_jobs_are_those_neither_finished_nor_running_nor_failed():
     assert list(found) == [found[0], found[1]] == every[4:] and len(found) == 2 and found
 
 
+def test_a_priority_of_each_job_is_given_where_snakemake_knows_such(monkeypatch):
+    from snakemake.rules import Rule
+
+    def longest(wildcards):
+        return 9
+
+    assert scheduling.by_job(longest) is longest
+    monkeypatch.delattr(Rule, "expand_priority")
+    assert scheduling.by_job(longest) == 0
+
+
 SNAKEFILE = """
 import os
 from snakemake.scheduling.job_scheduler import JobScheduler

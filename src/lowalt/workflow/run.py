@@ -6,6 +6,7 @@ Every fault of a configuration is found here, before any job starts.
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import check, plain
@@ -166,6 +167,10 @@ class Run:
     def is_reduced(self, size: int) -> bool:
         """Whether the tiles stage reduces its images to this size; signal shards have no tiles."""
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
+
+    def images_of_job(self, wildcards: Any) -> int:
+        """Images of one sample that the scheme of a job sees: how long its training takes, beside other trainings."""
+        return len(self.schemes_by_slug[wildcards.scheme].columns)
 
     def pixels(self, scheme: Scheme) -> int:
         """Pixels a side that a scheme's network sees."""

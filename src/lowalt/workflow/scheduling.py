@@ -14,7 +14,7 @@ REMAINING   Each round lists all jobs that have not finished, for a scheduler th
 import inspect
 import threading
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from heapq import nsmallest
 from typing import Any
 
@@ -60,6 +60,13 @@ def install() -> None:
         JobScheduler.open_jobs = property(selectable)
     if "REMAINING" in found:
         JobScheduler.remaining_jobs = property(Unfinished)
+
+
+def by_job(priority: Callable) -> Callable | int:
+    """Return a function that gives each job its priority, or 0 where Snakemake knows one priority a rule only."""
+    from snakemake.rules import Rule
+
+    return priority if hasattr(Rule, "expand_priority") else 0
 
 
 def one_timer(self: Any, delay: float) -> None:
