@@ -87,7 +87,7 @@ def test_a_recording_becomes_signals_spectra_tiles_and_a_shard_of_its_own(tmp_pa
     images = load_yaml("config/default.yaml")["images"]
     count = write(record, twin, images, tmp_path / "out")
     signals = np.load(tmp_path / "out/signals.npy")
-    assert signals.shape == (count, 400) == (7, 400) and signals.dtype == np.complex64
+    assert signals.shape == (count, 1200) == (2, 1200) and signals.dtype == np.complex64
     shown = np.load(tmp_path / "out/spectra.npz")
     np.testing.assert_array_equal(shown["vrp"], spectra(signals[:1], twin)["vrp"][0])
     # Above half the symbol rate: 1601 Hz at 3000 symbols/s stands at -1399 Hz.

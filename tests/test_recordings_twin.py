@@ -8,12 +8,13 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.common.yaml_files import load_yaml
-from lowalt.recordings import figures
+from lowalt.recordings import figures, kinds
 from lowalt.recordings.courses import hover, straight, to_and_fro
 from lowalt.recordings.library import Library
+from lowalt.recordings.presence import present
 from lowalt.recordings.receiver import Receiver, received
 from lowalt.recordings.scenes import clouds_of, heard, samples, stretch
-from lowalt.recordings.sets import halves, present, recordings
+from lowalt.recordings.sets import halves, recordings
 from lowalt.recordings.twin import Twin, beam_gain, blade_points, echo, still_row, strengthened, textured
 from lowalt.targets.records import load_records
 
@@ -59,7 +60,7 @@ def test_foil_on_one_blade_of_two_halves_the_spacing_of_the_lines(records, foil,
 def test_the_doppler_edge_is_the_blade_tip_speed(records, quadrotor):
     scene = {**HOVER, "strength_db": {"body": -40.0}, "tip": 6.0}
     spec = {"window": 256, "hop": 16, "slowest_mps": 2.0, "spacing_hz": [60.0, 500.0]}
-    edge = figures.rotor_figures(signal(records, TWIN, scene, 0.5), 5000.0, SPEED_OF_LIGHT / 3.3e9, spec)["edge_mps"]
+    edge = kinds.rotor_figures(signal(records, TWIN, scene, 0.5), 5000.0, SPEED_OF_LIGHT / 3.3e9, spec)["edge_mps"]
     blade = blade_points(quadrotor)[0]
     reach = np.hypot(*(quadrotor.points[blade] - quadrotor.hinges[quadrotor.part[blade[0]]])[:, :2].T).max()
     assert edge == pytest.approx(2 * np.pi * 161.0 * reach, rel=0.12)
@@ -82,9 +83,7 @@ def test_a_car_that_drives_past_shows_the_cosine_of_its_aspect(records):
     nearer = 8.0 * (along - 2.5) / np.hypot(along - 2.5, 3.0)
     assert (np.abs(line - (wanted + nearer) / 2) < 0.6).all()
     spec = {"window": 512, "hop": 128, "slowest_mps": 2.0}
-    assert figures.drive_figures(found, 4000.0, SPEED_OF_LIGHT / 24.0e9, spec)["speed_mps"] == pytest.approx(
-        7.9, abs=0.3
-    )
+    assert kinds.drive_figures(found, 4000.0, SPEED_OF_LIGHT / 24.0e9, spec)["speed_mps"] == pytest.approx(7.9, abs=0.3)
 
 
 def test_a_walker_turns_back_and_the_steps_keep_to_the_ground_covered():

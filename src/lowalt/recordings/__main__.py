@@ -1,9 +1,13 @@
-"""`python -m lowalt.recordings import | predict | pairs | compare | recognise`: recordings in, and held against twins.
+"""`python -m lowalt.recordings import | predict | pairs | compare | recognise | ablate`.
 
-import and predict are for a user's own recording, the others for the measured sets below a folder.
+Recordings in, and held against their radars' twins: import and predict are for a user's own recording, the others for
+the measured sets below a folder.
 """
 
 import argparse
+import os
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +20,10 @@ from lowalt.common.files import replacing
 from lowalt.recordings import compare, samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
+from lowalt.recordings.presence import present
 from lowalt.recordings.recognise import settings
 from lowalt.recordings.record import read_record
-from lowalt.recordings.sets import at_carrier, present, recordings
+from lowalt.recordings.sets import HALVES, at_carrier, recordings
 from lowalt.targets.records import load_records
 
 FOLDER = "config/measured"
@@ -55,9 +60,10 @@ def import_(arguments: list[str]) -> None:
 
 
 def predict(arguments: list[str]) -> None:
-    """Name the class of every window of one recording by a network of `recognise`, into predictions.csv."""
+    """Name the class of every window of one recording by networks of `recognise`, into predictions.csv."""
     options = _line("predict", predict.__doc__)
-    options.add_argument("--model", required=True, type=Path, help="network that was trained on the radar's twin (.pt)")
+    options.add_argument("--model", required=True, type=Path, nargs="+",
+                         help="networks that were trained on the radar's twin (.pt), whose mean counts")  # fmt: skip
     given = options.parse_args(arguments)
     from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered
     from lowalt.tiles.settings import Images
@@ -67,7 +73,8 @@ def predict(arguments: list[str]) -> None:
     intervals = samples.signals(record, twin)
     images, count = rendered(intervals, twin, Images.from_settings(block["images"]), block["size"]), len(intervals)
     told = facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), "test")
-    found = guesses(load_model(given.model, given.radar, block), Windows(images, told), block)
+    models = [load_model(path, given.radar, block) for path in given.model]
+    found = np.mean([guesses(model, Windows(images, told), block) for model in models], axis=0)
     starts = np.arange(count) * twin.symbols * twin.symbol_interval_s
     seen = present(intervals, twin)
     rows = samples.predictions(found, starts, seen)
@@ -123,17 +130,47 @@ def recognise(arguments: list[str]) -> None:
     """Train networks on the twins, test them on recordings: measured-recognition.csv and measured-accuracy.csv."""
     options = _line("recognise", recognise.__doc__, inputs=True)
     options.add_argument("--models", required=True, type=Path, help="folder for the trained networks")
+    options.add_argument(
+        "--halves", nargs="+", default=HALVES, choices=HALVES, help="halves of the split that are read"
+    )
+    options.add_argument("--reuse", action="store_true", help="take the networks that --models holds, train none")
+    options.add_argument("--jobs", type=int, default=os.cpu_count(), help="radars at a time")
     given = options.parse_args(arguments)
     from lowalt.recordings.reality import ACCURACY, RECOGNITION, accuracy, radar
 
     library, block = Library.read(given.twins), settings(given.recognition)
-    found = recordings(given.inputs, given.sets, given.split)
-    rows = [row for name in library.twins for row in radar(name, found, library, block, given.models)]
+    found = [one for one in recordings(given.inputs, given.sets, given.split) if one.half in given.halves]
+    names = list(library.twins)
+    # Each radar is a world of its own, so their order and number at a time change nothing. The costliest comes first.
+    with ProcessPoolExecutor(min(given.jobs, len(names)), get_context("spawn")) as pool:
+        jobs = {
+            name: pool.submit(radar, name, found, library, block, given.models, given.reuse) for name in reversed(names)
+        }
+        rows = [row for name in names for row in jobs[name].result()]
     samples.write_table(given.out / "measured-recognition.csv", RECOGNITION, rows)
     samples.write_table(given.out / "measured-accuracy.csv", ACCURACY, accuracy(rows, block["seed"]))
 
 
-COMMANDS = {"import": import_, "predict": predict, "pairs": pairs, "compare": compare_, "recognise": recognise}
+def ablate(arguments: list[str]) -> None:
+    """Train networks without one randomisation each and test them on the tuning half: measured-ablation.csv."""
+    options = _line("ablate", ablate.__doc__, inputs=True)
+    options.add_argument("--ablation", default=f"{FOLDER}/ablation.yaml", help="what is left out")
+    options.add_argument("--models", required=True, type=Path, help="folder for the trained networks")
+    given = options.parse_args(arguments)
+    from lowalt.recordings.ablate import ABLATION, ablation
+
+    library, own = Library.read(given.twins), load_yaml(given.ablation, "ablation")
+    block = settings(given.recognition) | {key: own[key] for key in ("echoes", "receivers", "seeds")}
+    block["training"] = block["training"] | {"steps": own["steps"], "validate_every": own["steps"]}
+    found = recordings(given.inputs, given.sets, given.split)
+    rows = ablation(own["radar"], found, library, block, own["changes"], given.models)
+    samples.write_table(given.out / "measured-ablation.csv", ABLATION, rows)
+
+
+COMMANDS = {
+    "import": import_, "predict": predict, "pairs": pairs, "compare": compare_, "recognise": recognise,
+    "ablate": ablate,
+}  # fmt: skip
 
 
 def main(arguments: list[str]) -> None:

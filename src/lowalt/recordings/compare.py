@@ -16,12 +16,11 @@ from scipy.stats import wasserstein_distance
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.common.streams import stream
-from lowalt.recordings.channel import symbol_rate
-from lowalt.recordings.figures import INTERVAL, KINDS, interval_figures, unit
-from lowalt.recordings.files import read
+from lowalt.recordings.figures import INTERVAL, interval_figures, unit
+from lowalt.recordings.kinds import KINDS
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import simulated_stretch
-from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals
+from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals, sampled
 from lowalt.recordings.twin import Twin
 
 FIGURES = (
@@ -70,9 +69,7 @@ def class_figures(name: str, pair: dict, found: list[Measured], records: dict, s
     twin, seed = Twin.from_settings(pair["radar"]), settings["seed"]
     measured = []
     for one in mine:
-        values, rate = read(one.record)
-        signal = symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
-        measured.append(figures_of(signal, at_carrier(twin, one.record.carrier_hz), pair))
+        measured.append(figures_of(sampled(one.record, twin), at_carrier(twin, one.record.carrier_hz), pair))
     sides = []
     for scene in (plain(pair["scene"], settings["mended"]), pair["scene"]):
         drawn = {**pair, "scene": scene}

@@ -54,8 +54,8 @@ def above_floor(power: np.ndarray) -> np.ndarray:
     return np.maximum(power - FLOOR_MEDIANS * np.median(power), 0.0)
 
 
-def _quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np.ndarray:
-    """Values at cumulative shares of the weights, values ascending, linear inside a bin."""
+def quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np.ndarray:
+    """Return the values (shares,) at cumulative shares of weights (n,); values (n,) ascending, linear inside a bin."""
     total = np.cumsum(weights)
     if total[-1] <= 0:
         return np.zeros(len(shares))
@@ -75,9 +75,9 @@ def interval_figures(interval: np.ndarray, edge_mps: float, sides: str) -> dict[
     magnitude = np.sqrt(power)
     centred = magnitude - magnitude.mean()
     share = power / max(power.sum(), 1e-300)
-    low, high = _quantile(speeds, shown, [0.25, 0.75])
+    low, high = quantile(speeds, shown, [0.25, 0.75])
     return {
-        "edge_mps": float(_quantile(np.abs(speeds)[order], shown[order], [EDGE_SHARE])[0]),
+        "edge_mps": float(quantile(np.abs(speeds)[order], shown[order], [EDGE_SHARE])[0]),
         "line_mps": float(abs(speeds[power.argmax()])),
         "width_mps": float(high - low),
         "kurtosis": float((centred**4).mean() / max((centred**2).mean() ** 2, 1e-300)),
@@ -149,99 +149,24 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
 
 
 def tracks(shown: np.ndarray, speeds: np.ndarray, slowest_mps: float) -> dict[str, np.ndarray]:
-    """Return by time, each (times,), the strongest line (m/s), its width (m/s), the edge (m/s) and whether it counts.
+    """Return by time, each (times,), the strongest line (m/s), the edge (m/s) and whether it counts.
 
     shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left out: there stands
-    the static part. width: between the points 6 dB below the line; edge: 95 % of the energy above the floor lies below
-    it; counts: the line is 15 dB above the frame's median.
+    the static part. edge: 95 % of the energy above the floor lies below it; counts: the line is 15 dB above the frame's
+    median.
     """
     keep = np.abs(speeds) >= slowest_mps
     power, kept = shown[keep] ** 2, np.abs(speeds[keep])
     top = power.argmax(axis=0)
     floor = np.median(power, axis=0)
-    line, width, edge = (np.empty(power.shape[1]) for _ in range(3))
     order = np.argsort(kept, kind="stable")
-    step = abs(speeds[1] - speeds[0])
-    for frame in range(power.shape[1]):
-        column, at = power[:, frame], top[frame]
-        low, high = at, at
-        while low > 0 and column[low - 1] > column[at] / 4:
-            low -= 1
-        while high < len(column) - 1 and column[high + 1] > column[at] / 4:
-            high += 1
-        line[frame], width[frame] = kept[at], (high - low + 1) * step
-        shown_here = np.maximum(column - 4 * floor[frame], 0.0)[order]
-        edge[frame] = _quantile(kept[order], shown_here, [EDGE_SHARE])[0]
+    above = np.maximum(power - 4 * floor, 0.0)[order]
+    edge = np.array([quantile(kept[order], column, [EDGE_SHARE])[0] for column in above.T])
     strength = power[top, np.arange(power.shape[1])]
-    return {"line": line, "width": width, "edge": edge, "counts": strength > 10**1.5 * floor}
+    return {"line": kept[top], "edge": edge, "counts": strength > 10**1.5 * floor}
 
 
-def rotor_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
-    """Return spacing of the blade lines (Hz) and the Doppler edge (m/s) of a hovering craft.
-
-    The edge leaves out the body line, |speed| below spec["slowest_mps"]; spec["spacing_hz"] bounds the spacing.
-    """
-    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
-    speeds = frequency * wavelength_m / 2
-    power = (shown**2).mean(axis=1)
-    keep = (np.abs(speeds) >= spec["slowest_mps"]) & (np.abs(speeds) <= spec.get("fastest_mps", np.inf))
-    order = np.argsort(np.abs(speeds[keep]), kind="stable")
-    edge = _quantile(np.abs(speeds[keep])[order], above_floor(power[keep])[order], [EDGE_SHARE])[0]
-    return {
-        "line_spacing_hz": line_spacing_hz(signal - signal.mean(), rate_hz, *spec["spacing_hz"]),
-        "edge_mps": float(edge),
-    }
-
-
-def wing_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
-    """Return wing-beat rate (Hz) and Doppler edge (m/s), median over time, of a flapping bird; spec["cycle_s"] bounds
-    the beat's time."""
-    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
-    speeds = frequency * wavelength_m / 2
-    fast = (speeds >= spec["slowest_mps"]) & (speeds <= spec["fastest_mps"])
-    track = tracks(shown[speeds > 0], speeds[speeds > 0], 0.0)
-    return {
-        "beat_hz": 1 / cycle_s(shown[fast], spec["hop"] / rate_hz, *spec["cycle_s"]),
-        "edge_mps": float(np.quantile(track["edge"], 0.9)),
-    }
-
-
-def drive_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
-    """Return driving speed and width of the body line (m/s) of what drives away: where its line is fastest."""
-    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
-    speeds = frequency * wavelength_m / 2
-    track = tracks(shown[speeds > 0], speeds[speeds > 0], spec["slowest_mps"])
-    line = track["line"][track["counts"]]
-    if not len(line):
-        return {"speed_mps": float("nan"), "width_mps": float("nan")}
-    speed = np.quantile(line, 0.9)
-    steady = track["counts"] & (np.abs(track["line"] - speed) < 0.1 * speed)
-    return {"speed_mps": float(speed), "width_mps": float(np.median(track["width"][steady]))}
-
-
-def gait_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
-    """Return torso and limb speed (m/s) and the time of a step (s) of a walker; spec["cycle_s"] bounds the step.
-
-    Torso: median of the strongest line while it is above spec["slowest_mps"]; limbs: 95th percentile of the edge.
-    """
-    _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
-    speeds = frequency * wavelength_m / 2
-    keep = (speeds > 0) & (speeds <= spec["fastest_mps"])
-    track = tracks(shown[keep], speeds[keep], spec["slowest_mps"])
-    walks = track["counts"] & (track["line"] > spec["torso_mps"])
-    limbs = (speeds >= spec["torso_mps"]) & (speeds <= spec["fastest_mps"])
-    # Frames count alike, near or far: the echo falls by 40 dB along a walk.
-    level = shown[limbs] / np.maximum(shown[keep].max(axis=0), 1e-300)
-    return {
-        "torso_mps": float(np.median(track["line"][walks])) if walks.any() else float("nan"),
-        "limb_mps": float(np.quantile(track["edge"][walks], 0.95)) if walks.any() else float("nan"),
-        "step_s": cycle_s(level, spec["hop"] / rate_hz, *spec["cycle_s"]),
-    }
-
-
-KINDS = {"rotor": rotor_figures, "wing": wing_figures, "drive": drive_figures, "gait": gait_figures}
-"""Figures of a class by the name that a pair of pictures gives."""
-UNITS = {"mps": "m/s", "hz": "Hz", "s": "s"}
+UNITS = {"mps": "m/s", "hz": "Hz", "s": "s", "db": "dB"}
 
 
 def unit(figure: str) -> str:

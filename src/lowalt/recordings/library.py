@@ -23,6 +23,8 @@ class Library:
     sets: dict[str, list[str]]
     scenes: dict[str, dict[str, list[dict]]]
     records: dict[str, dict]
+    memo: dict | None = None
+    """Echoes that were simulated, where they are kept: libraries that differ in receivers alone share them."""
 
     @classmethod
     def read(cls, path: str | Path) -> "Library":
@@ -64,7 +66,7 @@ class Library:
         for number, scene in enumerate(scenes):
             share = len(range(number, count, len(scenes)))
             keys = (purpose, twin, category, number)
-            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers)
+            signals, subtypes = intervals(self.twins[twin], scene, clouds, self.seed, keys, share, receivers, self.memo)
             found.append(signals)
             names += subtypes
         return np.concatenate(found), names

@@ -11,11 +11,10 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.common.streams import stream
-from lowalt.recordings.channel import symbol_rate
 from lowalt.recordings.figures import spectrogram, speeds_shown
 from lowalt.recordings.files import read
 from lowalt.recordings.scenes import clouds_of, heard, samples, stretch
-from lowalt.recordings.sets import Measured
+from lowalt.recordings.sets import Measured, sampled
 from lowalt.recordings.twin import Twin
 
 FLOOR_DB = -45.0
@@ -43,11 +42,11 @@ def measured_stretch(one: Measured, twin: Twin, start_s: float, seconds: float) 
 
     Raises: InputError where the recording ends before.
     """
-    values, rate = read(one.record)
+    values, rate = baseband = read(one.record)
     first, count = round(start_s * rate), round(seconds * rate)
     if first + count > len(values):
         raise InputError(f"{one.record.file}: {len(values) / rate:.3g} s, expected at least {start_s + seconds:.3g} s")
-    signal = symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
+    signal = sampled(one.record, twin, baseband)
     first = round(start_s / twin.symbol_interval_s)
     return signal[first : first + round(seconds / twin.symbol_interval_s)]
 

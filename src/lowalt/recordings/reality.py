@@ -1,16 +1,19 @@
 """The test of networks on recordings: confusion by file, and balanced accuracy with an interval over files.
 
-measured-recognition.csv: one row a radar, training seed and recording; how many windows got which name.
-measured-accuracy.csv: share of right windows of each class in each half, mean over its files and seeds, and balanced
-    accuracy over the radar's classes; intervals resample files within their class. One row is for all radars together.
+measured-recognition.csv: one row a radar, training seed and recording; how many windows got which name. The seed
+    "mean" stands for all networks together, by the mean of their probabilities.
+measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and balanced accuracy
+    over the radar's classes; intervals resample files within their class. One row is for all radars together.
 """
+
+from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.streams import stream
 from lowalt.recordings.library import Library
-from lowalt.recordings.recognise import Windows, facts, guesses, rendered, simulated, train
+from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered, simulated, train
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals
 from lowalt.tiles.settings import Images
 
@@ -28,26 +31,42 @@ def windows_of(one: Measured, library: Library, block: dict) -> Windows:
     return Windows(images, told)
 
 
-def radar(name: str, found: list[Measured], library: Library, block: dict, folder) -> list[list]:
+def tested(name: str, measured: list[tuple[Measured, Windows]], models: dict, block: dict) -> list[list]:
+    """Return the rows of `RECOGNITION` of recordings with their windows, named by networks {training seed: network}.
+
+    One row a network and recording, and one of all networks together (seed "mean"), whose probabilities are averaged.
+    """
+    rows = []
+    for one, windows in measured:
+        found = {seed: guesses(model, windows, block) for seed, model in models.items()}
+        found["mean"] = np.mean(list(found.values()), axis=0)
+        for seed, shares in found.items():
+            named = shares.argmax(1)
+            counts = np.bincount(named, minlength=len(CATEGORIES)).tolist()
+            right = 100 * float(np.mean(named == windows.facts.label))
+            rows.append([name, seed, one.set, one.half, one.name, one.record.label, len(named), *counts, right])
+    return rows
+
+
+def radar(
+    name: str, found: list[Measured], library: Library, block: dict, folder: Path, reuse: bool = False
+) -> list[list]:
     """Train one network a seed on the twin `name` and return the rows of `RECOGNITION` of its recordings.
 
-    folder: where the networks go, one folder a seed.
+    folder: where the networks go, one folder a seed; reuse: take those that are
+    there and train none. Recordings without any window that holds a target are left out.
     """
     mine = [one for one in found if one.set in library.sets[name]]
     if not mine:
         return []
-    measured = [windows_of(one, library, block) for one in mine]
+    measured = [(one, windows_of(one, library, block)) for one in mine]
+    measured = [(one, windows) for one, windows in measured if len(windows.images)]
+    if reuse:
+        models = {seed: load_model(folder / f"{name}-{seed}/model.pt", name, block) for seed in block["seeds"]}
+        return tested(name, measured, models, block)
     model_windows = {fold: simulated(library, name, block, fold) for fold in ("train", "validation")}
-    rows = []
-    for seed in block["seeds"]:
-        model = train(block, model_windows, name, seed, folder / f"{name}-{seed}")
-        for one, windows in zip(mine, measured, strict=True):
-            named = guesses(model, windows, block).argmax(1)
-            counts = np.bincount(named, minlength=len(CATEGORIES)).tolist()
-            right = 100 * float(np.mean(named == windows.facts.label))
-            head = [name, seed, one.set, one.half, one.name, one.record.label, len(named)]
-            rows.append([*head, *counts, right])
-    return rows
+    models = {seed: train(block, model_windows, name, seed, folder / f"{name}-{seed}") for seed in block["seeds"]}
+    return tested(name, measured, models, block)
 
 
 def _interval(by_class: dict[str, list[float]], rng: np.random.Generator) -> tuple[float, float, float]:
@@ -59,13 +78,13 @@ def _interval(by_class: dict[str, list[float]], rng: np.random.Generator) -> tup
 
 
 def accuracy(rows: list[list], seed: int) -> list[list]:
-    """Return the rows of `ACCURACY` from those of `RECOGNITION`; a file counts once, by its mean over training seeds.
+    """Return the rows of `ACCURACY` from those of `RECOGNITION` whose seed is "mean"; a file counts once.
 
     A class of a set of recordings is one class: the drones at 10 GHz and at 3.3 GHz stand apart.
     """
     shares: dict[tuple, dict[str, list[float]]] = {}
     windows: dict[str, int] = {}
-    for row in rows:
+    for row in (row for row in rows if row[1] == "mean"):
         name, _, _, half, file, label, count = row[:7]
         shares.setdefault((name, half, label), {}).setdefault(file, []).append(row[-1])
         windows[file] = count

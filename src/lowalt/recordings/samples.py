@@ -8,13 +8,11 @@ import numpy as np
 
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.motion.table import NUMBERS
-from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.files import read
+from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.record import Record
-from lowalt.recordings.sets import at_carrier
+from lowalt.recordings.sets import at_carrier, sampled
 from lowalt.recordings.twin import Twin
 from lowalt.shards.index import build
 from lowalt.shards.write import write_shard
@@ -29,13 +27,9 @@ SPLIT = {"by": "motion", "train": 1, "val": 0, "test": 1}
 def signals(record: Record, twin: Twin) -> np.ndarray:
     """Return a recording's coherent intervals (n, symbols) complex64 at the twin's symbol rate, its mean removed.
 
-    Raises: InputError as `read`, where the channel is not the twin's kind, or the recording is shorter than a window.
+    Raises: InputError as `sets.sampled`, and where the recording is shorter than a window.
     """
-    if record.channel != twin.channel:
-        raise InputError(f"{record.file}: channel {record.channel!r}, but the radar has a {twin.channel} channel")
-    values, rate = read(record)
-    signal = symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
-    return coherent_intervals(signal, twin.symbols, name=str(record.file)).astype(np.complex64)
+    return coherent_intervals(sampled(record, twin), twin.symbols, name=str(record.file)).astype(np.complex64)
 
 
 def spectra(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:

@@ -12,22 +12,27 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
-    foils          patterns of foil, one drawn a sample (optional)
+    foils          patterns of foil, one drawn a sample; foil_reach: its end, as a share of the blade (both optional)
     flap           changes of the wing beat, degrees (optional)
+    size           length, width and height as multiples of the subtype's (optional)
+    second         share of samples with a second target of the same scene, and its level_db (optional)
     receiver       settings of `lowalt.recordings.receiver`
 """
 
+import json
 import math
 from dataclasses import replace
 
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.courses import Course, hover, straight, to_and_fro
+from lowalt.recordings.presence import present
 from lowalt.recordings.receiver import Receiver, received
-from lowalt.recordings.twin import Twin, beam_gain, echo, still_row, strengthened, textured
+from lowalt.recordings.twin import Twin, beam_gain, echo, sized, still_row, strengthened, textured
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import gait_cloud
@@ -94,17 +99,33 @@ def heard(
 ) -> tuple[np.ndarray, str]:
     """Return the complex echo (N,) of one drawn scene at the receiver's rate, margins included, and the subtype's name.
 
-    seconds: length without the margins. Raises: InputError for a scene with a wrong key or value.
+    seconds: length without the margins. A second target, where the scene has one, drives at its own place and speed.
+    Raises: InputError for a scene with a wrong key or value.
     """
+    signal, name = _one(twin, scene, clouds, rng, seconds)
+    if "second" in scene and rng.uniform() < scene["second"]["share"]:
+        more, _ = _one(twin, scene, clouds, rng, seconds)
+        level = 10 ** (value(scene["second"]["level_db"], rng) / 20)
+        signal = signal + level * rms(signal) / max(rms(more), 1e-300) * more
+    return signal, name
+
+
+def _one(
+    twin: Twin, scene: dict, clouds: dict[str, Cloud], rng: np.random.Generator, seconds: float
+) -> tuple[np.ndarray, str]:
+    """The echo of one drawn target, and its subtype's name."""
     try:
         name = scene["subtypes"][int(rng.integers(len(scene["subtypes"])))]
         cloud = clouds[name]
         if "flap" in scene:
             flap = {key: value(setting, rng) for key, setting in scene["flap"].items()}
             cloud = replace(cloud, record=cloud.record | {"flap": cloud.record["flap"] | flap})
+        if "size" in scene:
+            cloud = sized(cloud, [value(scene["size"][axis], rng) for axis in ("width", "length", "height")])
         strength = {kind: value(setting, rng) for kind, setting in scene.get("strength_db", {}).items()}
         foils = scene.get("foils")
-        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "")
+        reach = value(scene.get("foil_reach", 1.0), rng)
+        cloud = strengthened(cloud, strength, foils[int(rng.integers(len(foils)))] if foils else "", reach)
         cloud = textured(cloud, *(value(scene.get(key, 0.0), rng) for key in ("texture_db", "tip")), rng)
         margin = 2 * MARGIN * twin.symbol_interval_s
         times = np.arange(math.ceil((seconds + margin) * twin.rate_hz)) / twin.rate_hz
@@ -116,16 +137,21 @@ def heard(
         wander = [value(scene.get(key, 0.0), rng) for key in ("spread", "wander")]
         signal = echo(twin, cloud, row, course, times, *wander, rng)
         if "beam" in scene:
-            signal *= beam_gain(course.place_m, value(scene["beam"]["width_deg"], rng), scene["beam"]["floor_db"])
+            signal *= beam_gain(course.place_m, *(value(scene["beam"][key], rng) for key in ("width_deg", "floor_db")))
     except KeyError as error:
         raise InputError(f"scene {scene.get('course')!r} of {scene.get('subtypes')}: {error} is missing") from None
     return signal, name
 
 
-def samples(twin: Twin, receiver: dict, signal: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Return what the receiver records (N,) of an echo (N,), its settings drawn from their ranges."""
+def samples(
+    twin: Twin, receiver: dict, signal: np.ndarray, rng: np.random.Generator, target: bool = True
+) -> np.ndarray:
+    """Return what the receiver records (N,) of an echo (N,), its settings drawn from their ranges.
+
+    target: False for the same receiver and noise without the echo.
+    """
     settings = Receiver.from_settings({key: value(item, rng) for key, item in receiver.items()})
-    return received(signal, twin.rate_hz, settings, twin.channel == "real", rng)
+    return received(signal, twin.rate_hz, settings, twin.channel == "real", rng, target)
 
 
 def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
@@ -134,20 +160,48 @@ def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
     return signal[MARGIN : MARGIN + math.floor(seconds / twin.symbol_interval_s + 1e-6)]
 
 
+REDRAWS = 8
+"""Receivers drawn for one echo until its target stands above their noise; the last one counts in any case."""
+
+
+def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
+    """The coherent interval (1, symbols) that a receiver hears of an echo, drawn again while no target shows."""
+    seconds = twin.symbols * twin.symbol_interval_s
+    for redraw in range(REDRAWS):
+        both = []
+        for target in (True, False) if twin.detect_db else (True,):
+            values = samples(twin, receiver, signal, stream(*keys, redraw), target)
+            both.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols))
+        if present(both[0], twin, both[-1]).all():
+            break
+    return both[0]
+
+
 def intervals(
-    twin: Twin, scene: dict, clouds: dict[str, Cloud], seed: int, keys: tuple, count: int, receivers: int = 1
+    twin: Twin,
+    scene: dict,
+    clouds: dict[str, Cloud],
+    seed: int,
+    keys: tuple,
+    count: int,
+    receivers: int = 1,
+    memo: dict | None = None,
 ) -> tuple[np.ndarray, list[str]]:
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
     Each of `count` scenes is drawn once, and its echo heard by so many receivers, each drawn from the scene's ranges.
+    As with recordings, a window counts where its target stands above the noise (`presence.present`).
+    memo: echoes of earlier calls, which do not depend on the receiver; new ones are put into it.
     """
-    seconds = twin.symbols * twin.symbol_interval_s
+    seconds, memo = twin.symbols * twin.symbol_interval_s, {} if memo is None else memo
     found, names = np.empty((count, receivers, twin.symbols), np.complex128), []
     for number in range(count):
-        signal, name = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
+        known = (*keys, number, json.dumps({key: item for key, item in scene.items() if key != "receiver"}))
+        if known not in memo:
+            memo[known] = heard(twin, scene, clouds, stream(seed, "twin", *keys, number), seconds)
+        signal, name = memo[known]
         for again in range(receivers):
-            rng = stream(seed, "twin-receiver", *keys, number, again)
-            values = samples(twin, scene["receiver"], signal, rng)
-            found[number, again] = coherent_intervals(stretch(values, twin, seconds), twin.symbols, name=name)[0]
+            own = (seed, "twin-receiver", *keys, number, again)
+            found[number, again] = _interval(twin, scene["receiver"], signal, own)[0]
         names.append(name)
     return found, names

@@ -1,7 +1,8 @@
 """The measured sets: which files belong to them, which half each is in, and their intervals that hold a target.
 
 The file of sets holds records whose `file` is a pattern inside the set's folder, the file of the split the two halves
-by file name. Files that came later are in neither half's list: they are test files.
+by file name. Files that came later are in neither half's list: they are test files. A record of its own beside a file
+(any .yaml in the set's folder) goes before the set's pattern, so a file of any name, rate and channel can be added.
 """
 
 from dataclasses import replace
@@ -10,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.figures import speeds_shown
 from lowalt.recordings.files import Baseband, read
-from lowalt.recordings.record import Record, record
+from lowalt.recordings.presence import present
+from lowalt.recordings.record import Record, read_record, record
 from lowalt.recordings.twin import Twin
 
 HALVES = ("tuning", "test")
@@ -50,6 +52,14 @@ def halves(path: str | Path) -> dict[str, dict[str, list[str]]]:
     return found
 
 
+def _labelled(path: Path) -> Record:
+    """The record in a file of a set's folder; only one with a label can be held against anything."""
+    one = read_record(path)
+    if one.label is None:
+        raise InputError(f"{path}: no label, expected one of {CATEGORIES}")
+    return one
+
+
 def recordings(inputs: str | Path, sets: str | Path, split: str | Path) -> list[Measured]:
     """Return the recordings there are below the folder `inputs`, one folder a set, in the order of sets and names.
 
@@ -66,9 +76,10 @@ def recordings(inputs: str | Path, sets: str | Path, split: str | Path) -> list[
             for path in sorted(folder.glob(block["file"])):
                 if path.name in seen:
                     raise InputError(f"{sets}: {path.name} fits two patterns of {name}, expected one")
-                half = "tuning" if path.name in half_of.get(name, {}).get("tuning", ()) else "test"
-                seen[path.name] = Measured(name, half, replace(one, file=path))
-        found += [seen[key] for key in sorted(seen)]
+                seen[path.name] = replace(one, file=path)
+        seen |= {one.file.name: one for one in map(_labelled, sorted(folder.glob("*.yaml")))}
+        tuning = half_of.get(name, {}).get("tuning", ())
+        found += [Measured(name, "tuning" if key in tuning else "test", seen[key]) for key in sorted(seen)]
     if not found:
         raise InputError(f"{inputs}: no recordings of {sorted(blocks)}, expected a folder a set")
     return found
@@ -79,20 +90,18 @@ def at_carrier(twin: Twin, carrier_hz: float) -> Twin:
     return replace(twin, carrier_hz=carrier_hz)
 
 
-def present(intervals: np.ndarray, twin: Twin) -> np.ndarray:
-    """Return which intervals (n, symbols) hold a moving target, (n,) bool.
+def sampled(one: Record, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
+    """Return a recording's signal (symbols,) complex128 at the twin's symbol rate.
 
-    The strongest line at |speed| >= slowest_mps stands `detect_db` above the median of those speeds, Hann window: a
-    constant false alarm rate. With detect_db 0 all do: the target never left the radar.
+    A radar with one real channel hears the first of a recording's two.
+    Raises: InputError as `read`, and for a real recording where the radar has two channels.
     """
-    if not twin.detect_db:
-        return np.ones(len(intervals), bool)
-    count = intervals.shape[1]
-    power = np.abs(np.fft.fft(intervals * np.hanning(count), axis=1)) ** 2
-    speeds = np.fft.fftshift(np.fft.fftfreq(count)) * 2 * twin.edge_mps
-    order, meant = speeds_shown(speeds, twin.edge_mps, twin.sides)
-    moving = np.fft.fftshift(power, axes=1)[:, order][:, np.abs(meant) >= twin.slowest_mps]
-    return moving.max(axis=1) >= 10 ** (twin.detect_db / 10) * np.median(moving, axis=1)
+    values, rate = baseband or read(one)
+    if one.channel == "real" and twin.channel == "complex":
+        raise InputError(f"{one.file}: channel 'real', but the radar has a complex channel")
+    if one.channel == "complex" and twin.channel == "real":
+        values = values.real
+    return symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
 
 
 def measured_intervals(one: Measured, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
@@ -100,7 +109,5 @@ def measured_intervals(one: Measured, twin: Twin, baseband: Baseband | None = No
 
     Raises: InputError as `read`, and where the recording is shorter than one interval.
     """
-    values, rate = baseband or read(one.record)
-    signal = symbol_rate(values, rate, twin.symbol_interval_s, twin.sampling)
-    found = coherent_intervals(signal, twin.symbols, name=str(one.record.file))
+    found = coherent_intervals(sampled(one.record, twin, baseband), twin.symbols, name=str(one.record.file))
     return found[present(found, twin)]

@@ -85,11 +85,12 @@ TORSO = ("root", "hipjoint", "back", "thorax", "neck", "head", "clavicle")
 LEGS = ("femur", "tibia", "foot", "toes")
 
 
-def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "") -> Cloud:
+def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "", foil_reach: float = 1.0) -> Cloud:
     """Return the cloud with the cross sections of some of its parts raised by decibels.
 
     strength_db: kind of part ("body", "rotor", "wing", "wheel"; of nodes "torso", "arms", "legs") -> dB; foil: a digit
-    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"].
+    for each blade, rotor by rotor, "1" for a blade with foil, raised by strength_db["foil"] from the hub to
+    `foil_reach` of its length.
     Raises: InputError for an unknown kind, or a foil that does not fit the blades.
     """
     gain = np.zeros(len(cloud.points))
@@ -109,8 +110,15 @@ def strengthened(cloud: Cloud, strength_db: dict[str, float], foil: str = "") ->
         if len(foil) != len(blades) or set(foil) - set("01"):
             raise InputError(f"foil {foil!r}, expected one digit 0 or 1 for each of {len(blades)} blades")
         for digit, points in zip(foil, blades, strict=True):
-            gain[points] += strength_db["foil"] * (digit == "1")
+            covered = radii(cloud, points) <= foil_reach * radii(cloud, points).max()
+            gain[points] += strength_db["foil"] * (covered & (digit == "1"))
     return replace(cloud, rcs_m2=cloud.rcs_m2 * 10 ** (gain / 10))
+
+
+def radii(cloud: Cloud, points: np.ndarray) -> np.ndarray:
+    """Return the distances (n,) m of some points of one turning part from its axis."""
+    part = cloud.part[points[0]]
+    return np.linalg.norm(np.cross(cloud.points[points] - cloud.hinges[part], cloud.axes[part]), axis=1)
 
 
 def textured(cloud: Cloud, texture_db: float, tip: float, rng: np.random.Generator) -> Cloud:
@@ -125,12 +133,23 @@ def textured(cloud: Cloud, texture_db: float, tip: float, rng: np.random.Generat
     )
     for rotor in cloud.parts_of("rotor") if tip else ():
         mine = cloud.part == rotor
-        reach = np.linalg.norm(np.cross(cloud.points[mine] - cloud.hinges[rotor], cloud.axes[rotor]), axis=1)
+        reach = radii(cloud, np.flatnonzero(mine))
         gain[mine] *= (reach / reach.max()) ** tip
     for part in range(len(cloud.kinds)) if "node" not in cloud.kinds else ():
         mine = cloud.part == part
         gain[mine] /= gain[mine].mean()
     return replace(cloud, rcs_m2=cloud.rcs_m2 * gain)
+
+
+def sized(cloud: Cloud, factors: list[float]) -> Cloud:
+    """Return the cloud with its body's places multiplied by three factors: across, along and upwards.
+
+    Parts that turn keep their own size and move with their hinges, so wheels stay round.
+    """
+    hinges = cloud.hinges * factors
+    turning = np.isin(cloud.part, [part for part, kind in enumerate(cloud.kinds) if kind != "body"])
+    moved = cloud.points + (hinges - cloud.hinges)[cloud.part]
+    return replace(cloud, points=np.where(turning[:, None], moved, cloud.points * factors), hinges=hinges)
 
 
 def beam_gain(place_m: np.ndarray, width_deg: float, floor_db: float) -> np.ndarray:

@@ -1,0 +1,110 @@
+"""What each randomisation of a twin adds: networks trained without it, tested on the tuning half of the recordings.
+
+measured-ablation.csv: one row a change, class and "balanced"; accuracy is the mean over training seeds and files, the
+interval resamples files within their class and seeds; difference is to the unchanged twin, on the same files and seeds.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.recordings.library import Library
+from lowalt.recordings.reality import tested, windows_of
+from lowalt.recordings.recognise import simulated, train
+from lowalt.recordings.sets import Measured
+
+ABLATION = (
+    "radar", "change", "class", "seeds", "files", "windows", "accuracy_percent", "low", "high", "difference_percent",
+    "difference_low", "difference_high",
+)  # fmt: skip
+REPEATS = 4000
+FULL = "none"
+"""Name of the unchanged twin."""
+
+
+def changed(library: Library, name: str, change: dict) -> Library:
+    """Return the library with another receiver and plainer scenes of the twin `name`.
+
+    change: receiver, settings that replace those of the twin; drop, keys of scenes that are left out.
+    Raises: InputError for another key, or a receiver's setting that the twin does not have.
+    """
+    receiver, drop = change.get("receiver", {}), change.get("drop", [])
+    if set(change) - {"receiver", "drop"}:
+        raise InputError(f"ablation: {sorted(change)}, expected some of receiver and drop")
+
+    def plainer(scene: dict) -> dict:
+        unknown = set(receiver) - set(scene["receiver"])
+        if unknown:
+            raise InputError(
+                f"ablation: receiver has no {sorted(unknown)}, expected some of {sorted(scene['receiver'])}"
+            )
+        return {key: item for key, item in scene.items() if key not in drop} | {
+            "receiver": scene["receiver"] | receiver
+        }
+
+    scenes = {category: [plainer(scene) for scene in many] for category, many in library.scenes[name].items()}
+    return replace(library, scenes=library.scenes | {name: scenes})
+
+
+def shares(rows: list[list]) -> dict[str, np.ndarray]:
+    """Return class -> share of right windows (files, seeds) in percent from rows of `reality.RECOGNITION`."""
+    found: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        if row[1] != "mean":
+            found.setdefault(row[5], {}).setdefault(row[4], []).append(row[-1])
+    return {label: np.array(list(files.values())) for label, files in found.items()}
+
+
+def _draws(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Means (REPEATS,) of values (files, seeds) with files and seeds drawn again."""
+    files, seeds = (rng.integers(0, count, (REPEATS, count)) for count in values.shape)
+    return values[files[:, :, None], seeds[:, None, :]].mean(axis=(1, 2))
+
+
+def summarised(name: str, change: str, own: dict, full: dict, windows: dict[str, int], seed: int) -> list[list]:
+    """Return the rows of `ABLATION` of one change from its `shares` and those of the unchanged twin."""
+    rows, means, levels = [], [], []
+    for label in own:
+        keys = (seed, "measured-ablation", name, label)
+        # The same draws for both, so that the difference is paired.
+        pair = [_draws(values[label], stream(*keys)) for values in (own, full)]
+        means.append((own[label].mean(), own[label].mean() - full[label].mean()))
+        levels.append((pair[0], pair[0] - pair[1]))
+    labels, counts = list(own), [own[label].shape for label in own]
+    if len(own) > 1:
+        labels.append("balanced")
+        counts.append((sum(files for files, _ in counts), counts[0][1]))
+        means.append(tuple(np.mean(means, axis=0)))
+        levels.append(tuple(np.mean(levels, axis=0)))
+    for label, (files, seeds), mean, level in zip(labels, counts, means, levels, strict=True):
+        bounds = [[float(bound) for bound in np.quantile(part, [0.025, 0.975])] for part in level]
+        total = windows.get(label, sum(windows.values()))
+        rows.append([name, change, label, seeds, files, total, float(mean[0]), *bounds[0], float(mean[1]), *bounds[1]])
+    return rows
+
+
+def ablation(name: str, found: list[Measured], library: Library, block: dict, changes: dict, folder) -> list[list]:
+    """Return the rows of `ABLATION` of the twin `name`: trained as it is, and with each of the changes.
+
+    changes: name -> change as `changed` takes it; folder: where the networks go. Test recordings are not looked at.
+    """
+    mine = [one for one in found if one.set in library.sets[name] and one.half == "tuning"]
+    measured = [(one, windows_of(one, library, block)) for one in mine]
+    measured = [(one, windows) for one, windows in measured if len(windows.images)]
+    windows: dict[str, int] = {}
+    for one, held in measured:
+        windows[one.record.label] = windows.get(one.record.label, 0) + len(held.images)
+    rows, full, library = [], None, replace(library, memo={})
+    for title, change in {FULL: {}, **changes}.items():
+        plainer = changed(library, name, change)
+        samples = {fold: simulated(plainer, name, block, fold) for fold in ("train", "validation")}
+        models = {
+            seed: train(block, samples, name, seed, folder / f"{name}-{title}-{seed}".replace(" ", "_"))
+            for seed in block["seeds"]
+        }
+        own = shares(tested(name, measured, models, block))
+        full = full or own
+        rows += summarised(name, title, own, full, windows, block["seed"])
+    return rows

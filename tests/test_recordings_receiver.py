@@ -1,0 +1,184 @@
+"""The cheap receiver and its detector, sizes of vehicles, figures of whole recordings, and what an ablation counts."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.recordings import ablate, kinds
+from lowalt.recordings.library import Library
+from lowalt.recordings.presence import ENOUGH, noise_floor, present
+from lowalt.recordings.receiver import Receiver, clipped, highpassed, received
+from lowalt.recordings.scenes import clouds_of, intervals
+from lowalt.recordings.twin import Twin, radii, sized, strengthened
+
+QUIET = {
+    "snr_db": 80.0, "flicker_db": -80.0, "flicker_hz": 5.0, "wander_db": 0.0, "leak_db": -80.0, "hum_db": -80.0,
+    "hum_hz": 50.0,
+}  # fmt: skip
+LOOKING = Twin(24.0e9, "real", 6000.0, 1 / 3000.0, 400, "one_sided", 0.4, 15.0)
+
+
+@pytest.fixture(scope="module")
+def library():
+    return Library.read("config/measured/twins.yaml")
+
+
+def test_the_high_pass_has_half_the_power_at_its_corner_and_falls_by_its_order():
+    time = np.arange(60_000) / 6000.0
+    for share, wanted in ((1.0, -3.01), (0.1, -40.0), (10.0, 0.0)):
+        tone = highpassed(np.cos(2 * np.pi * 100.0 * share * time), 6000.0, 100.0, 2.0)[30_000:]
+        assert 10 * np.log10(2 * np.mean(tone**2)) == pytest.approx(wanted, abs=0.05)
+    assert abs(highpassed(np.full(100, 7.0), 6000.0, 100.0, 2.0)).max() == 0
+    values = np.arange(5.0)
+    assert highpassed(values, 6000.0, 0.0, 2.0) is values
+
+
+def test_levels_are_those_of_what_passes_the_high_pass():
+    time = np.arange(60_000) / 6000.0
+    slow, fast = np.exp(2j * np.pi * 10.0 * time), 0.1 * np.exp(2j * np.pi * 1000.0 * time)
+    settings = Receiver.from_settings({**QUIET, "snr_db": 0.0, "highpass_hz": 100.0})
+    noise = received(slow + fast, 6000.0, settings, False, np.random.default_rng(0), target=False)
+    # The slow part is 40 dB down behind the filter, as strong as a tenth of the fast one.
+    assert np.mean(abs(noise) ** 2) == pytest.approx((0.01 + 1e-4) * (1 - 100.0 * 2 / 6000.0), rel=0.05)
+
+
+def test_clipping_limits_and_hum_has_its_harmonics():
+    values = np.sin(np.linspace(0, 200 * np.pi, 100_001))
+    assert abs(clipped(values, 1.0)).max() == pytest.approx(np.sqrt(0.5), rel=1e-3)
+    assert abs(clipped(values + 1j * values, 0.5).imag).max() == pytest.approx(0.5, rel=1e-3)
+    time = np.arange(6000) / 6000.0
+    settings = Receiver.from_settings({**QUIET, "hum_db": 0.0, "hum_lines": 2.0})
+    lines = abs(
+        np.fft.rfft(received(np.exp(2j * np.pi * 700 * time), 6000.0, settings, True, np.random.default_rng(0)))
+    )
+    assert lines[50] / lines[700] == pytest.approx(1.0, rel=1e-3)
+    assert lines[100] / lines[50] == pytest.approx(0.5, rel=1e-3)
+    assert lines[150] < 1e-3 * lines[50]
+    with pytest.raises(InputError, match=r"unknown \['hmu'\]"):
+        Receiver.from_settings({**QUIET, "hmu": 1.0})
+
+
+def test_the_floor_is_the_mean_of_the_noise_whatever_its_colour_and_number():
+    rng = np.random.default_rng(0)
+    colour = np.linspace(1.0, 100.0, 4000)
+    for count in (1, 3, 40):
+        floor = noise_floor(colour * rng.exponential(size=(count, 4000)), 0.005)
+        # A running median of single exponential powers is ln 2 of their mean; of many windows the largest of three
+        # neighbours counts, which lies higher.
+        wanted = {1: np.log(2), 3: np.log(2), 40: 1.46}[count]
+        assert np.mean(floor[300:-300] / colour[300:-300]) == pytest.approx(wanted, rel=0.05)
+
+
+def test_coloured_noise_and_a_line_that_stays_are_no_target():
+    rng, time = np.random.default_rng(0), np.arange(400)
+    intervals = rng.standard_normal((40, 400)) + 1j * rng.standard_normal((40, 400))
+    coloured = np.fft.ifft(np.fft.fft(intervals) * np.where(np.arange(400) < 60, 20.0, 1.0))
+    assert not present(coloured, LOOKING).any()
+    stays = coloured + 3 * np.exp(2j * np.pi * 0.5 * time)
+    assert not present(stays, LOOKING).any()
+    assert present(stays[: ENOUGH - 1], LOOKING).all()
+    stays[5:9] += 3 * np.exp(2j * np.pi * 0.7 * time)
+    assert present(stays, LOOKING).nonzero()[0].tolist() == [5, 6, 7, 8]
+    # Where the noise is known, a recording of one window is enough.
+    assert not present(coloured[:1], LOOKING, coloured[1:2]).any()
+    assert present(stays[5:6], LOOKING, coloured[1:2]).all()
+
+
+def test_simulated_windows_hold_a_target_where_a_receiver_can_hear_it(library):
+    scene = {
+        **library.scenes["cw_24ghz"]["Vehicle"][1],
+        "receiver": {**QUIET, "snr_db": [-60.0, 30.0]}, "second": {"share": 1.0, "level_db": 0.0},
+    }  # fmt: skip
+    clouds = clouds_of(library.records, scene["subtypes"], 1)
+    found, names = intervals(LOOKING, scene, clouds, 1, ("here",), 3, 2)
+    memo = {}
+    for _ in range(2):
+        again, _ = intervals(LOOKING, scene, clouds, 1, ("here",), 3, 2, memo)
+        np.testing.assert_array_equal(found, again)
+    assert len(memo) == 3
+    assert found.shape == (3, 2, 400) and len(names) == 3
+    deaf = {**scene, "receiver": {**QUIET, "snr_db": -60.0}}
+    quiet, _ = intervals(LOOKING, deaf, clouds, 1, ("here",), 3, 2, memo)
+    assert len(memo) == 3
+    power = [np.abs(np.fft.fft(many * np.hanning(400))) ** 2 for many in (found, quiet)]
+    over = [part.max(axis=-1) / np.median(part, axis=-1) for part in power]
+    assert (over[0] > 30).all() and (over[1] < 30).all()
+
+
+def test_a_longer_vehicle_keeps_round_wheels(library):
+    cloud = clouds_of(library.records, ["Audi A6L 2019"], 1)["Audi A6L 2019"]
+    longer = sized(cloud, [0.5, 2.0, 1.5])
+    body = np.isin(cloud.part, cloud.parts_of("body"))
+    np.testing.assert_allclose(longer.points[body], cloud.points[body] * [0.5, 2.0, 1.5])
+    for wheel in cloud.parts_of("wheel"):
+        mine = np.flatnonzero(cloud.part == wheel)
+        np.testing.assert_allclose(radii(longer, mine), radii(cloud, mine), atol=1e-12)
+        np.testing.assert_allclose(longer.hinges[wheel], cloud.hinges[wheel] * [0.5, 2.0, 1.5])
+
+
+def test_foil_ends_where_it_ends(library):
+    cloud = clouds_of(library.records, ["DJI Mini 2"], 1)["DJI Mini 2"]
+    ratio = strengthened(cloud, {"foil": 20.0}, "10000000", 0.7).rcs_m2 / cloud.rcs_m2
+    rotor = np.flatnonzero(cloud.part == cloud.parts_of("rotor")[0])
+    blade = rotor[: len(rotor) // 2]
+    inner = radii(cloud, blade) <= 0.7 * radii(cloud, blade).max()
+    np.testing.assert_allclose(ratio[blade], np.where(inner, 100.0, 1.0))
+    assert 0 < inner.sum() < len(blade) and ratio[rotor[len(rotor) // 2 :]].max() == 1.0
+
+
+def test_a_passing_body_spreads_and_a_leaving_one_is_a_line():
+    time = np.arange(12_000) / 6000.0
+    wave = 0.0125
+    speed = np.minimum(3.0 + 4.0 * time, 9.0)
+    one = np.exp(4j * np.pi / wave * np.cumsum(speed) / 6000.0)
+    other = np.exp(4j * np.pi / wave * np.cumsum(np.minimum(speed + 1.5, 9.0)) / 6000.0)
+    noise = np.random.default_rng(0).standard_normal((2, len(time)))
+    signal = one + other + 0.01 * (noise[0] + 1j * noise[1])
+    spec = {"window": 512, "hop": 64, "slowest_mps": 1.0}
+    found = kinds.drive_figures(signal, 6000.0, wave, spec)
+    assert found["speed_mps"] == pytest.approx(9.0, abs=0.15)
+    # Two equal lines 1.5 m/s apart, each smeared by 0.34 m/s within a window: four fifths of the energy.
+    assert found["spread_mps"] == pytest.approx(1.6, abs=0.2)
+    assert kinds.drive_figures(one + 0.01 * noise[0], 6000.0, wave, spec)["spread_mps"] < 0.4
+
+
+def test_a_harmonic_is_told_from_the_beat():
+    time = np.arange(6000) / 1000.0
+    beat = sum(np.exp(2j * np.pi * 2.4 * order * time) / order for order in (1, 2, 3))
+    spec = {
+        "window": 128, "hop": 8, "slowest_mps": 0.3, "fastest_mps": 3.0, "cycle_s": [0.2, 0.8],
+        "harmonic_hz": [6.0, 8.5],
+    }  # fmt: skip
+    pulses = (0.5 + 0.5 * np.cos(2 * np.pi * 2.4 * time)) ** 4 * np.exp(2j * np.pi * 80 * time)
+    found = kinds.wing_figures(beat + pulses, 1000.0, 0.03, spec)
+    assert found["beat_hz"] == pytest.approx(2.4, abs=0.12)
+    assert found["harmonic_hz"] == pytest.approx(7.2, abs=0.05)
+    assert found["harmonic_order"] == pytest.approx(3.0, abs=0.15)
+    assert found["base_over_harmonic_db"] > 3
+
+
+def test_an_ablation_changes_what_it_names_and_pairs_its_differences(library):
+    plainer = ablate.changed(library, "cw_24ghz", {"receiver": {"snr_db": 30.0}, "drop": ["beam", "size"]})
+    for scene in plainer.scenes["cw_24ghz"]["Vehicle"]:
+        assert scene["receiver"]["snr_db"] == 30.0 and "beam" not in scene and "size" not in scene
+        assert scene["texture_db"] == library.scenes["cw_24ghz"]["Vehicle"][0]["texture_db"]
+    assert plainer.scenes["uav_3ghz"] == library.scenes["uav_3ghz"]
+    with pytest.raises(InputError, match=r"receiver has no \['snr'\]"):
+        ablate.changed(library, "cw_24ghz", {"receiver": {"snr": 1.0}})
+    with pytest.raises(InputError, match="expected some of receiver and drop"):
+        ablate.changed(library, "cw_24ghz", {"droop": []})
+    row = lambda seed, file, label, right: ["cw", seed, "set", "tuning", file, label, 10, 0, 0, 0, 0, right]  # noqa: E731
+    rows = [row(s, f, "Bird", r) for f, s, r in (("a", 0, 50.0), ("a", 1, 70.0), ("b", 0, 90.0), ("b", 1, 90.0))]
+    rows += [row("mean", "a", "Bird", 0.0), row(0, "c", "UAV", 40.0), row(1, "c", "UAV", 40.0)]
+    full = ablate.shares(rows)
+    np.testing.assert_array_equal(full["Bird"], [[50.0, 70.0], [90.0, 90.0]])
+    own = {label: values - 10.0 for label, values in full.items()}
+    bird, uav, both = ablate.summarised("cw", "less", own, full, {"Bird": 20, "UAV": 10}, 1)
+    assert bird[2:7] == ["Bird", 2, 2, 20, 65.0] and uav[2:7] == ["UAV", 2, 1, 10, 30.0]
+    assert both[2:7] == ["balanced", 2, 3, 30, 47.5]
+    for line in (bird, uav, both):
+        # Every file and seed lost ten points, so the paired difference has no spread.
+        assert line[9:] == pytest.approx([-10.0, -10.0, -10.0])
+    assert bird[7] < 65.0 < bird[8] and replace(LOOKING, detect_db=0.0).detect_db == 0

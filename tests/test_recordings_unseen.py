@@ -1,0 +1,80 @@
+"""A recording nobody has seen: a WAV and five lines become spectra, tiles and a prediction, in mono or stereo."""
+
+import numpy as np
+import pytest
+import yaml
+from scipy.io import wavfile
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.errors import InputError
+from lowalt.recordings.__main__ import main
+from lowalt.recordings.sets import recordings
+
+SECONDS = 1.3
+CARRIER = 24.0e9
+SPEED = 6.0
+
+
+def drive(folder, rate, stereo, swapped=False, **more):
+    """Write a WAV of a target that leaves at SPEED from a fifth of a second on, and its record of five lines."""
+    time = np.arange(round(SECONDS * rate)) / rate
+    tone = np.exp(-2j * np.pi * 2 * SPEED * CARRIER / 299792458.0 * time) * (time > 0.2)
+    noise = np.random.default_rng(0).standard_normal((2, len(time)))
+    values = 0.2 * tone + 0.01 * (noise[0] + 1j * noise[1])
+    pair = np.stack([values.real, values.imag][:: -1 if swapped else 1], axis=1)
+    wavfile.write(folder / "drive.wav", rate, (20000 * (pair if stereo else pair[:, 0])).astype(np.int16))
+    block = {"file": "drive.wav", "carrier_hz": CARRIER, "channel": "complex" if stereo else "real"}
+    path = folder / "drive.yaml"
+    path.write_text(yaml.safe_dump({**block, "source": "made here", "licence": "MIT", **more}))
+    return path
+
+
+@pytest.mark.parametrize("rate, stereo", [(8000, False), (44100, False), (22050, True), (96000, True)])
+def test_a_wav_and_five_lines_become_spectra_and_tiles(tmp_path, rate, stereo):
+    path = drive(tmp_path, rate, stereo)
+    main(["import", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out")])
+    signals = np.load(tmp_path / "out/signals.npy")
+    spectra = np.load(tmp_path / "out/spectra.npz")
+    assert len(list((tmp_path / "out/tiles").glob("*.png"))) == len(signals) == int(SECONDS / 0.4)
+    # The line stands at the speed that was driven, in every window, in one channel as in two.
+    power = np.abs(np.fft.fft(signals * np.hanning(signals.shape[1]), axis=1)) ** 2
+    line = power.argmax(axis=1) / signals.shape[1] * 3000.0 * 299792458.0 / CARRIER / 2
+    np.testing.assert_allclose(line, SPEED, atol=0.03)
+    assert set(spectra) == {"vrp", "trp", "vt"} and all(np.isfinite(spectra[name]).all() for name in spectra)
+
+
+def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path):
+    from lowalt.recognition.checkpoint import save
+    from lowalt.recordings.recognise import recogniser, settings
+
+    model, _ = recogniser(settings("config/measured/recognition.yaml"))
+    save(tmp_path / "model.pt", "made here", {"twin": "cw_24ghz", "weights": model.state_dict()})
+    path = drive(tmp_path, 44100, True)
+    call = ["predict", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out"), "--model"]
+    main([*call, str(tmp_path / "model.pt"), str(tmp_path / "model.pt")])
+    rows = read_csv(tmp_path / "out/predictions.csv")
+    assert [row["start_s"] for row in rows] == ["0", "0.4", "0.8"]
+    assert {row["target"] for row in rows} == {"yes"}
+    for row in rows:
+        shares = [float(row[name]) for name in ("UAV", "Bird", "Vehicle", "Pedestrian")]
+        assert sum(shares) == pytest.approx(1, abs=1e-3)
+
+
+def test_swapped_channels_are_refused_where_the_direction_is_known(tmp_path):
+    call = ["import", "--radar", "cw_24ghz", "--out", str(tmp_path / "out"), "--record"]
+    main([*call, str(drive(tmp_path, 22050, True, moves="away"))])
+    with pytest.raises(InputError, match="channels swapped, the record says the target moves away"):
+        main([*call, str(drive(tmp_path, 22050, True, swapped=True, moves="away"))])
+    # Where nobody knows the direction, the one channel that this radar has hears the same speed.
+    main([*call, str(drive(tmp_path, 22050, True, swapped=True))])
+
+
+def test_a_record_beside_a_new_file_goes_before_the_sets_pattern(tmp_path):
+    folder = tmp_path / "vehicle_24ghz"
+    folder.mkdir()
+    drive(folder, 22050, True, label="Pedestrian")
+    (one,) = recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
+    assert (one.name, one.half, one.record.label, one.record.channel) == ("drive.wav", "test", "Pedestrian", "complex")
+    drive(folder, 22050, True)
+    with pytest.raises(InputError, match=r"drive.yaml: no label, expected one of"):
+        recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
