@@ -225,12 +225,14 @@ class Products:
         return files
 
     def prepared(self, wildcards: Any) -> list[str]:
-        """All that the run makes without torch before its first training; nothing where its data are another run's."""
+        """What the run makes without torch before its first training; nothing where its data are another run's.
+
+        The echo's cost is left out: a download beside it would falsify its times.
+        """
         run, base = self._run, f"results/{self._run.name}"
         if run.data != run.name:
             return []
         names = ["SHA256SUMS", "distances.csv", "clouds.png", "shards/README.md"]
-        names += ["cost.png"] if self._config["report"]["cost"] else []
         views = self.own_views(wildcards) if self._config["recognition"]["cache"] else []
         return [*(f"{base}/{name}" for name in names), *views]
 
