@@ -17,11 +17,14 @@ from lowalt.effects.interface import (
     BoundsItself,
     ChoosesCells,
     FiltersCells,
+    MovesImages,
+    Quantises,
     SamplesTime,
     WeighsPoints,
 )
 from lowalt.effects.response import ImagePath
 from lowalt.effects.sending import Sending
+from lowalt.effects.steering import Steered
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
 
@@ -68,6 +71,7 @@ class Chain:
         )
         self.others: list[Chain] = []
         """Other targets of the beam, each with its own view; everything they ask for is computed."""
+        self.step = 0.0
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
             self.factor = self.factor * effect.module.visible(effect.settings, view, draws(effect.name))
@@ -80,8 +84,13 @@ class Chain:
     @cached_property
     def peaks(self) -> np.ndarray:
         """Largest sum of amplitudes (N, P) that each part can have in a range cell of the result."""
+        return self.strengths * self.amplification
+
+    @cached_property
+    def strengths(self) -> np.ndarray:
+        """Largest sum of amplitudes (N, P) that each part can have in a range cell before the receiver."""
         amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
-        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor)) * self.amplification
+        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor))
 
     @cached_property
     def direct(self) -> np.ndarray:
@@ -132,6 +141,8 @@ class Chain:
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         for effect in self.receiver:
             draws = self.draws(stream_name(effect.name))
+            if providing([effect], Quantises):
+                self.step = effect.module.step(effect.settings, samples)
             samples = effect.module.receive(effect.settings, samples, self._frame, draws)
         return self.sending.cells(self.sending.received(samples, rows))
 
@@ -222,25 +233,30 @@ class Chain:
         many samples.
         """
         delays, weights = times
-        groups: list[tuple[int, np.ndarray | float]] = [(0, factor)]
+        everyone = np.arange(len(view.times_s))
+        groups: list[tuple[int, np.ndarray | float, np.ndarray]] = [(0, factor, everyone)]
         if "cyclic_prefix" in on:
             cut = self.by_need["cyclic_prefix"]
             first = cut.module.first_samples(cut.settings, view)
-            groups = [(int(count), factor * (first == count)) for count in np.unique(first)]
+            groups = [(int(count), factor * (first == count), _any_of(first == count)) for count in np.unique(first)]
             turned = cut.module.turn(cut.settings, view.network, self._frame.baseband_hz)
         # Visibility and reflection coefficients stay during a symbol; only places move.
         held = self._paths if view is self.view else self._paths_of(view)
         samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
+        now, before = self.sending.aired[rows], self.sending.aired_before[rows] if "cyclic_prefix" in on else None
         for delay, weight in zip(delays, weights, strict=True):
             later = view.at(view.times_s + delay) if "symbol_motion" in on else view
-            moved = self._paths_of(later) if held else []
-            paths = [ImagePath(new.places, old.coefficient) for new, old in zip(moved, held, strict=True)]
-            for count, strength in groups:
-                spectrum = self._echo(later, on, strength, paths)
-                echo = waveform.transmit(spectrum, self.sending.aired[rows])
+            paths = held
+            if held and later is not view:
+                paths = [ImagePath(new, old.coefficient) for new, old in zip(self._images_of(later), held, strict=True)]
+            rays = Steered(later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error)
+            for count, strength, lit in groups:
+                spectrum = rays.echo(strength)[lit]
+                echo = waveform.transmit(spectrum, now[lit])
                 if count:
-                    echo[:, :count] = waveform.transmit(spectrum * turned, self.sending.aired_before[rows])[:, :count]
-                samples += weight * echo
+                    echo[:, :count] = waveform.transmit(spectrum * turned, before[lit])[:, :count]
+                echo *= weight
+                samples[lit] += echo
         return samples
 
     def _paths_of(self, view: View) -> list[ImagePath]:
@@ -248,6 +264,16 @@ class Chain:
         return [
             path for effect in providing(self.channel, AddsPaths) for path in effect.module.paths(effect.settings, view)
         ]
+
+    def _images_of(self, view: View) -> list[np.ndarray]:
+        """The points' images (N, L, 3) m of all paths except the direct one."""
+        found = []
+        for effect in providing(self.channel, AddsPaths):
+            if providing([effect], MovesImages):
+                found += effect.module.images(effect.settings, view)
+            else:
+                found += [path.places for path in effect.module.paths(effect.settings, view)]
+        return found
 
     @cached_property
     def _paths(self) -> list[ImagePath]:
@@ -279,3 +305,8 @@ class Chain:
         return Frame(
             view.network, view.station, self.sending.known, self.power, 2.0 * range_m / SPEED_OF_LIGHT, aired, starts
         )  # fmt: skip
+
+
+def _any_of(chosen: np.ndarray) -> np.ndarray:
+    """Return the symbols (K,) in which any point (N, L) is chosen."""
+    return np.flatnonzero(chosen.any(axis=1))

@@ -61,6 +61,14 @@ class Amplifies(Protocol):
 
 
 @runtime_checkable
+class Quantises(Protocol):
+    """Optional, receiver: a staircase of equal steps, whose `amplifies` is infinite."""
+
+    def step(self, settings: dict, samples: np.ndarray) -> float:
+        """Return the height of a step for these samples (N, M) (their units)."""
+
+
+@runtime_checkable
 class PerturbsMotion(Protocol):
     """Motion: an effect that moves the target or its parts; all stations see the same motion."""
 
@@ -143,6 +151,14 @@ class AddsPaths(Protocol):
 
     def paths(self, settings: dict, view: View) -> list[ImagePath]:
         """Return the further paths; `response` forms every pair of a path out and a path back."""
+
+
+@runtime_checkable
+class MovesImages(Protocol):
+    """Optional, channel: further paths whose images alone are asked for, where the coefficients are known."""
+
+    def images(self, settings: dict, view: View) -> list[np.ndarray]:
+        """Return the images (N, L, 3) m of the paths, in the order of `paths`."""
 
 
 @runtime_checkable

@@ -30,6 +30,7 @@ from lowalt.effects.interface import (
     WeighsPoints,
 )
 from lowalt.effects.need import Decision
+from lowalt.effects.steps import error_before, steps_alone
 from lowalt.effects.view import Beams, View
 from lowalt.targets.cloud import Cloud
 
@@ -111,6 +112,9 @@ def received_signal(
     chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
+        if share is not None and asked and steps_alone(chain):
+            largest = largest_of(chain.run(frozenset(), leads=False))
+            chain.error = error_before(chain, INTERPOLATION * share * largest)
         outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
         return Received(outcome.signal, outcome.cell, power, notes)

@@ -17,7 +17,7 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.reference_range import reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.effects import interpolation, response_loops
+from lowalt.effects import interpolation, moment_loops, response_loops
 
 
 class ImagePath(NamedTuple):
@@ -54,37 +54,71 @@ def response(
     Raises: InputError for a point in the station, or a link with other paths. Source: paper Eqs. 4, 7 and 24;
     Jacobi-Anger expansion; Willis, Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
-    radio = radar(network, station)
-    if station.transmitter is not None and paths:
-        raise InputError(f"station {station.name}: {len(paths)} further paths, expected none on a link between two")
-    seen = [ImagePath(places), *paths]
-    chosen, refs = _end(network, station, seen, aim_m)
-    sending = chosen
-    if station.transmitter is not None:
-        sending, _ = _end(network, station.transmitter, seen, aim_m)
-        refs = _one_way(network, station, places[:, 0]) + _one_way(network, station.transmitter, places[:, 0])
-    strength = np.atleast_2d(radio.scale * np.sqrt(rcs_m2) * factor)
-    symmetric = network.transmit == network.receive and station.transmitter is None
-    pairs = _pairs(len(chosen), symmetric)
-    own = np.exp(-2j * np.pi * refs[:, 4])
-    # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
-    # table. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
-    kappas, weights = _frequencies(network, radio, squint, error / 2)
-    rest = 10.0 ** np.floor(np.log10(error / 10))
-    out = [path.one_way(network.transmit, kappas, squint, wavefront, rest) for path in sending]
-    back = out if symmetric else [path.one_way(network.receive, kappas, squint, wavefront, rest) for path in chosen]
-    widest = max(float(abs(excess).max()) for _, excess in (*out, *back))
-    reach = _round_up(radio.cells * widest)
-    table = _table(reach, radio.subcarriers, rest)
-    sums = np.zeros((len(kappas), len(places), len(table)), np.complex128)
-    for a, b, times in pairs:
-        (there, excess_a), (home, excess_b) = out[a], back[b]
-        response_loops.moments(
-            strength, there, home, times, excess_a, excess_b, 0.5 * radio.cells, reach, sums
-        )  # fmt: skip
-    result = np.empty((len(places), radio.subcarriers), np.complex128)
-    response_loops.spread(sums, own, refs[:, 5].astype(np.int64), refs[:, 6].copy(), table, weights, result)
-    return result
+    rays = Rays(network, station, places, aim_m, paths, squint=squint, wavefront=wavefront, error=error)
+    return rays.summed(np.sqrt(rcs_m2) * factor)
+
+
+class Rays:
+    """All points' one-way factors over every path at given instants, from which responses to any strengths follow.
+
+    Arguments as of `response`.
+    """
+
+    def __init__(
+        self, network: Network, station: Station, places: np.ndarray, aim_m: np.ndarray,
+        paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float,
+    ):  # fmt: skip
+        self.radio = radio = radar(network, station)
+        if station.transmitter is not None and paths:
+            raise InputError(f"station {station.name}: {len(paths)} further paths, expected none on a link between two")
+        seen = [ImagePath(places), *paths]
+        chosen, self.refs = _end(network, station, seen, aim_m)
+        sending = chosen
+        if station.transmitter is not None:
+            sending, _ = _end(network, station.transmitter, seen, aim_m)
+            self.refs = _one_way(network, station, places[:, 0]) + _one_way(network, station.transmitter, places[:, 0])
+        # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
+        # tables. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
+        kappas, self.weights = _frequencies(network, radio, squint, error / 2)
+        self.rest = 10.0 ** np.floor(np.log10(error / 10))
+        symmetric = network.transmit == network.receive and station.transmitter is None
+        self.pairs = _pairs(len(chosen), symmetric)
+        self.out = [path.one_way(network.transmit, kappas, squint, wavefront, self.rest) for path in sending]
+        self.back = self.out
+        if not symmetric:
+            self.back = [path.one_way(network.receive, kappas, squint, wavefront, self.rest) for path in chosen]
+
+    def summed(self, strength: np.ndarray) -> np.ndarray:
+        """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
+
+        Symbols without any strength are zero.
+        """
+        radio, refs = self.radio, self.refs
+        strength = radio.scale * np.atleast_2d(strength)
+        own, whole = np.exp(-2j * np.pi * refs[:, 4]), refs[:, 5].astype(np.int64)
+        result = np.zeros((len(refs), radio.subcarriers), np.complex128)
+        for a, b, times in self.pairs:
+            there, home = self.out[a], self.back[b]
+            # Each pair's ranges are measured from their own middle, so that few orders of its moments matter.
+            middle = 0.5 * radio.cells * (there.middle + home.middle)
+            reach = _round_up(0.5 * radio.cells * (there.reach + home.reach))
+            table = _table(reach, radio.subcarriers, self.rest)
+            sums = np.empty((len(self.weights), len(refs), len(table)), np.complex128)
+            moment_loops.moments(
+                strength, there.factors, home.factors, times, there.excess, home.excess, middle, 0.5 * radio.cells,
+                reach, sums,
+            )  # fmt: skip
+            moment_loops.spread(sums, own, whole, refs[:, 6] + middle, table, self.weights, result)
+        return result
+
+
+class _OneWay(NamedTuple):
+    """One array over one path: factors (Q, N, L), excess range (N, L), its middle (N,) and reach to either side (m)."""
+
+    factors: np.ndarray
+    excess: np.ndarray
+    middle: np.ndarray
+    reach: float
 
 
 def _end(network: Network, station: Station, paths: Sequence[ImagePath], aim_m: np.ndarray) -> tuple[list, np.ndarray]:
@@ -113,8 +147,8 @@ class _PathFactors:
 
     def one_way(
         self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, wavefront: bool, error: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return (Q, N, L), coefficient, array sum, 1/r and half the two-way phase, and the excess range (N, L) m.
+    ) -> _OneWay:
+        """Return coefficient, array sum, 1/r and half the two-way phase of all points, and their excess range.
 
         kappas: the arrays' frequencies (Q,) over the carrier. Raises: InputError for a point in the station.
         """
@@ -140,7 +174,8 @@ class _PathFactors:
                 f"position of a point at symbol {(fault - 1) // count[1]} is that of station {self.name} (r = 0), "
                 "expected r > 0"
             )
-        return out, excess
+        low, high = excess.min(axis=1), excess.max(axis=1)
+        return _OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
 
 
 def _half_diagonal(shape: tuple[int, int]) -> float:
@@ -169,10 +204,10 @@ def _pairs(paths: int, symmetric: bool) -> list[tuple[int, int, float]]:
 
 def _round_up(value: float) -> float:
     """Return the next power of sqrt(2), so that a few tables serve all samples."""
-    return 2.0 ** (np.ceil(2 * np.log2(max(value, 0.25))) / 2)
+    return 2.0 ** (np.ceil(2 * np.log2(max(value * (1 + 1e-12), 2.0**-5))) / 2)
 
 
-@lru_cache(maxsize=32)
+@lru_cache(maxsize=64)
 def _table(reach: float, count: int, error: float) -> np.ndarray:
     """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), the terms left out sum to less than `error`."""
     band = np.pi * reach

@@ -18,8 +18,6 @@ DEGREE = 11
 WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
 """Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
 COSINE, SINE = 0, 1
-STRIDE = 16
-"""Subcarriers that share one short phase ramp."""
 
 
 @lru_cache(maxsize=16)
@@ -191,92 +189,3 @@ def near_field(places, station, axes, spacing, wave, beam, aims, shape, series, 
                 for k in range(orders):
                     total += series[q, k] * sums[k]
                 out[q, n, l] = total
-
-
-@LOOPS
-def moments(strength, out, back, times, excess_a, excess_b, half_cells, reach, result):
-    """Add sum over points of z T_p(u) to result (Q, N, P): z = times strength out back, u the two-way range in cells.
-
-    out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L); u counts from the reference and runs from -1 to 1 over
-    `reach` cells.
-    """
-    nodes, symbols, count = out.shape
-    x, before, last = np.empty(count), np.empty(count), np.empty(count)
-    real, imag = np.empty((nodes, count)), np.empty((nodes, count))
-    for n in range(symbols):
-        row = n % strength.shape[0]
-        for i in range(count):
-            x[i] = half_cells * (excess_a[n, i] + excess_b[n, i]) / reach
-            before[i], last[i] = x[i], 1.0
-        for q in range(nodes):
-            for i in range(count):
-                z = times * strength[row, i] * (out[q, n, i] * back[q, n, i])
-                real[q, i], imag[q, i] = z.real, z.imag
-        for p in range(result.shape[2]):
-            for q in range(nodes):
-                re, im = 0.0, 0.0
-                for i in range(count):
-                    re += last[i] * real[q, i]
-                    im += last[i] * imag[q, i]
-                result[q, n, p] += complex(re, im)
-            for i in range(count):
-                t = last[i]
-                last[i] = 2.0 * x[i] * t - before[i] if p else x[i]
-                before[i] = t
-
-
-@LOOPS
-def turned(whole, cells, half_steps, total):
-    """Phase factor of a delay by `whole` + `cells` range cells, `half_steps` halves of a subcarrier off the middle.
-
-    Whole cells turn by multiples of pi / M, which are reduced in whole numbers.
-    """
-    index = whole % (2 * total) * half_steps % (2 * total)
-    angle = math.pi * (cells * half_steps + index) / total
-    return complex(math.cos(angle), -math.sin(angle))
-
-
-@LOOPS
-def spread(sums, own, whole, cells, table, weights, result):
-    """Fill result (N, M) with own[n] sum_q weights[q, m] sum_p (-j)^p sums[q, n, p] table[p, m], delayed.
-
-    sums: (Q, N, P); table: (P, M) real; weights: (Q, M); the delay about the middle subcarrier is `whole` (N,) int64
-    plus `cells` (N,) range cells.
-    """
-    nodes, symbols, orders = sums.shape
-    total = table.shape[1]
-    re, im, node_re, node_im = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
-    ramp_re, ramp_im = np.empty(STRIDE), np.empty(STRIDE)
-    for n in range(symbols):
-        re[:] = 0.0
-        im[:] = 0.0
-        for q in range(nodes):
-            node_re[:] = 0.0
-            node_im[:] = 0.0
-            for p in range(orders):
-                a, b = sums[q, n, p].real, sums[q, n, p].imag
-                if p % 4 == 1:
-                    a, b = b, -a
-                elif p % 4 == 2:
-                    a, b = -a, -b
-                elif p % 4 == 3:
-                    a, b = -b, a
-                for m in range(total):
-                    node_re[m] += a * table[p, m]
-                    node_im[m] += b * table[p, m]
-            for m in range(total):
-                re[m] += node_re[m] * weights[q, m]
-                im[m] += node_im[m] * weights[q, m]
-        step, wide = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
-        phase = 1.0 + 0.0j
-        for k in range(STRIDE):
-            ramp_re[k], ramp_im[k] = phase.real, phase.imag
-            phase *= step
-        phase = own[n] * turned(whole[n], cells[n], 1 - total, total)
-        for first in range(0, total, STRIDE):
-            a, b = phase.real, phase.imag
-            for k in range(min(STRIDE, total - first)):
-                x, y = re[first + k], im[first + k]
-                c, d = a * x - b * y, a * y + b * x
-                result[n, first + k] = complex(c * ramp_re[k] - d * ramp_im[k], c * ramp_im[k] + d * ramp_re[k])
-            phase *= wide

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
-from lowalt.effects.response import ImagePath, response
+from lowalt.effects.response import ImagePath, Rays
 from lowalt.effects.view import View
 
 
@@ -15,17 +15,36 @@ def echo(view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float
 
     Where beams are turned, the arrays' weights keep the phase of the arrays' middles.
     """
-    given = view.network, view.station
-    if view.beams is None or len(view.beams.starts_s) == 1:
-        return response(*given, view.places, view.cloud.rcs_m2, view.aim_m, paths=paths, factor=factor, **asked)
-    result = np.empty((len(view.times_s), view.network.subcarriers), np.complex128)
-    for number, rows in view.beam_rows():
-        some = [ImagePath(path.places[rows], _rows_of(path.coefficient, rows)) for path in paths]
-        aim = view.beams.aims_m[number]
-        result[rows] = _kept_phase(view, aim) * response(
-            *given, view.places[rows], view.cloud.rcs_m2, aim, paths=some, factor=_rows_of(factor, rows), **asked
-        )  # fmt: skip
-    return result
+    return Steered(view, paths, **asked).echo(factor)
+
+
+class Steered:
+    """The one-way factors of a view's target, beam by beam, from which echoes of any strengths follow."""
+
+    def __init__(
+        self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
+        error: float = 1e-14,
+    ):  # fmt: skip
+        self.view, asked = view, {"squint": squint, "wavefront": wavefront, "error": error}
+        given = view.network, view.station
+        if view.beams is None or len(view.beams.starts_s) == 1:
+            self.beams = [(slice(None), 1.0, Rays(*given, view.places, view.aim_m, paths, **asked))]
+            return
+        self.beams = []
+        for number, rows in view.beam_rows():
+            some = [ImagePath(path.places[rows], _rows_of(path.coefficient, rows)) for path in paths]
+            aim = view.beams.aims_m[number]
+            self.beams.append((rows, _kept_phase(view, aim), Rays(*given, view.places[rows], aim, some, **asked)))
+
+    def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
+        """Return the subcarriers (N, M) with `factor` (N, L) on every point's amplitude, zero where all of it is."""
+        view, roots = self.view, np.sqrt(self.view.cloud.rcs_m2)
+        if view.beams is None or len(view.beams.starts_s) == 1:
+            return self.beams[0][2].summed(roots * factor)
+        result = np.empty((len(view.times_s), view.network.subcarriers), np.complex128)
+        for rows, phase, rays in self.beams:
+            result[rows] = phase * rays.summed(roots * _rows_of(factor, rows))
+        return result
 
 
 def _rows_of(values: np.ndarray | complex, rows: np.ndarray) -> np.ndarray | complex:

@@ -81,10 +81,15 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
     return i0e(2.0 * (2 * np.pi * frequency_hz / SPEED_OF_LIGHT * height_m * sine) ** 2)
 
 
+def images(settings: dict, view: View) -> list[np.ndarray]:
+    """Return the points' images (N, L, 3) m below the ground."""
+    return [view.places * [1.0, 1.0, -1.0]]
+
+
 def paths(settings: dict, view: View) -> list[ImagePath]:
     """Return the one further path: images (N, L, 3) m and coefficients (N, L)."""
-    images = view.places * [1.0, 1.0, -1.0]
-    away = images - np.asarray(view.station.position_m)
+    (mirrored,) = images(settings, view)
+    away = mirrored - np.asarray(view.station.position_m)
     sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
     # The middle of the station's band stands for all of it.
     frequency = radar(view.network, view.station).centre_hz
@@ -92,4 +97,4 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     coefficient = fresnel(np.clip(sine, 0.0, 1.0), *properties)
     if settings["roughness_m"] > 0:
         coefficient *= roughness(sine, settings["roughness_m"], frequency)
-    return [ImagePath(images, coefficient * view.relative_gain(images))]
+    return [ImagePath(mirrored, coefficient * view.relative_gain(mirrored))]

@@ -47,6 +47,11 @@ def full_scale(samples: np.ndarray, backoff_db: float) -> float:
     return rms * 10 ** (backoff_db / 20)
 
 
+def step(settings: dict, samples: np.ndarray) -> float:
+    """Return the height of a step for these samples, zero for a look of zeros."""
+    return full_scale(samples, settings["backoff_db"]) * 2.0 ** (1 - settings["bits"])
+
+
 def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the converter's output (N, M); the gain before it is set once for the whole look.
 
