@@ -1,4 +1,4 @@
-"""The compiled loops between a target's points and all subcarriers: moments of the points' ranges, and their spectra."""
+"""The compiled loops between a target's points and all subcarriers: moments of the ranges, and their spectra."""
 
 import math
 
