@@ -100,6 +100,21 @@ def test_a_table_of_its_own_row_order_gives_the_labels(tmp_path):
     assert run_of(tmp_path, {"targets": {"own": {"bus": own}}}).classes[-1] == "Bus"
 
 
+def test_the_command_makes_a_record_with_its_row(tmp_path, monkeypatch):
+    from lowalt.__main__ import main
+    from lowalt.commands import target
+    from lowalt.targets.cloud import read
+
+    monkeypatch.setattr(target, "_picture", lambda cloud, out: str(out))
+    monkeypatch.chdir(tmp_path)
+    out = tmp_path / "bus.npz"
+    own = records(tmp_path, {"My bus": BUS})
+    assert main(["target", "make", own, "--out", str(out)]) == 0
+    assert read(out).record["published"]["len_m"] == 12.0
+    bare = records(tmp_path, {"My bus": {key: value for key, value in BUS.items() if key != "row"}}, "bare")
+    assert main(["target", "make", bare, "--out", str(out)]) != 0
+
+
 def test_heights_of_unknown_names_are_refused(tmp_path):
     with pytest.raises(InputError, match=r"motion.height_m: \['Brid'\]"):
         run_of(tmp_path, {"motion": {"height_m": {"Brid": [1, 2]}}})

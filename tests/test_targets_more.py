@@ -63,6 +63,10 @@ def test_a_propeller_turns_about_the_axis_to_the_front(clouds):
     now, half, whole = positions(cloud, row, np.array([0.0, 1 / 80, 1 / 40]))[:, cloud.part == 1]
     assert np.allclose(now, whole, atol=1e-9) and np.allclose(now[:, 1], half[:, 1], atol=1e-9)
     hub = cloud.hinges[1]
+    # Near the tips a blade lies flat in the plane it turns in.
+    outer = cloud.points[cloud.part == 1] - hub
+    outer = outer[np.abs(outer[:, 0]) > 0.7 * np.abs(outer[:, 0]).max()]
+    assert len(outer) > 5 and np.ptp(outer[:, 1]) < 0.6 * np.ptp(outer[:, 2])
     assert np.allclose((now - hub)[:, [0, 2]], -(half - hub)[:, [0, 2]], atol=1e-9)
 
 

@@ -8,13 +8,14 @@ import yaml
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, slug
+from lowalt.common.street import PACKAGE
 from lowalt.targets.cloud import read, write
 from lowalt.targets.draft import drafted
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.records import load_table, merge, read_records
+from lowalt.targets.records import load_table, merge, read_records, with_row
 
-TABLE = Path("config/targets.csv")
+TABLE = PACKAGE.parents[1] / "config/targets.csv"
 
 
 def _unit(text: str) -> str | float:
@@ -51,7 +52,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
     for parser in (new, make):
-        parser.add_argument("--table", type=Path, default=TABLE, help=f"published targets (default: {TABLE})")
+        parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the checkout's)")
         parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
                             help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
 
@@ -93,7 +94,13 @@ def _make(given: argparse.Namespace) -> str:
     subtype = given.subtype or (next(iter(records)) if len(records) == 1 else None)
     if subtype not in records:
         raise InputError(f"{given.record}: --subtype is {subtype!r}, expected one of {list(records)}")
-    record = merge(_row(given.table, subtype), records[subtype], f"{given.record}: {subtype}")
+    where, record = f"{given.record}: {subtype}", records[subtype]
+    row = load_table(given.table).get(subtype)
+    if "row" in record:
+        row = with_row(row, subtype, record.pop("row"), where)
+    if row is None:
+        raise InputError(f"{where}: no row in {given.table}, expected a key `row` or the name of a published subtype")
+    record = merge(row, record, where)
     cloud = make(record, given.inputs, given.seed)
     out = given.out or Path(f"{slug(subtype)}.npz")
     write(out, cloud)

@@ -11,6 +11,7 @@ from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, masts_m
 from lowalt.common.streams import stream
+from lowalt.common.street import PACKAGE
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw, region_polygon
@@ -25,7 +26,7 @@ NORMALS = 150
 """Normals drawn at most: more would hide the points."""
 FRAMES = 24
 FLOOR_DB = -40.0
-CONFIG = Path("config/default.yaml")
+CONFIG = PACKAGE.parents[1] / "config/default.yaml"
 
 
 def _colours(cloud: Cloud) -> np.ndarray:
