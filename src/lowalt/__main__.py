@@ -1,12 +1,15 @@
-"""The command `lowalt`, for people: scenes and spectra explained, own targets made; stages have commands of their own
-(python -m lowalt.STAGE)."""
+"""The command `lowalt`, for people: run the workflow, look at scenes, spectra, samples and runs, make own targets.
+
+Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input. Stages have commands of their own
+(python -m lowalt.STAGE).
+"""
 
 import argparse
 import os
 import sys
 from pathlib import Path
 
-from lowalt.commands import spectra, target
+from lowalt.commands import compare, data, sample, spectra, target, workflow
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -30,27 +33,40 @@ def _explained(given: argparse.Namespace) -> str:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run `lowalt explain SCENE`, `lowalt spectra` or `lowalt target ACTION`; returns the exit status."""
-    line = argparse.ArgumentParser(prog="lowalt", description=__doc__)
+    """Run one command of `lowalt`; returns the exit status."""
+    line = argparse.ArgumentParser(
+        prog="lowalt", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = line.add_subparsers(dest="command", required=True)
     explain = commands.add_parser(
-        "explain", help="what a scene simulates, what it leaves out and why, and what it costs"
-    )
+        "explain", help="what a scene simulates, what it leaves out and why, and what it costs",
+        epilog="example: lowalt explain config/scenes/urban.yaml --sample Crow:3",
+    )  # fmt: skip
     explain.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the base; more may follow it")
     explain.add_argument("--base", type=Path, default=CONFIG, help=f"base configuration (default: {CONFIG})")
     explain.add_argument("--schema", type=Path, default=SCHEMA, help=f"its schema (default: {SCHEMA})")
     explain.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     explain.add_argument("--station", help="the station that listens (default: the first)")
     explain.add_argument("--no-cost", action="store_true", help="do not measure times")
+    workflow.add_to(commands)
+    sample.add_to(commands, CONFIG, SCHEMA)
+    data.add_to(commands, CONFIG, SCHEMA)
+    compare.add_to(commands)
     target.add_to(commands)
     spectra.add_to(commands, CONFIG, SCHEMA)
     given = line.parse_args(arguments)
+    actions = {
+        "run": workflow.run, "status": workflow.states, "sample": sample.run, "verify": data.verify,
+        "remake": data.remake, "predict": data.predict, "compare": compare.run, "target": target.run,
+        "spectra": spectra.run, "explain": _explained,
+    }  # fmt: skip
     try:
-        text = {"target": target.run, "spectra": spectra.run, "explain": _explained}[given.command](given)
+        text = actions[given.command](given)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
-    print(text)
+    if text:
+        print(text)
     return 0
 
 

@@ -1,0 +1,96 @@
+"""The command `lowalt compare`: two finished runs side by side: configuration, accuracy, time, bytes."""
+
+import argparse
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.errors import InputError
+from lowalt.common.files import text_of
+from lowalt.common.yaml_files import load_yaml
+
+
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add `compare` to a parser's commands."""
+    line = commands.add_parser(
+        "compare", help="two finished runs: what differs in configuration, accuracy, time and bytes",
+        epilog="example: lowalt compare results/default results/tiny",
+    )  # fmt: skip
+    line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
+    line.add_argument("--json", action="store_true", help="print JSON for a program")
+
+
+def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
+    """Yield (dotted key, value) of everything in nested mappings that is no mapping, or is an empty one."""
+    for key, value in block.items():
+        if isinstance(value, dict) and value:
+            yield from leaves(value, f"{where}{key}.")
+        else:
+            yield f"{where}{key}", value
+
+
+def _accuracies(folder: Path) -> dict[str, float]:
+    """Mean accuracy over the SNRs (%) by "protocol scheme"; empty where the run trained nothing."""
+    path = folder / "accuracy.csv"
+    found: dict[str, list[float]] = {}
+    for row in read_csv(path, "protocol", "scheme", "accuracy_percent") if path.exists() else []:
+        found.setdefault(f"{row['protocol']} {row['scheme']}", []).append(float(row["accuracy_percent"]))
+    return {name: sum(values) / len(values) for name, values in found.items()}
+
+
+def _seconds(folder: Path) -> dict[str, float]:
+    """Processor seconds by stage; empty where the run has no report."""
+    path = folder / "stages.csv"
+    return {row["rule"]: float(row["cpu_s"]) for row in read_csv(path, "rule", "cpu_s")} if path.exists() else {}
+
+
+def _sizes(folder: Path) -> dict[str, int]:
+    path = folder / "shards/index.json"
+    if not path.exists():
+        return {}
+    index = json.loads(text_of(path, "index"))
+    return {"samples": index["samples"], "bytes": index["bytes"]}
+
+
+def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
+    """Return, of two runs' folders, {part: {what: (of the first, of the second)}} for all that differs or is measured.
+
+    Parts: configuration (only what differs), accuracy_percent, processor_s, data. None stands where a run has none.
+    Raises: InputError naming the folder that is no run's.
+    """
+    for folder in (one, other):
+        if not (folder / "config.yaml").is_file():
+            raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    settings = [dict(leaves(load_yaml(folder / "config.yaml"))) for folder in (one, other)]
+
+    def pairs(first: dict, second: dict) -> dict[str, tuple]:
+        return {name: (first.get(name), second.get(name)) for name in dict.fromkeys([*first, *second])}
+
+    differs = {name: pair for name, pair in pairs(*settings).items() if pair[0] != pair[1]}
+    measured = {"accuracy_percent": _accuracies, "processor_s": _seconds, "data": _sizes}
+    return {"configuration": differs} | {part: pairs(of(one), of(other)) for part, of in measured.items()}
+
+
+def _cell(value: object) -> str:
+    return "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
+
+
+def run(given: argparse.Namespace) -> str:
+    """Return the comparison as text, or as JSON.
+
+    Raises: as `compared`.
+    """
+    found = compared(*given.runs)
+    if given.json:
+        return json.dumps(found, indent=1)
+    lines = []
+    for part, rows in found.items():
+        if not rows:
+            continue
+        lines += ["", f"{part.replace('_', ' ')}: {given.runs[0]} | {given.runs[1]}"]
+        wide = max(map(len, rows))
+        for name, (first, second) in rows.items():
+            change = f"   {second - first:+.2f}" if isinstance(first, float) and isinstance(second, float) else ""
+            lines.append(f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{change}")
+    return "\n".join(lines[1:])

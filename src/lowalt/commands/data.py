@@ -1,0 +1,100 @@
+"""The commands `lowalt verify`, `lowalt remake` and `lowalt predict`: is a data set whole, what does a model say."""
+
+import argparse
+import json
+from pathlib import Path
+
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.shards.verify import faults
+
+
+def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
+    """Add the three commands to a parser's; base: the configuration by default; schema: its schema."""
+    verify = commands.add_parser(
+        "verify",
+        help="check every byte of a data set",
+        epilog="example: lowalt verify results/default/shards/index.json",
+    )
+    verify.add_argument("index", type=Path, help="index.json of the data set")
+    verify.add_argument("--remake", type=int, default=0, metavar="N", help="also make N random samples again")
+    remake = commands.add_parser(
+        "remake", help="make stored samples again from their records and compare every byte",
+        epilog="example: lowalt remake results/default/shards/index.json crow-000003-snr013",
+    )  # fmt: skip
+    remake.add_argument("index", type=Path, help="index.json of the data set")
+    remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
+    for line in (verify, remake):
+        line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
+    predict = commands.add_parser(
+        "predict", help="class probabilities of a tile or of signals by a trained model",
+        epilog="example: lowalt predict results/default/models/seen/abc-vrp-trp-vt/0/model.pt sample.npy",
+    )  # fmt: skip
+    predict.add_argument("model", type=Path, help="model.pt of a training")
+    predict.add_argument("input", type=Path, help="tile (.png), or signals (stations, symbols) complex (.npy)")
+    predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
+    predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
+    predict.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
+    predict.add_argument("--json", action="store_true", help="print JSON for a program")
+
+
+def _remaker(given: argparse.Namespace):
+    from lowalt.shards.read import ShardSet
+    from lowalt.shards.remake import CloudFolder, Remaker
+
+    clouds = given.clouds or given.index.resolve().parent.parent / "clouds"
+    return Remaker(ShardSet(given.index), CloudFolder(clouds))
+
+
+def _ended(lines: list[str], good: str) -> str:
+    """The text to print; a fault ends the command with status 1."""
+    if lines:
+        print("\n".join(lines))
+        raise SystemExit(1)
+    return good
+
+
+def verify(given: argparse.Namespace) -> str:
+    """Check a data set and return one line; print every fault and end with status 1 where there is one.
+
+    Raises: InputError where there is no index.
+    """
+    from lowalt.shards.remake import some
+
+    lines = list(faults(given.index))
+    if given.remake and not lines:
+        remaker = _remaker(given)
+        lines = [line for number in some(remaker.shards, given.remake) for line in remaker.faults(number)]
+    again = f", {given.remake} samples made again" if given.remake else ""
+    return _ended(lines, f"{given.index}: every byte is as it was written{again}")
+
+
+def remake(given: argparse.Namespace) -> str:
+    """Make samples again and return one line; print what differs and end with status 1 where anything does.
+
+    Raises: InputError for a key that the data set lacks.
+    """
+    from lowalt.shards.remake import number_of
+
+    remaker = _remaker(given)
+    lines = [line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key))]
+    return _ended(lines, f"{len(given.sample)} samples made again, equal in every byte")
+
+
+def predict(given: argparse.Namespace) -> str:
+    """Return the probability of each class, the most probable first.
+
+    Raises: InputError for a file that is no model, tile or signal.
+    """
+    from lowalt.recognition.runs import load as load_model
+    from lowalt.recognition.runs import predict as probabilities
+
+    config = load([given.base, *given.overlay], given.schema)
+    settings = {key: config[key] for key in ("network", "spectra", "images")}
+    if given.input.suffix not in (".png", ".npy"):
+        raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
+    found = probabilities(load_model(given.model), existing(given.input, "input"), settings)
+    if given.json:
+        return json.dumps(found)
+    return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))

@@ -1,0 +1,63 @@
+"""The command `lowalt sample`: one sample of a configuration as files and as a picture with axes."""
+
+import argparse
+import json
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.config import load
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.shards.dataset import Dataset, Place
+from lowalt.shards.record import sample_key
+from lowalt.tiles.png import encode
+
+
+def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
+    """Add `sample` to a parser's commands; base: the configuration by default; schema: its schema."""
+    line = commands.add_parser(
+        "sample", help="one sample: tile, signals, record, and a picture with axes",
+        epilog="example: lowalt sample Crow 3 --snr 13 --out samples",
+    )  # fmt: skip
+    line.add_argument("subtype", help="name of the subtype, as in the table of targets")
+    line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
+    line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
+    line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the base configuration")
+    line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
+    line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
+    line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
+
+
+def run(given: argparse.Namespace) -> str:
+    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; return what was written.
+
+    Raises: InputError for a wrong configuration, subtype or model.
+    """
+    from lowalt.report.figures.sample import figure
+
+    config = load([given.base, *given.overlay], given.schema)
+    everything = config["targets"]["select"]
+    # Only the target's own cloud is made.
+    config["targets"]["select"] = [given.subtype]
+    dataset = Dataset(config, inputs=config["inputs"] or os.environ.get("LOWALT_INPUTS"))
+    if given.model < 0 or (everything and given.subtype not in everything):
+        raise InputError(f"{given.subtype!r}, model {given.model}: expected a selected subtype and a number from 0")
+    (group,) = dataset.plan.groups
+    place = Place(group, given.subtype, given.model, given.snr)
+    image, signal, record = dataset.made(place)
+    key, renderer = sample_key(given.subtype, given.model, given.snr), dataset.maker.renderer
+    noise = "no noise" if math.isinf(given.snr) else f"SNR {given.snr:g} dB"
+    written = {
+        f"{key}.png": encode(image, renderer.images.palette),
+        f"{key}.json": (json.dumps(record, indent=1) + "\n").encode(),
+        f"{key}-axes.png": figure(image, renderer, f"{given.subtype}, motion model {given.model}, {noise}"),
+    }
+    for name, data in written.items():
+        with replacing(given.out / name) as temporary:
+            temporary.write_bytes(data)
+    with replacing(given.out / f"{key}.npy") as temporary:
+        np.save(temporary, signal)
+    return "\n".join(str(given.out / name) for name in (*written, f"{key}.npy"))

@@ -1,0 +1,54 @@
+"""One sample as a picture with axes: a row for each station, a column for each spectrum."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.network import Station
+from lowalt.report.figures.style import plt, png
+from lowalt.spectra import spectrum
+from lowalt.tiles.render import Renderer, split
+
+
+class Axes(NamedTuple):
+    """What the edges of an image stand for: its width (s), and the speeds (m/s) of its lowest and highest row."""
+
+    seconds: float
+    bottom_mps: float
+    top_mps: float
+
+
+def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
+    """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom."""
+    settings, network = renderer.spectra[name], renderer.network
+    first, last = spectrum(name).speeds(settings, station.frequency_hz, network.symbol_interval_s)
+    return Axes((network.symbols - settings.window) * network.symbol_interval_s, first, last)
+
+
+def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
+    """Return the picture (PNG bytes) of a tile of index values (rows, columns) uint8, with time and speed on its axes.
+
+    Where a spectrum's top row approaches, its image is turned over, so that receding is upwards everywhere. Speeds
+    beyond the largest that a spectrum shows fold back into it: the phase then turns by more than half a circle from
+    symbol to symbol.
+    """
+    network, names = renderer.network, list(renderer.spectra)
+    shape = len(network.stations), len(names)
+    images = split(tile, len(names))
+    drawn, panels = plt.subplots(*shape, figsize=(3.3 * shape[1], 2.6 * shape[0]), squeeze=False, layout="constrained")
+    drawn.suptitle(title, fontsize=10)
+    for number, panel in enumerate(panels.flat):
+        row, column = divmod(number, shape[1])
+        station, name = network.stations[row], names[column]
+        axes = axes_of(name, station, renderer)
+        panel.imshow(
+            images[number], cmap=renderer.images.colour_map, vmin=0, vmax=255, aspect="auto", interpolation="nearest",
+            extent=(0.0, axes.seconds, axes.bottom_mps, axes.top_mps),
+        )  # fmt: skip
+        panel.set_ylim(sorted(axes[1:]))
+        most = max(map(abs, axes[1:]))
+        panel.set_title(f"{station.name}: {spectrum(name).TITLE}\nfolds beyond {most:.1f} m/s", fontsize=8)
+        panel.set_ylabel("" if column else "radial speed (m/s)\nreceding upwards", fontsize=8)
+        panel.set_xlabel("time (s)" if row == shape[0] - 1 else "", fontsize=8)
+        panel.tick_params(labelsize=7)
+    return png(drawn)

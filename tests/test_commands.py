@@ -1,0 +1,150 @@
+"""The commands of `lowalt`: what they write and say, their exit status, and examples that parse."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dataset import build, publish
+from lowalt import Dataset
+from lowalt.__main__ import main
+from lowalt.commands import workflow
+from lowalt.common.config import load_yaml
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.recognition import runs
+from lowalt.report.figures.sample import axes_of
+from lowalt.tiles.png import decode
+from lowalt.tiles.render import Renderer, split
+from test_recognition_training import train, with_training, write_views
+
+CONFIG = load_yaml("config/default.yaml")
+
+
+def renderer():
+    return Renderer.from_settings({key: CONFIG[key] for key in ("network", "spectra", "images")})
+
+
+@pytest.mark.parametrize("speed", [2.0, -3.5])
+@pytest.mark.parametrize("name", ["vrp", "trp"])
+def test_a_target_of_known_speed_stands_at_that_speed_on_the_axes(name, speed):
+    render = renderer()
+    times, column = render.network.times_s, list(render.spectra).index(name)
+    phases = [4 * np.pi * place.frequency_hz * speed * times / SPEED_OF_LIGHT for place in render.network.stations]
+    images = split(render.tile(np.exp(-1j * np.array(phases)).astype(np.complex64)), len(render.spectra))
+    for number, station in enumerate(render.network.stations):
+        axes = axes_of(name, station, render)
+        rows = images[3 * number + column][:, 100].astype(int)
+        place = (np.flatnonzero(rows == rows.max()).mean() + 0.5) / len(rows)
+        assert axes.top_mps + (axes.bottom_mps - axes.top_mps) * place == pytest.approx(speed, abs=0.1)
+        assert axes.seconds == pytest.approx((400 - (256 if name == "vrp" else 8)) * 2.5e-3)
+
+
+def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys):
+    assert main(["sample", "Crow", "3", "--snr", "13", "--out", str(tmp_path)]) == 0
+    said = capsys.readouterr().out.split()
+    stem = "crow-000003-snr013"
+    assert [Path(path).name for path in said] == [f"{stem}.png", f"{stem}.json", f"{stem}-axes.png", f"{stem}.npy"]
+    alone = {**CONFIG, "targets": {**CONFIG["targets"], "select": ["Crow"]}}
+    dataset = Dataset(alone)
+    (number,) = [n for n in range(len(dataset)) if dataset.key(n) == stem]
+    made = dataset[number]
+    np.testing.assert_array_equal(decode((tmp_path / f"{stem}.png").read_bytes())[0], made.image)
+    np.testing.assert_array_equal(np.load(tmp_path / f"{stem}.npy"), made.signal)
+    assert json.loads((tmp_path / f"{stem}.json").read_text()) == made.record
+    assert (tmp_path / f"{stem}-axes.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def run_folder(path, accuracy, seconds, **changes):
+    path.mkdir()
+    (path / "config.yaml").write_text(json.dumps({"run": path.name, "seed": 1, "motion": {"models": 3}} | changes))
+    (path / "accuracy.csv").write_text(
+        "protocol,scheme,snr_db,accuracy_percent\n" + "".join(f"seen,A:VT,{snr},{accuracy + snr}\n" for snr in (0, 2))
+    )
+    (path / "stages.csv").write_text(f"rule,cpu_s\necho,{seconds}\n")
+    return path
+
+
+def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
+    one = run_folder(tmp_path / "one", 80, 5.0)
+    other = run_folder(tmp_path / "other", 81, 2.5, seed=2)
+    assert main(["compare", str(one), str(other), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["configuration"] == {"run": ["one", "other"], "seed": [1, 2]}
+    assert found["accuracy_percent"] == {"seen A:VT": [81.0, 82.0]}
+    assert found["processor_s"] == {"echo": [5.0, 2.5]} and found["data"] == {}
+    assert main(["compare", str(one), str(other)]) == 0
+    assert "81.00 | 82.00   +1.00" in capsys.readouterr().out
+    assert main(["compare", str(one), str(tmp_path)]) == 2
+    assert f"{tmp_path}: has no config.yaml" in capsys.readouterr().err
+
+
+def given(**changes):
+    from types import SimpleNamespace
+
+    return SimpleNamespace(**{"overlay": [], "target": [], "cores": "all", "dry_run": False, "profile": None} | changes)
+
+
+def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatch, capsys):
+    line = workflow.command(given(overlay=[Path("config/tiny.yaml")], target=["data"], cores="2", dry_run=True))
+    assert line[3:] == ["--snakefile", str(workflow.SNAKEFILE), "--cores", "2", "--configfile", "config/tiny.yaml",
+                        "--dry-run", "--", "data"]  # fmt: skip
+    assert workflow.SNAKEFILE.is_file()
+    assert main(["run", str(tmp_path / "none.yaml")]) == 2
+    assert "configuration: no file at" in capsys.readouterr().err
+    monkeypatch.setattr(workflow.subprocess, "run", lambda line: given(returncode=7))
+    with pytest.raises(SystemExit) as ended:
+        main(["run"])
+    assert ended.value.code == 7
+    monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")
+    assert main(["run"]) == 2 and "has no workflow" in capsys.readouterr().err
+
+
+def test_status_of_a_folder_where_nothing_ran_is_an_error(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["status"]) == 2
+    assert "no run has started here" in capsys.readouterr().err
+
+
+def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch):
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    names = capsys.readouterr().out.split("{")[1].split("}")[0].split(",")
+    assert {"run", "status", "explain", "sample", "predict", "verify", "remake", "compare", "target"} <= set(names)
+    for name in sorted(set(names) - {"target", "spectra"}):
+        with pytest.raises(SystemExit) as ended:
+            main([name, "--help"])
+        text = " ".join(capsys.readouterr().out.split())
+        assert ended.value.code == 0 and f"example: lowalt {name}" in text
+
+
+def test_verify_and_remake_end_with_1_where_a_byte_differs(tmp_path, capsys):
+    publish(build(tmp_path / "made", "signal"), tmp_path / "set")
+    index = tmp_path / "set/index.json"
+    assert main(["verify", str(index)]) == 0
+    assert "every byte is as it was written" in capsys.readouterr().out
+    (shard, *_) = sorted((tmp_path / "set").glob("*.tar"))
+    raw = bytearray(shard.read_bytes())
+    raw[700] ^= 1
+    shard.write_bytes(raw)
+    with pytest.raises(SystemExit) as ended:
+        main(["verify", str(index)])
+    assert ended.value.code == 1 and shard.name in capsys.readouterr().out
+    assert main(["remake", str(index), "nothing"]) == 2
+    assert "does not say how echoes were computed" in capsys.readouterr().err
+
+
+def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
+    trained = tmp_path / "model"
+    train(write_views(tmp_path / "views.npz"), trained, with_training(steps=2, validate_every=2))
+    signals = np.exp(1j * np.arange(1200).reshape(3, 400) ** 1.4).astype(np.complex64)
+    np.save(tmp_path / "a.npy", signals)
+    line = ["predict", str(trained / "model.pt"), str(tmp_path / "a.npy")]
+    assert main([*line, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    settings = {key: CONFIG[key] for key in ("network", "spectra", "images")}
+    assert found == runs.predict(runs.load(trained / "model.pt"), tmp_path / "a.npy", settings)
+    assert main(line) == 0
+    shown = [text.split()[-1] for text in capsys.readouterr().out.splitlines()]
+    assert shown == sorted(found, key=found.get, reverse=True)
+    assert main([*line[:2], str(tmp_path / "a.wav")]) == 2
