@@ -1,5 +1,6 @@
 """The campaign's own logic: disks that a run really fills, and files that two runs must share to the byte."""
 
+import os
 import random
 import signal
 import subprocess
@@ -10,6 +11,7 @@ import psutil
 import pytest
 
 from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
 from lowalt.workflow.campaign import LARGE_MB, SMALL_MB, room_mb
 from lowalt.workflow.disturb import disturb, workers
 from lowalt.workflow.trial import checksums
@@ -59,3 +61,15 @@ def test_a_killed_worker_is_one_that_computes_and_no_process_of_another_run(tmp_
             for process in [*workers(run), run]:
                 if process.is_running():
                     process.kill()
+
+
+def test_a_file_s_next_writer_removes_what_a_killed_one_left_and_nothing_else(tmp_path):
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    left = [f".seen.{ended.pid}.part.npy", f".seen.{os.getppid()}.part.npy", f".seen2.{ended.pid}.part.npy"]
+    left += [".seen.x.part.npy"]
+    for name in left:
+        (tmp_path / name).write_text("left")
+    with replacing(tmp_path / "seen.npy") as temporary:
+        temporary.write_text("whole")
+    assert {path.name for path in tmp_path.iterdir()} == {"seen.npy", *left[1:]}

@@ -30,6 +30,7 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        _sweep(path)
         if size is not None and size > free_bytes(path):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         yield temporary
@@ -48,6 +49,26 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
         # A folder that could not be made holds no file either.
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
+
+
+def _sweep(path: Path) -> None:
+    """Remove what killed processes had written of `path`: nobody else would, and a full disk needs the room."""
+    begin, end = f".{path.stem}.", f".part{path.suffix}"
+    for entry in os.scandir(path.parent):
+        number = entry.name.removeprefix(begin).removesuffix(end)
+        if entry.name == f"{begin}{number}{end}" and number.isdigit() and not _lives(int(number)):
+            Path(entry.path).unlink(missing_ok=True)
+
+
+def _lives(process: int) -> bool:
+    """Whether this machine has a process of that id."""
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def free_bytes(path: str | Path) -> int:
