@@ -111,6 +111,10 @@ def test_a_flock_flies_with_its_target_and_others_on_their_own():
     assert flock.std() < 6 and flock.std(axis=0) == pytest.approx([0.5] * 3, rel=0.3)
     pigeons = speeds([pair for m in range(40) for pair in beside({**TWO, "subtypes": ["Pigeon"]}, model=m)])
     assert abs(pigeons.mean(axis=0)).max() < 3 and pigeons.std(axis=0).min() > 2
+    cars = {**TWO, "count": [1, 1], "subtypes": ["Audi A6L 2019"]}
+    ground = np.linalg.norm(speeds([pair for m in range(40) for pair in beside(cars, model=m)]), axis=1)
+    # Uniform over the published 1 to 20 m/s, whatever the drone's 5.9 m/s.
+    assert ground.min() >= 1 and ground.max() <= 20 and ground.std() > 3.5
 
 
 def test_counts_are_drawn_over_their_whole_range():
