@@ -203,3 +203,22 @@ def test_a_canceller_removes_leakage_but_not_the_converters_noise_that_it_brings
 def test_leakage_through_another_oscillator_is_refused(other):
     with pytest.raises(InputError, match="transmit_leakage"):
         transmit_leakage.check(transmit_leakage.DEFAULTS, CheckedScene(network(), other, ()))
+
+
+# By need
+
+
+@pytest.mark.parametrize(
+    "sent", [{"data_symbols": {"order": 64}}, {"comb_pilots": {"spacing": 4}}, {"power_amplifier": {"backoff_db": 0.0}}]
+)
+@pytest.mark.parametrize("tolerance", [0.3, 1e-2])
+def test_whatever_is_left_out_keeps_the_tolerance_with_these_too(rng, sent, tolerance):
+    cloud, row = target(rng, points=3, size_m=0.1, wheel_hz=10.0)
+    row |= {"x_m": 300.0}
+    given = {**sent, "iq_imbalance": {}, "squint": {}, "wavefront": {}, "symbol_motion": {}}
+    station = network().stations[0]
+    full = received_signal(scene(given), station, cloud, row)
+    some = received_signal(scene(given, tolerance=tolerance), station, cloud, row)
+    assert abs(some.signal - full.signal).max() <= tolerance * abs(full.signal).max()
+    if tolerance == 0.3:
+        assert any(not decision.computed for decision in some.decisions)
