@@ -23,7 +23,7 @@ QUICK = (
     "up -y front -x",
     "names that grow",
     "units by part",
-    "groups",
+    "objects",
     "instances in GLB",
     "Box car",
     "Box bird",

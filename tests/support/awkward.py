@@ -167,7 +167,7 @@ CASES = {
     "units by part": (separate, {"unit": "mm", "by_part": "cm"}),
     "groups": (grouped, {"keyword": "g"}), "objects": (grouped, {"keyword": "o"}),
     "instances in GLB": (instanced, {"suffix": ".glb"}),
-    "a file name with braces": (cut, {"file": "{odd} folder/my {craft} 1.stl"}),
+    "a file name with signs": (cut, {"file": "odd folder/my craft (1), new.stl"}),
     "a ply in a folder": (cut, {"unit": "cm", "file": "deep/er/craft.ply"}),
     "Box car": (car, {}), "Box bird": (bird, {}),
 }  # fmt: skip

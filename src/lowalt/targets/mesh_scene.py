@@ -73,16 +73,16 @@ def pieces(path: Path, groups: bool = False) -> list[Piece]:
 def selected(path: Path, names: list[str] | None) -> list[Piece]:
     """Return the pieces of a file that `names` call by geometry or instance, all by default.
 
-    The names of an OBJ file are those of its materials' surfaces or, where one is not among them, of its objects and
-    groups.
+    The names of an OBJ file are those of its objects and groups or, where one is not among them, of its materials'
+    surfaces. Split by materials, a file of one material is a whole under the name of its first object.
     Raises: InputError naming the file, the names that are not in it and those that are.
     """
-    found = pieces(path)
     if names is None:
-        return found
-    if _lacking(found, names) and path.suffix.lower() == ".obj":
-        grouped = pieces(path, groups=True)
-        found = found if _lacking(grouped, names) else grouped
+        return pieces(path)
+    found = pieces(path, groups=path.suffix.lower() == ".obj")
+    if _lacking(found, names):
+        materials = pieces(path)
+        found = found if _lacking(materials, names) else materials
     if _lacking(found, names):
         known = sorted({name for piece in found for name in (piece.geometry, piece.instance)})
         raise InputError(f"{path}: geometry {_lacking(found, names)} is not in it, expected some of {known}")
