@@ -16,6 +16,7 @@ ends. Rows of other labels that the table holds already are kept. Needs a quiet 
 """
 
 import argparse
+import contextlib
 import json
 import os
 import resource
@@ -117,9 +118,13 @@ def main() -> None:
     options.add_argument("--cores", type=int, default=os.cpu_count())
     options.add_argument("--cold", action="store_true", help="fetch all packages from their index")
     options.add_argument("--configfile", nargs="+", default=[], help="overlays of the configuration (default: none)")
+    options.add_argument("--keep", type=Path, help="new folder for the clone and its results (default: removed)")
     given = options.parse_args()
-    with tempfile.TemporaryDirectory() as work:
-        rows = measure(Path(work), given.cores, given.configfile, given.cold)
+    with contextlib.ExitStack() as stack:
+        if given.keep:
+            given.keep.mkdir(parents=True)
+        work = given.keep or Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        rows = measure(work.resolve(), given.cores, given.configfile, given.cold)
     facts = {"label": given.label, "hardware": describe()}
     rows = [facts | {key: short(value) for key, value in row.items()} for row in rows]
     kept = [row for row in read_csv(given.out) if row["label"] != given.label] if given.out.exists() else []
