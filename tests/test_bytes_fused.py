@@ -18,7 +18,7 @@ llvm = pytest.importorskip("llvmlite.binding")
 # The stages whose stored values are not rounded afterwards from a bound, as the echo's are.
 MODULES = (
     "common.exact.arithmetic", "common.exact.sines", "echo.rounding.nearest", "echo.rounding.sums", "motion.kernels",
-    "noise.normals", "spectra.sliding", "tiles.filters", "tiles.huffman", "tiles.render", "tiles.resample",
+    "common.normals", "spectra.sliding", "tiles.filters", "tiles.huffman", "tiles.render", "tiles.resample",
 )  # fmt: skip
 LOOSE = re.compile(
     r"\bf(?:add|sub|mul|div|neg) (?:(?:nnan|ninf|nsz|arcp|afn) )*(?:fast|contract|reassoc)\b|@llvm\.fmuladd"
@@ -29,7 +29,7 @@ LINE, TABLE = "float32[::1]", "float32[:, ::1]"
 SIGNATURES = {
     ("motion.kernels", "_product"): "float64[:, ::1], float64[:, ::1], float64[:, ::1]",
     ("motion.kernels", "_sines"): "float64[::1], float64[::1], float64[::1]",
-    ("noise.normals", "fill"): "uint64[::1], float64, float64[:, ::1]",
+    ("common.normals", "fill"): "uint64[::1], float64, float64[:, ::1]",
     ("spectra.sliding", "fourier_magnitudes"): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
     ("spectra.sliding", "transfer"): f"{LINE}, {LINE}, int64, {TABLE}, {TABLE}, {LINE}, {TABLE}",
     ("tiles.render", "_index"): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",

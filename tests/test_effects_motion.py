@@ -99,7 +99,9 @@ def craft(rotors: int = 4, category: str = "UAV") -> SimpleNamespace:
     """The attributes of a cloud that the motion effects use."""
     parts = list(range(rotors))
     record = {"published": {"size_m": 0.4}}
-    return SimpleNamespace(category=category, record=record, parts_of=lambda kind: parts if kind == "rotor" else [])
+    return SimpleNamespace(
+        category=category, like=category, record=record, parts_of=lambda kind: parts if kind == "rotor" else []
+    )
 
 
 ROW = {

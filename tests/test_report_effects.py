@@ -10,6 +10,7 @@ from PIL import Image
 
 from craft import NETWORK as WIDE
 from craft import craft, row
+from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load, merge
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
@@ -56,7 +57,7 @@ def scene(effects=None, seed=3):
 def measured(effects, snrs=(3.0, INFINITY), models=2):
     tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
     given = [row(model) for model in range(models)]
-    return measure((scene(), scene(effects)), tiles, {"DJI Mini 2": craft()}, given, {}, list(snrs), SIZE)
+    return measure((scene(), scene(effects)), tiles, {"DJI Mini 2": craft()}, given, {}, list(snrs), SIZE, CATEGORIES)
 
 
 @pytest.fixture
@@ -279,7 +280,8 @@ def test_the_command_writes_what_it_measured_and_names_what_is_missing(tmp_path)
     write_cloud(tmp_path / "craft.npz", craft())
     write_table(tmp_path / "chunk.csv", [row(model) for model in range(5)])
     block = {"name": "adc", "effects": {"adc": {"bits": 4}}, "network": NETWORK, "spectra": SPECTRA, "images": IMAGES,
-             "split": SPLIT, "seed": 3, "tolerance": None, "snr_db": ["inf"], "size": SIZE, "models": 1}  # fmt: skip
+             "split": SPLIT, "seed": 3, "tolerance": None, "snr_db": ["inf"], "size": SIZE, "models": 1,
+             "classes": CATEGORIES}  # fmt: skip
     line = ["--settings", json.dumps(block), "--motion", str(tmp_path / "chunk.csv"), "--clouds",
             str(tmp_path / "craft.npz"), "--out", str(tmp_path / "adc.npz")]  # fmt: skip
     main(line)

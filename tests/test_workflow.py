@@ -212,7 +212,7 @@ def declared(rule: str) -> set[str]:
     modules = re.findall(r'"([\w.]+)"', arguments)
     if "SOURCE_MODULES" in arguments:
         modules += [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
-    return {str(path.relative_to(PACKAGE)) for path in sources(*modules)}
+    return {str(path.relative_to(PACKAGE)) for path in sources(*modules, spectra=("vrp", "trp", "vt"))}
 
 
 def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
