@@ -114,8 +114,8 @@ bench-make: $(SETUP)  ## wall and processor time of `make` from an empty clone, 
 status: $(SETUP)  ## what a run in another terminal is doing
 	@$(BIN)/python -m lowalt.workflow.status
 
-cost: $(SETUP)  ## what the echo's accuracy costs in time: results/default/cost.csv and cost.png
-	$(SNAKEMAKE) -- cost
+cost: $(SETUP)  ## what the echo's accuracy costs in time, up to 1600 points: results/cost/cost.csv and cost.png
+	$(SNAKEMAKE) --configfile config/cost.yaml -- cost
 
 accuracy-cost: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
