@@ -15,7 +15,9 @@ TABLES := accuracy comparisons confusion subtypes stages alarms calibration reli
 NUMPYS := 2.0.0 2.4.6
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 
-.PHONY: all default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
+DOCS := .venv/set-up-docs
+
+.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
 all: default
 
@@ -34,7 +36,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(PIP) -c envs/constraints.txt uv || true
 	$(call install,-e '.[workflow$(comma)cost]')
-	rm -f $(SETUP) $(TESTING)
+	rm -f $(SETUP) $(TESTING) $(DOCS)
 	touch $@
 
 $(SETUP): $(BASE)
@@ -42,7 +44,11 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,tools) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	touch $@
+
+$(DOCS): $(BASE)
+	$(call install,$(call of_extra,docs))
 	touch $@
 
 # Where the packages of training are not there yet, they come while the data are made.
@@ -194,6 +200,12 @@ pictures: $(SETUP)  ## the README's picture, from the finished default run
 
 pins: $(TESTING)  ## write the installed versions as the pins
 	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
+
+docs-pages: $(BASE)  ## write the page of the configuration's keys from its schema
+	$(BIN)/python -m lowalt.common.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
+
+docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 
 help:
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'

@@ -13,11 +13,16 @@ def test_the_library_example_runs_as_printed(monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict = {}
     exec(compile(re.search(r"```python\n(.*?)```", README, re.DOTALL)[1], "README.md", "exec"), names)
-    shapes = {"signals": (3, 400), "velocity": (3, 256, 144), "time": (3, 1024, 392), "transfer": (123, 392)}
-    assert {name: names[name].shape for name in shapes} == shapes
-    assert names["tile"].shape == (768, 768)
-    assert names["tile"].dtype == np.uint8
-    assert len(np.unique(names["tile"])) > 100
+    image, signal = names["image"], names["signal"]
+    assert (image.shape, image.dtype) == ((768, 768), np.uint8)
+    assert (signal.shape, signal.dtype) == ((3, 400), np.complex64)
+    assert names["record"]["category"] == names["samples"].classes[names["label"]]
+    assert len(np.unique(image)) > 100
+
+
+def test_it_has_one_table_of_results_and_fits_two_screens():
+    assert len(README.splitlines()) < 100
+    assert README.count("| embedded default") == 1 and len(re.findall(r"^## ", README, re.MULTILINE)) == 5
 
 
 def test_every_file_it_links_to_exists():

@@ -179,7 +179,7 @@ def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
 
 
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Node positions (N, L, 3) of a cyclic recording turned by `body`, linear between its frames (paper Eq. 21)."""
+    """Node positions (N, L, 3) of a cyclic recording turned by `body`, linear between its frames (paper Eq. 22)."""
     frames = len(cloud.track)
     place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
     first = np.minimum(place.astype(np.int64), frames - 1)

@@ -1,0 +1,176 @@
+"""The documents keep their word: functions, files, keys and commands that they name exist, and the site links them."""
+
+import argparse
+import importlib
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from lowalt.__main__ import main
+from lowalt.common import schema_page
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
+from lowalt.effects.catalogue import PLACES
+
+ROOT = Path(__file__).parent.parent
+SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+PAGES = sorted([ROOT / "README.md", *ROOT.glob("docs/**/*.md")])
+PHYSICS = (ROOT / "docs/physics.md").read_text()
+COMMAND = re.compile(r"(?:\.venv/bin/)(?:lowalt|python|snakemake|pip)\b[^`\n]*|(?<=`)make [a-z-]+")
+
+
+def commands(page: Path) -> list[str]:
+    """Commands of a page: in code spans, and lines of shell blocks."""
+    return [line.partition("  #")[0].strip() for line in COMMAND.findall(page.read_text().replace("\\\n", " "))]
+
+
+NAMED = [(page.relative_to(ROOT).as_posix(), command) for page in PAGES for command in commands(page)]
+
+
+class Parsed(Exception):
+    """Raised in the place of running a command whose line was understood."""
+
+
+@pytest.fixture
+def only_parsed(monkeypatch):
+    """`main` understands its line and stops."""
+    whole = argparse.ArgumentParser.parse_args
+
+    def stop(self, *given):
+        whole(self, *given)
+        raise Parsed
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", stop)
+
+
+def test_there_are_commands_of_every_sort():
+    words = {command.split()[0] for _, command in NAMED}
+    assert words == {".venv/bin/lowalt", ".venv/bin/python", ".venv/bin/snakemake", ".venv/bin/pip", "make"}
+    assert len(NAMED) > 60
+
+
+@pytest.mark.parametrize("page, command", [pair for pair in NAMED if pair[1].startswith(".venv/bin/lowalt")])
+def test_every_command_of_lowalt_is_understood(page, command, only_parsed):
+    # FILE, NAME and the like stand for any value; KEY and N are such words too.
+    with pytest.raises((Parsed, SystemExit)) as ended:
+        main(shlex.split(command)[1:])
+    if ended.type is SystemExit:
+        assert "--help" in command and ended.value.code == 0, f"{page}: {command}"
+
+
+@pytest.mark.parametrize("page, command", [pair for pair in NAMED if "/python -m" in pair[1]])
+def test_every_module_and_its_options_exist(page, command):
+    words = shlex.split(command)[2:]
+    if words[0] == "pytest":
+        return
+    path = ROOT / "src" / words[0].replace(".", "/")
+    source = path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__main__.py"
+    assert source.is_file(), f"{page}: {command}"
+    # A command may take its options from functions of its room.
+    known = "\n".join(file.read_text() for file in [source, *source.parent.glob("*.py")])
+    known += (ROOT / "src/lowalt/common/command.py").read_text()
+    missing = [word for word in words if word.startswith("--") and word != "--help" and f'"{word}"' not in known]
+    assert not missing, f"{page}: {command}"
+
+
+def test_every_target_of_make_exists():
+    targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    wanted = {command.split()[1] for _, command in NAMED if command.startswith("make ")}
+    assert len(wanted) > 8 and not wanted - targets
+
+
+@pytest.mark.parametrize("page", [page.relative_to(ROOT).as_posix() for page in PAGES])
+def test_every_link_and_every_file_of_a_command_exists(page):
+    text = (ROOT / page).read_text()
+    plain = re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+    links = [link for link in re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", plain) if link]
+    missing = [link for link in links if not ((ROOT / page).parent / link).exists()]
+    files = re.findall(r"(?<![\w./])(?:config|workflow|design|src|envs|benchmarks|profiles)/[\w./-]+\.\w+", plain)
+    made = re.findall(r'title="([^"]+)"', text)
+    missing += [name for name in files if name not in made and not (ROOT / name).exists()]
+    assert not missing
+
+
+def test_every_function_on_the_page_of_physics_exists():
+    named = re.findall(r"`(lowalt(?:\.\w+)+\.\w+)`", PHYSICS)
+    assert len(named) > 50
+    for name in named:
+        if name.startswith("lowalt.recognition"):
+            pytest.importorskip("torch")
+        module, _, function = name.rpartition(".")
+        assert callable(getattr(importlib.import_module(module), function)), name
+
+
+def test_every_effect_and_every_equation_stands_on_the_page_of_physics():
+    rows = re.findall(r"^\| `(\w+)` \| [^|]", PHYSICS, re.MULTILINE)
+    assert sorted(rows) == sorted(PLACES)
+    numbers = set()
+    for first in re.findall(r"^\| (\d[\d, to]*) \|", PHYSICS, re.MULTILINE):
+        for part in first.split(","):
+            ends = [int(number) for number in part.split("to")]
+            numbers |= set(range(ends[0], ends[-1] + 1))
+    assert numbers == set(range(1, 42))
+
+
+def test_every_effect_stands_on_the_page_of_scenes():
+    text = (ROOT / "docs/scenes.md").read_text()
+    assert not [name for name in PLACES if f"`{name}`" not in text]
+
+
+def test_the_page_of_keys_is_current():
+    kept = (ROOT / "docs/reference/configuration.md").read_text()
+    assert kept == schema_page.page(load_yaml(SCHEMA)), "run: make docs-pages"
+
+
+def test_the_page_of_keys_says_type_range_and_meaning_of_inner_keys():
+    inner = {"type": ["number", "null"], "minimum": 2, "description": "a | b"}
+    block = {"type": "object", "description": "things", "additionalProperties": {"properties": {"far_m": inner}}}
+    text = schema_page.page({"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}})
+    assert "| `seed` | integer |  | root |\n" in text
+    assert "## sites\n\nThings.\n" in text
+    assert "| `NAME.far_m` | number or null | at least 2 | a \\| b |\n" in text
+    with pytest.raises(InputError, match="properties"):
+        schema_page.page({"type": "object"})
+
+
+def test_links_lead_to_the_same_files_in_the_site_as_in_the_repository(monkeypatch):
+    pytest.importorskip("mkdocs")
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    site = importlib.import_module("site_pages")
+    found = site.relinked("[a](../design/echo.md#what) [b](tutorials/target.md) ![c](../design/pictures/tiles.png)",
+                          "docs/tasks.md")  # fmt: skip
+    assert found == "[a](design/echo.md#what) [b](tutorials/target.md) ![c](design/pictures/tiles.png)"
+    assert site.relinked("[a](docs/index.md) [b](config)", "CONTRIBUTING.md") == "[a](index.md) [b](config/README.md)"
+    assert site.relinked("[a](../README.md)", "docs/none.md") == "[a](README.md)"
+    assert site.relinked("[a](nowhere.md)", "docs/index.md") == "[a](nowhere.md)"
+
+
+def test_the_site_builds_without_a_warning_and_with_every_link(tmp_path):
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("mkdocstrings")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path / "site")]
+    environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, run.stderr
+    page = (tmp_path / "site/reference/library.html").read_text()
+    assert "Samples without end" in page
+    assert (tmp_path / "site/design/pictures/tiles.png").is_file()
+
+
+def test_every_page_of_the_site_exists_and_every_page_is_in_the_site():
+    nav = yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"]
+
+    def pages(entry):
+        below = entry.values() if isinstance(entry, dict) else entry
+        return [entry] if isinstance(entry, str) else [name for value in below for name in pages(value)]
+
+    named = {f"docs/{name}" if (ROOT / "docs" / name).is_file() else name for name in pages(nav)}
+    assert not [name for name in named if not (ROOT / name).is_file()]
+    every = {page.relative_to(ROOT).as_posix() for page in [*PAGES, *ROOT.glob("design/*.md")]} - {"README.md"}
+    assert every <= named

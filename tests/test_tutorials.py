@@ -1,0 +1,154 @@
+"""Each tutorial runs as it is printed, block by block, in a folder that looks like a checkout."""
+
+import contextlib
+import importlib
+import io
+import os
+import re
+import runpy
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from dataset import build, publish
+from lowalt.__main__ import main
+
+ROOT = Path(__file__).parent.parent
+FOLDER = ROOT / "docs/tutorials"
+FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
+NEEDS = {"pytorch": "timm", "hugging_face": "datasets"}
+SHARDS = ("pytorch", "hugging_face")
+
+
+@pytest.fixture(scope="module")
+def shards(tmp_path_factory):
+    """A finished data set of 24 samples with its card, in the place of the default's."""
+    folder = tmp_path_factory.mktemp("made")
+    return publish(build(folder / "shards", "image"), folder / "default/shards")
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A folder with links to what a checkout holds, and the current folder of the test."""
+    for name in ("config", "design", "examples", "workflow"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
+    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
+    return tmp_path
+
+
+def in_own_process(line, folder):
+    """Run a command with the copy of the package in a folder; returns what it prints."""
+    words = [sys.executable, "-m", "lowalt", *shlex.split(line)[1:]]
+    environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
+    run = subprocess.run(words, cwd=folder, capture_output=True, text=True, env=environment)
+    assert run.returncode == 0, line + run.stdout + run.stderr
+    return run.stdout
+
+
+def in_this_process(line, monkeypatch):
+    """Run a command here, where the libraries are loaded already; returns what it prints."""
+    words = shlex.split(line)
+    with contextlib.redirect_stdout(io.StringIO()) as printed:
+        if words[0] == ".venv/bin/lowalt":
+            assert main(words[1:]) == 0
+        elif words[1] == "-m":
+            importlib.import_module(f"{words[2]}.__main__").main(words[3:])
+        else:
+            monkeypatch.setattr(sys, "argv", words[1:])
+            runpy.run_path(words[1], run_name="__main__")
+    return printed.getvalue()
+
+
+def followed(page, folder, monkeypatch):
+    """Do what a page says: write the files it names, run its commands and its Python; returns (printed, names)."""
+    printed, names = "", {"__name__": page}
+    for language, title, block in FENCE.findall((FOLDER / f"{page}.md").read_text()):
+        if title == "entry":
+            schema = folder / "workflow/schemas/config.schema.yaml"
+            whole = schema.read_text()
+            schema.write_text(whole.replace("      squint:", f"{block}      squint:", 1))
+        elif title:
+            (folder / title).write_text(block)
+        elif language == "sh":
+            for line in block.splitlines():
+                own = (folder / "src").is_dir()
+                printed += in_own_process(line, folder) if own else in_this_process(line, monkeypatch)
+        elif language == "python":
+            exec(compile(block, f"{page}.md", "exec"), names)
+    return printed, names
+
+
+def linked_tree(folder, real):
+    """A folder like `src` whose folder `real` takes new files: all else are links, so compiled code is found."""
+    place = ROOT / "src"
+    for part in real.split("/"):
+        folder.mkdir()
+        for path in place.iterdir():
+            if path.name not in (part, "__pycache__"):
+                (folder / path.name).symlink_to(path)
+        place, folder = place / part, folder / part
+    folder.mkdir()
+    for path in place.glob("*.py"):
+        (folder / path.name).symlink_to(path)
+
+
+def test_every_tutorial_is_followed_here():
+    pages = {path.stem for path in FOLDER.glob("*.md")}
+    assert pages == {"first_data_set", "trajectory", "target", "effect", "pytorch", "hugging_face", "recording"}
+
+
+def test_a_first_data_set(checkout, capsys, monkeypatch):
+    _, names = followed("first_data_set", checkout, monkeypatch)
+    assert len(names["samples"]) == 80
+    assert capsys.readouterr().out.startswith("80 ")
+    # The overlay of the last step is a whole configuration's overlay.
+    names["load"](["config/default.yaml", "first.yaml"], "workflow/schemas/config.schema.yaml")
+
+
+def test_a_trajectory(checkout, monkeypatch):
+    _, names = followed("trajectory", checkout, monkeypatch)
+    shapes = {"signals": (3, 400), "velocity": (3, 256, 144), "time": (3, 1024, 392), "transfer": (123, 392)}
+    assert {name: names[name].shape for name in shapes} == shapes
+    assert names["tile"].shape == (768, 768) and len(set(names["tile"].ravel().tolist())) > 100
+
+
+def test_a_target(checkout, monkeypatch):
+    printed, names = followed("target", checkout, monkeypatch)
+    assert "4 moving parts drafted" in printed and "5 parts" in printed
+    assert (checkout / "mydrone.png").is_file()
+    assert len(names["samples"].clouds["DJI Mini 2"].kinds) == 5
+
+
+# The quick suite adds an effect to a copy of the tree in tests/test_contributing.py.
+@pytest.mark.slow
+def test_an_effect(checkout, monkeypatch):
+    (checkout / "workflow").unlink()
+    shutil.copytree(ROOT / "workflow", checkout / "workflow")
+    linked_tree(checkout / "src", "lowalt/effects/receiver")
+    printed, _ = followed("effect", checkout, monkeypatch)
+    assert "dc_offset" in printed and "Schenk" in printed and "0.2" in printed
+
+
+@pytest.mark.parametrize("page", SHARDS)
+def test_shards_in_other_tools(page, checkout, shards, capsys, monkeypatch):
+    pytest.importorskip(NEEDS[page])
+    (checkout / "results/default").mkdir(parents=True)
+    shutil.copytree(shards, checkout / "results/default/shards")
+    printed, names = followed(page, checkout, monkeypatch)
+    if page == "pytorch":
+        assert re.search(r"loss \d+\.\d+ after 2 steps, \d+\.\d % of 6 validation samples", printed)
+    else:
+        assert {name: len(rows) for name, rows in names["seen"].items()} == {"train": 12, "validation": 6, "test": 6}
+        assert names["images"].shape[:2] == (3, 3)
+
+
+def test_a_recording(checkout, monkeypatch):
+    _, names = followed("recording", checkout, monkeypatch)
+    assert names["signals"].ndim >= 2
+    assert len(list((checkout / "mine/tiles").glob("*.png"))) > 2
