@@ -10,7 +10,9 @@ from lowalt.common import classes
 from lowalt.common.config import load
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
+from lowalt.report.page import PARTS
 from lowalt.targets.records import load_table, merge
+from pages import sound
 
 STATIONS = {"A": {"position_m": [0.0, 0.0, 25.0], "normal_deg": 60.0}}
 NETWORK = WAVE | {"stations": STATIONS}
@@ -68,6 +70,8 @@ def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
     ends = ("percent", "low", "high")
     assert header[4:] == [f"{rate}_{end}" for rate in ("detected", *words) for end in ends]
     text = reported(tmp_path, config, clouds, rows(targets))
+    page = sound(text)
+    assert page.links[1:] == [f"#{part.id}" for part in PARTS]
     for name in names:
         assert any(f"{name}: {subtype}" in text for subtype, category in targets.items() if category == name)
     assert f"is called {names[0]} where its {names[0]} probability" in text

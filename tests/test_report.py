@@ -18,7 +18,7 @@ from lowalt.report.figures.confusion import confusion_matrices
 from lowalt.report.figures.stage_times import stage_bars
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
-from lowalt.report.sections import accuracy_cost, echo_cost, effects, transfer
+from lowalt.report.sections import accuracy_cost, echo_cost, effects, hard_cases, measured, transfer
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, spreads, stage_times
 
 BANDS = [
@@ -152,7 +152,7 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
 
 def test_a_section_that_a_run_may_lack_is_left_out(bare):
     run = SimpleNamespace(inputs=Inputs(bare))
-    for section in (accuracy_cost, echo_cost, effects, transfer):
+    for section in (accuracy_cost, echo_cost, effects, hard_cases, measured, transfer):
         assert section.values(run) is None
     assert rendered("transfer", None) == ""
 

@@ -14,7 +14,7 @@ from lowalt.common.config import merge, plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
-from lowalt.report.inputs import OPTIONAL
+from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
@@ -272,7 +272,9 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
     ):
         _, products, _ = parts(overlay)
         files = ReportInputs(products.report(CHUNK)).files
-        assert names == (set(files) & set(OPTIONAL)) - {"published"}
+        kept = {name for name in files if name.startswith("kept_")}
+        assert kept == {f"kept_{name}" for name in KEPT}
+        assert names == (set(files) & set(OPTIONAL)) - {"published"} - kept
         assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
     assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)
 

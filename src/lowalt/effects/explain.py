@@ -164,7 +164,13 @@ def explain_scene(
     named: samples (subtype, model number), by default one a category; station: by default the first; measure: whether
     costs are measured. Raises: InputError where the configuration, a sample or a station is wrong.
     """
-    config = load(paths, schema)
+    return explained(load(paths, schema), inputs, named, station, measure)
+
+
+def explained(
+    config: dict, inputs: Path | None, named: list[tuple[str, int]], station: str | None, measure: bool
+) -> str:
+    """Return the explanation of the scene of a whole configuration; arguments and errors as `explain_scene`."""
     checked = check(config)
     effects = tuple(called(config["effects"]))
     scene = Scene(Network.from_settings(config["network"]), config["seed"], config["echo"]["tolerance"], effects)

@@ -21,9 +21,14 @@ FILES = (
 """Names of which every manifest has one file."""
 LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""
+KEPT = {
+    "accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv",
+    "echo_pixels": "default-cost_pixels.csv", "effects": "default-effects.csv", "hard_cases": "hard_cases.csv",
+    "measured": "measured-accuracy.csv",
+}  # fmt: skip
+"""Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
 OPTIONAL = (
-    "published", "transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects",
-    "effects_figure", "measured",
+    "published", "transfer", "echo_cost_figure", "effects_figure", *KEPT, *(f"kept_{name}" for name in KEPT),
 )  # fmt: skip
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""
 
@@ -58,6 +63,10 @@ class Inputs:
 
     def __contains__(self, name: str) -> bool:
         return name in self.files
+
+    def own_or_kept(self, name: str) -> str | None:
+        """Return the manifest's name of this run's file, or else of the kept one; None where there is neither."""
+        return next((found for found in (name, f"kept_{name}") if found in self), None)
 
     def path(self, name: str) -> Path:
         """Return the file called `name`. Raises: InputError where it does not exist."""

@@ -1,6 +1,8 @@
 """The page: the sections in their order, each a module with its own template, put into one self-contained HTML file."""
 
 from pathlib import Path
+from types import ModuleType
+from typing import NamedTuple
 
 import jinja2
 
@@ -14,11 +16,13 @@ from lowalt.report.sections import (
     confusion,
     echo_cost,
     effects,
+    hard_cases,
     made_with,
     measured,
     orderings,
     overview,
     samples,
+    scene,
     stages,
     subtypes,
     targets,
@@ -26,10 +30,30 @@ from lowalt.report.sections import (
     transfer,
 )
 
-SECTIONS = (
-    overview, accuracy, orderings, confusion, bands, alarms, calibration, transfer, trainings, accuracy_cost, subtypes,
-    samples, targets, measured, echo_cost, effects, stages, made_with,
-)  # fmt: skip
+
+class Part(NamedTuple):
+    """A part of the page: its address in the page, its title in the contents, and its sections."""
+
+    id: str
+    title: str
+    sections: tuple[ModuleType, ...]
+
+
+RESULTS = (accuracy, orderings, confusion, subtypes, bands, alarms, calibration, transfer, trainings)
+PARTS = (
+    Part("run", "This run", (overview,)),
+    Part("results", "Results", RESULTS),
+    Part("cost", "What accuracy costs in time", (echo_cost, accuracy_cost)),
+    Part("hard-cases", "Hard cases", (hard_cases,)),
+    Part("effects", "Effects and scenes", (effects, scene)),
+    Part("measured", "Held against measurement", (measured,)),
+    Part("targets", "Targets", (targets,)),
+    Part("samples", "Samples", (samples,)),
+    Part("stages", "Stage times", (stages,)),
+    Part("provenance", "Provenance", (made_with,)),
+)
+"""The parts in the order of the page. All are in every page: one without values says so."""
+SECTIONS = tuple(section for part in PARTS for section in part.sections)
 """The sections in the order of the page.
 
 Each module has `values(run)`. It returns the values that its template shows, or None where the run has no such section.
@@ -48,12 +72,21 @@ def rendered(name: str, values: dict | None) -> str:
     return "" if values is None else _templates().get_template(f"sections/{name}.html").render(values)
 
 
+def assembled(title: str, parts: list[dict[str, str]]) -> str:
+    """Return a self-contained page of parts with their contents; each has id, title and html."""
+    return _templates().get_template("page.html").render(title=title, parts=parts)
+
+
 def section_page(title: str, name: str, values: dict) -> str:
     """Return a page of the one section `name` with these values."""
-    return _templates().get_template("page.html").render(title=title, sections=[rendered(name, values)])
+    return assembled(title, [{"id": name, "title": title, "html": rendered(name, values)}])
 
 
 def page(run: Run) -> str:
     """Return the whole page. Raises: InputError for a table that is missing or lacks a column."""
-    texts = [rendered(module.__name__.rpartition(".")[2], module.values(run)) for module in SECTIONS]
-    return _templates().get_template("page.html").render(title=run.config["run"], sections=texts)
+    parts = []
+    for part in PARTS:
+        texts = [rendered(module.__name__.rpartition(".")[2], module.values(run)) for module in part.sections]
+        html = "\n".join(texts).strip() or "<p>Neither this run nor the kept reference has measured this.</p>"
+        parts.append({"id": part.id, "title": part.title, "html": html})
+    return assembled(f"run “{run.config['run']}”", parts)

@@ -8,6 +8,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.street import PACKAGE
 from lowalt.recognition import choose
+from lowalt.report.inputs import KEPT
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -16,6 +17,9 @@ from lowalt.workflow.sources import near
 FIDELITY = "results/fidelity-exact/transfer.csv"
 """Loss of accuracy by training on echoes at a tolerance; other runs make it, and an error names it where missing."""
 
+REFERENCE = "results/reference"
+PAGE = (".html", ".css", ".js")
+"""Endings of the files that the page is put together from."""
 TABLES = (
     "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
     "calibration.csv", "reliability.csv",
@@ -213,6 +217,12 @@ class Products:
         }
         if self._config["recognition"]["transfer"]:
             files["transfer"] = f"{base}/transfer.csv"
+        files |= {
+            f"kept_{name}": f"{REFERENCE}/{file}" for name, file in KEPT.items() if Path(REFERENCE, file).is_file()
+        }
+        # No rule makes it, so that no workflow needs the package of fifty digits: `make hard-cases` does.
+        if Path(f"{base}/hard_cases.csv").is_file():
+            files["hard_cases"] = f"{base}/hard_cases.csv"
         if block["accuracy"]:
             files["accuracy_cost"] = block["accuracy"]
         if block["measured"]:
@@ -237,8 +247,8 @@ class Products:
         return [*(f"{base}/{name}" for name in names), *views]
 
     def page_templates(self, wildcards: Any) -> list[str]:
-        """The templates of the page and of its sections."""
-        return [near(path) for path in sorted((PACKAGE / "report").rglob("*.html"))]
+        """The templates of the page and of its sections, its style and its scripts."""
+        return [near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""

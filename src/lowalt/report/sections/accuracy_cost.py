@@ -1,12 +1,18 @@
-"""Section: recognition accuracy over time, from a table measured before."""
+"""Section: recognition accuracy over its time, from this run's table or the kept reference."""
 
 from lowalt.report.figures.accuracy_cost import FIDELITY, NEEDED, draw
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
 
+SHOWN = ("backbone", "pixels", "inference_ms_1", "hardware")
+
 
 def values(run: Run) -> dict | None:
-    """Return the figure; None where the run names no such table."""
-    if "accuracy_cost" not in run.inputs:
+    """Return the rows averaged over the SNRs and their figure; None where neither run nor reference has them."""
+    name = run.inputs.own_or_kept("accuracy_cost")
+    if name is None:
         return None
-    return {"picture": embedded(draw(run.inputs.table("accuracy_cost", *NEEDED, *FIDELITY)))}
+    table = run.inputs.table(name, *NEEDED, *FIDELITY, *SHOWN)
+    rows = [row for row in table if row["snr_db"] == "avg" and row["kind"] != "fidelity"]
+    return {"own": name == "accuracy_cost", "rows": rows, "hardware": table[0]["hardware"],
+            "picture": embedded(draw(table))}  # fmt: skip

@@ -48,8 +48,12 @@ def summary(measured: list[dict[str, str]], pixels: list[dict[str, str]]) -> dic
 
 
 def values(run: Run) -> dict | None:
-    """Return the short table and the figure; None where the run does not show them."""
-    if "echo_cost" not in run.inputs:
+    """Return the short table, and the figure of this run's own; None where neither run nor reference has them."""
+    name = run.inputs.own_or_kept("echo_cost")
+    if name is None:
         return None
-    cost = summary(run.inputs.table("echo_cost", *MEASURED), run.inputs.table("echo_pixels", *PIXELS))
-    return {"cost": cost, "picture": embedded(run.inputs.path("echo_cost_figure").read_bytes())}
+    own = name == "echo_cost"
+    changed = "echo_pixels" if own else "kept_echo_pixels"
+    cost = summary(run.inputs.table(name, *MEASURED), run.inputs.table(changed, *PIXELS))
+    picture = embedded(run.inputs.path("echo_cost_figure").read_bytes()) if own else ""
+    return {"own": own, "cost": cost, "picture": picture}

@@ -11,8 +11,10 @@ COLUMNS = (
 
 
 def values(run: Run) -> dict | None:
-    """Return the rows of the table of effects and its figure; None where the run does not show them."""
-    if "effects" not in run.inputs:
+    """Return the rows of the table of effects, and the figure of this run's own; None where there is no table."""
+    name = run.inputs.own_or_kept("effects")
+    if name is None:
         return None
-    rows = run.inputs.table("effects", *COLUMNS)
-    return {"rows": rows, "picture": embedded(run.inputs.path("effects_figure").read_bytes())}
+    own = name == "effects"
+    picture = embedded(run.inputs.path("effects_figure").read_bytes()) if own else ""
+    return {"own": own, "rows": run.inputs.table(name, *COLUMNS), "picture": picture}

@@ -54,5 +54,6 @@ def held(folder: str | Path) -> dict:
 
 
 def values(run: Run) -> dict | None:
-    """Return the section's values; None where the run names no measured tables."""
-    return held(run.inputs.path("measured").parent) if "measured" in run.inputs else None
+    """Return the section's values; None where neither run nor reference has measured tables."""
+    name = run.inputs.own_or_kept("measured")
+    return None if name is None else {"own": name == "measured", **held(run.inputs.path(name).parent)}

@@ -18,7 +18,8 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
 
 
 def values(run: Run) -> dict | None:
-    """Return the pivoted table and the distances by subtype; None where nothing was predicted."""
+    """Return the pivoted table, the worst subtype first, and the distances; None where nothing was predicted."""
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
+    rows.sort(key=lambda row: min(map(float, row[2].values())))
     return {"columns": columns, "rows": rows, "distances": distances} if rows else None

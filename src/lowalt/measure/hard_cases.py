@@ -1,0 +1,189 @@
+"""Inputs on which a formula written down naively fails, each judged in fifty digits: the naive error, ours, our bound.
+
+    python -m lowalt.measure.hard_cases --out hard_cases.csv
+
+One symbol of one station a case. The truth is `lowalt.measure.fifty_digits`. Errors are relative to the true value of
+the range cell that the engine chose. Half a minute where kernels are compiled first; needs mpmath (extra `cost`).
+"""
+
+import argparse
+import dataclasses
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.command import run
+from lowalt.common.csv_tables import write_csv
+from lowalt.common.errors import InputError
+from lowalt.common.hardware import describe
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.echo import echo_signal
+
+COLUMNS = ("case", "why", "naive_error", "error", "bound", "right_cell", "hardware")
+C = SPEED_OF_LIGHT
+
+
+class Case(NamedTuple):
+    """A hard case: why it is hard, the network and its station, points (L, 3) m, and where the beam aims (3,) m."""
+
+    why: str
+    network: Network
+    station: Station
+    points_m: np.ndarray
+    aim_m: np.ndarray
+
+
+class Judged(NamedTuple):
+    """Values of one case in the cell that the engine chose, whether that cell is right, and the engine's bound."""
+
+    ours: complex
+    naive: complex
+    truth: complex
+    right: bool
+    bound: float
+
+
+def network(**changes) -> Network:
+    """Return the cases' network: the default's radar with one station at the origin, with these fields changed."""
+    station = Station("A", (0.0, 0.0, 25.0), 0.0, changes.get("carrier_hz", 4.9e9))
+    base = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (16, 4), (16, 4), 1.0, (station,))
+    return dataclasses.replace(base, **changes)
+
+
+def naive(net: Network, station: Station, points_m: np.ndarray, rcs_m2: np.ndarray, aim_m) -> complex:
+    """Return the strongest cell's value of one symbol by the closed form as first written down (paper, Eq. 24).
+
+    points_m (L, 3), rcs_m2 (L,), aim_m (3,). Angles, sin(N u) / sin(u) and one phase in float64: NaN at 0/0.
+    """
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")
+
+        def look(p):
+            d = np.asarray(p, float) - np.array(station.position_m)
+            r, flat = np.sqrt((d * d).sum(-1)), np.sqrt(d[..., 0] ** 2 + d[..., 1] ** 2)
+            theta = np.pi / 2 - np.angle((d[..., 0] + 1j * d[..., 1]) / flat * np.exp(-1j * station.normal_rad))
+            phi = np.arcsin(d[..., 2] / r)
+            return r, np.cos(phi) * np.cos(theta), np.sin(phi)
+
+        r, psi, omega = look(points_m)
+        _, psi0, omega0 = look(aim_m)
+        kappa = station.frequency_hz / net.carrier_hz
+        gain = np.ones(len(r), complex)
+        for counts in (net.transmit, net.receive):
+            for number, x in zip(counts, (psi - psi0, omega - omega0), strict=True):
+                u = np.pi * kappa * x / 2
+                gain = gain * np.exp(1j * (number - 1) * u) * np.sin(number * u) / np.sin(u)
+        wave = C / net.carrier_hz * np.sqrt(rcs_m2) / (4 * np.pi) ** 1.5 / r**2 * gain
+        wave = wave * np.exp(-4j * np.pi * station.frequency_hz * r / C)
+        count = net.subcarriers
+        x = np.arange(count)[:, None] - r / net.cell_m
+        kernel = np.exp(1j * np.pi * (count - 1) / count * x) * np.sin(np.pi * x) / (count * np.sin(np.pi * x / count))
+        cells = np.sqrt(net.power / (np.prod(net.transmit) * np.prod(net.receive))) * (kernel @ wave)
+        return cells[np.argmax(abs(cells))]
+
+
+def away(distance: float, x: float = 1.0, y: float = 0.3, z: float = 0.1) -> np.ndarray:
+    """Return a point (3,) at a distance (m) from the station, in the direction (x, y, z)."""
+    direction = np.array([x, y, z]) / np.linalg.norm([x, y, z])
+    return np.array([0.0, 0.0, 25.0]) + distance * direction
+
+
+def cluster(distance: float, count: int = 5, size: float = 0.5, seed: int = 3) -> np.ndarray:
+    """Return `count` points (count, 3) about one at this distance (m), scattered by `size` (m)."""
+    return away(distance) + np.random.default_rng(seed).normal(scale=size, size=(count, 3))
+
+
+def _grating() -> tuple:
+    # kappa = 1.02 puts the first grating lobe, 2 / kappa away from the beam, within sight.
+    net = network()
+    station = dataclasses.replace(net.stations[0], frequency_hz=1.02 * net.carrier_hz)
+    psi0, psi = -0.985, -0.985 + 2 / 1.02
+    aim = np.array([100 * np.sqrt(1 - psi0**2), 100 * psi0, 25.0])
+    return net, station, np.array([[100 * np.sqrt(1 - psi**2), 100 * psi, 25.0]]), aim
+
+
+NET = network()
+CELL = NET.cell_m
+EDGE = np.array([[30.5 * CELL, 0.0, 25.0]])
+CENTRE = np.array([[30 * CELL, 0.0, 25.0]])
+MAX = C / (2 * 120e3)
+
+_LISTED = {
+    "straight above": ("azimuth is 0/0", NET, NET.stations[0], np.array([[0.0, 0.0, 90.0]]), (0.0, 0.0, 80.0)),
+    "behind the array": ("angles leave the front half", NET, NET.stations[0], cluster(120) * [-1, 1, 1], (-90, 40, 30)),
+    "on a grating lobe": ("sin(N u) / sin(u) is 0/0 away from the beam", *_grating()),
+    "at the beam's centre": ("sin(N u) / sin(u) is 0/0", NET, NET.stations[0], away(150)[None], away(150)),
+    "at a cell's edge": ("two cells tie", NET, NET.stations[0], EDGE, EDGE[0] + [0, 1, 1]),
+    "at a cell's centre": ("the cell kernel is 0/0", NET, NET.stations[0], CENTRE, CENTRE[0] + [0, 1, 1]),
+    "at the unambiguous range": ("the cell wraps to 0", NET, NET.stations[0], away(MAX)[None], away(1200, y=0.31)),
+    "past the unambiguous range": ("the cell wraps", NET, NET.stations[0], cluster(1.7 * MAX), away(2000)),
+    "at 1 cm": ("1 / r^2 and direction are extreme", NET, NET.stations[0], away(0.01)[None], away(0.02, y=0.2)),
+    "at 100 km": ("2e7 rad of phase", NET, NET.stations[0], cluster(1e5), away(1e5)),
+    "100 km at 77 GHz": (
+        "3e8 rad of phase", network(carrier_hz=77e9), network(carrier_hz=77e9).stations[0], cluster(1e5, size=0.01),
+        away(1e5),
+    ),
+    "one point": ("nothing to average", NET, NET.stations[0], away(77.7)[None], away(77, y=0.32)),
+    "arrays of 7 x 3 and 25 x 1": (
+        "no powers of two", network(transmit=(7, 3), receive=(25, 1)), NET.stations[0], cluster(90), away(88),
+    ),
+    "arrays of 256": ("recurrences lose digits", network(transmit=(256, 1)), NET.stations[0], cluster(300), away(299)),
+    "M = 1": ("one cell for all", network(subcarriers=1), NET.stations[0], cluster(90), away(88)),
+    "M = 2": ("cells tie by symmetry", network(subcarriers=2), NET.stations[0], cluster(90), away(88)),
+    "M = 3300": ("cells of 0.4 m", network(subcarriers=3300), NET.stations[0], cluster(90, size=0.1), away(88)),
+    "larger than its range": ("no expansion in size / range", NET, NET.stations[0], cluster(3, size=4), away(3)),
+    "deep fade": (
+        "half a wave apart: the sum all but cancels", NET, NET.stations[0],
+        np.array([[30.2 * CELL, 0, 25.0], [30.2 * CELL + C / (4.9e9 + 127.5 * 120e3) / 4, 0, 25.0]]), (150, 1, 25),
+    ),
+}  # fmt: skip
+CASES = {name: Case(*values) for name, values in _LISTED.items()}
+"""The hard cases by name."""
+
+
+def judged(name: str) -> Judged:
+    """Return what the engine, the naive formula and fifty digits say of one case.
+
+    Raises: InputError where mpmath is not installed.
+    """
+    try:
+        import mpmath
+
+        from lowalt.measure.fifty_digits import cells_mp
+    except ModuleNotFoundError as error:
+        raise InputError("hard cases: mpmath is not installed, expected the extra `cost`") from error
+    _, net, station, points, aim = CASES[name]
+    rcs = np.linspace(0.5, 1.5, len(points)) if len(points) != 2 else np.ones(2)
+    result = echo_signal(net, station, points[None], rcs, aim)
+    ours, cell = result.signal[0], int(result.cell[0])
+    # All cells about the target and some of the others: far cells of one cluster cannot be the strongest.
+    near = {(cell + j) % net.subcarriers for j in range(-2, 3)}
+    listed = sorted(near | set(range(0, net.subcarriers, max(1, net.subcarriers // 7))))
+    values = dict(zip(listed, cells_mp(net, station, points.tolist(), rcs.tolist(), aim, listed), strict=True))
+    truth = complex(values[cell])
+    right = all(abs(values[cell]) >= abs(other) * (1 - mpmath.mpf(10) ** -11) for other in values.values())
+    return Judged(ours, naive(net, station, points, rcs, aim), truth, right, result.bound)
+
+
+def rows() -> list[list]:
+    """Return the table of all cases, a row each with the columns COLUMNS."""
+    hardware, result = describe(), []
+    for name, case in CASES.items():
+        found = judged(name)
+        error, plain = (abs(value - found.truth) / abs(found.truth) for value in (found.ours, found.naive))
+        wrong = f"{plain:.0e}" if np.isfinite(plain) else "not a number"
+        cell = "yes" if found.right else "no"
+        result.append([name, case.why, wrong, f"{error:.0e}", f"{found.bound:.0e}", cell, hardware])
+    return result
+
+
+def main(arguments: list[str]) -> None:
+    """Write the table."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.measure.hard_cases", description=__doc__)
+    options.add_argument("--out", required=True, help="table to write (.csv)")
+    write_csv(options.parse_args(arguments).out, COLUMNS, rows())
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,18 @@
+"""Section: what the run's scene simulates and leaves out, as `lowalt explain` says it."""
+
+import os
+from pathlib import Path
+
+from lowalt.common.errors import InputError
+from lowalt.effects.explain import explained
+from lowalt.report.run import Run
+
+
+def values(run: Run) -> dict:
+    """Return the explanation without times: those of the effects stand in a table of their own."""
+    inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
+    try:
+        return {"text": explained(run.config, inputs and Path(inputs), [], None, False)}
+    except InputError as error:
+        # A page of finished results is worth more than this section, for example where the recordings have been moved.
+        return {"text": f"not explained: {error}"}

@@ -1,0 +1,100 @@
+"""A page read back: its addresses, links, headings and tables; and what a headless Chromium makes of it."""
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+VOID = {"meta", "link", "img", "input", "br", "hr", "image", "line", "rect"}
+
+
+class Page(HTMLParser):
+    """The structure of a page; `faults` lists tags that do not close in their order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open, self.faults, self.ids, self.links, self.sources, self.tables = [], [], [], [], [], []
+        self.pictures = []
+        self._cell = None
+        self.feed(text)
+        self.faults += [f"{tag} is not closed" for tag in self.open]
+
+    def handle_starttag(self, tag, attrs):
+        found = dict(attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+        if "id" in found:
+            self.ids.append(found["id"])
+        if tag == "a":
+            self.links.append(found.get("href"))
+        if "src" in found:
+            self.sources.append(found["src"])
+        if tag == "img":
+            self.pictures.append(found.get("alt"))
+        if tag == "table":
+            self.tables.append({"caption": "", "head": [], "rows": []})
+        if tag == "tr" and "tbody" in self.open:
+            self.tables[-1]["rows"].append([])
+        if tag in ("th", "td", "caption"):
+            self._cell = ""
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.handle_endtag(tag)
+
+    def handle_data(self, data):
+        if self._cell is not None:
+            self._cell += data
+
+    def handle_endtag(self, tag):
+        if tag in VOID:
+            return
+        if not self.open or self.open[-1] != tag:
+            self.faults.append(f"{tag} closes {self.open[-1:]}")
+        if tag in self.open:
+            del self.open[len(self.open) - 1 - self.open[::-1].index(tag) :]
+        if tag in ("th", "td", "caption"):
+            text, self._cell = " ".join(self._cell.split()), None
+            if tag == "caption":
+                self.tables[-1]["caption"] = text
+            elif "thead" in self.open:
+                self.tables[-1]["head"].append(text)
+            else:
+                self.tables[-1]["rows"][-1].append(text)
+
+
+def sound(text: str) -> Page:
+    """Return the page; assert that it parses, needs no network, and that links and tables are whole."""
+    page = Page(text)
+    assert not page.faults
+    assert len(set(page.ids)) == len(page.ids)
+    assert page.links and {link.removeprefix("#") for link in page.links} <= set(page.ids)
+    assert all(source.startswith("data:") for source in page.sources)
+    assert all(page.pictures) and "http" not in re.sub(r"https?://www\.w3\.org/\S+", "", text.partition("<body>")[0])
+    for table in page.tables:
+        assert table["caption"] and table["rows"]
+        assert {len(row) for row in table["rows"]} == {len(table["head"])}
+    return page
+
+
+def browsed(folder: Path, text: str, script: str = "") -> str:
+    """Return the page's HTML after its scripts, then `script`, ran in Chromium; skips the test where there is none.
+
+    Fails where the console shows an error.
+    """
+    browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("no Chromium on this machine, expected the command chromium: the page's scripts were not run")
+    path = folder / "page.html"
+    path.write_text(text.replace("</body>", f"<script>{script}</script></body>"))
+    flags = ["--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", f"--user-data-dir={folder}/user"]
+    command = [browser, *flags, "--virtual-time-budget=2000", "--dump-dom", path.as_uri()]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert ran.returncode == 0, ran.stderr
+    wrong = [line for line in ran.stderr.splitlines() if "CONSOLE" in line]
+    assert not wrong
+    return ran.stdout

@@ -1,0 +1,83 @@
+"""The page as a reader meets it: whole parts, links that lead somewhere, tables that sort, filter and can be kept."""
+
+import re
+from types import SimpleNamespace
+
+import pytest
+
+from lowalt.report.inputs import FILES, KEPT, Inputs
+from lowalt.report.page import PARTS, assembled, rendered
+from lowalt.report.sections import accuracy_cost, echo_cost, effects, hard_cases, measured
+from pages import browsed, sound
+
+TABLE = """<table><caption>Sizes</caption><thead><tr><th scope="col">name</th><th scope="col">size</th></tr></thead>
+<tbody><tr><td>b</td><td>10.5</td></tr><tr><td>c</td><td></td></tr>
+<tr><td>a, "x"</td><td>-9 (1 to 2)</td></tr></tbody></table>"""
+
+
+@pytest.fixture(scope="module")
+def kept():
+    """A run without tables of its own, beside the kept reference."""
+    files = dict.fromkeys(FILES, "none.csv") | {"clouds": [], "benchmarks": []}
+    reference = {f"kept_{name}": f"results/reference/{file}" for name, file in KEPT.items()}
+    return SimpleNamespace(inputs=Inputs(files | reference))
+
+
+def test_a_run_without_own_measurements_shows_the_kept_ones_and_says_so(kept):
+    sections = {"echo_cost": echo_cost, "accuracy_cost": accuracy_cost, "hard_cases": hard_cases, "effects": effects,
+                "measured": measured}  # fmt: skip
+    parts = []
+    for name, section in sections.items():
+        text = rendered(name, section.values(kept))
+        assert "This run did not measure it" in " ".join(text.split()) and "make " in text
+        parts.append({"id": name, "title": name, "html": text})
+    tables = {table["caption"]: table for table in sound(assembled("kept", parts)).tables}
+    assert len(tables["Hard cases"]["rows"]) == 19
+    methods = {row[0] for row in tables["Simulation: time and error by method"]["rows"]}
+    assert {"engine", "FINUFFT"} <= methods
+    assert len(tables["Effects: time and influence"]["rows"]) > 10
+    assert "Recognition: accuracy and its times" in tables
+
+
+def test_a_run_s_own_table_goes_before_the_kept_one(kept):
+    own = Inputs(kept.inputs.files | {"hard_cases": kept.inputs.files["kept_hard_cases"]})
+    assert kept.inputs.own_or_kept("hard_cases") == "kept_hard_cases"
+    assert own.own_or_kept("hard_cases") == "hard_cases" and own.own_or_kept("transfer") is None
+    text = " ".join(rendered("hard_cases", hard_cases.values(SimpleNamespace(inputs=own))).split())
+    assert "This run measured it on " in text and "did not" not in text
+
+
+def test_the_contents_name_every_part_of_the_page():
+    parts = [{"id": part.id, "title": part.title, "html": "<p>x</p>"} for part in PARTS]
+    page = sound(assembled("run", parts))
+    assert page.links[1:] == [f"#{part.id}" for part in PARTS]
+
+
+def test_tables_sort_by_value_filter_and_download_and_the_theme_turns(tmp_path):
+    script = """
+    const column = (at) => [...document.querySelectorAll("tbody tr")].map((row) => row.cells[at].textContent).join("|");
+    const said = [], heads = document.querySelectorAll("th button"), keep = URL.createObjectURL;
+    heads[1].click(); said.push(column(0)); heads[1].click(); said.push(column(0));
+    heads[0].click(); said.push(column(0));
+    const field = document.querySelector("input");
+    field.value = "10.5"; field.dispatchEvent(new Event("input"));
+    said.push(document.querySelector("output").textContent);
+    field.value = "a,"; field.dispatchEvent(new Event("input"));
+    document.getElementById("theme").click(); said.push(document.documentElement.dataset.theme);
+    URL.createObjectURL = (blob) => {
+      blob.text().then((text) => { document.body.dataset.csv = text; }); return keep.call(URL, blob);
+    };
+    // A real download keeps a headless browser from ending.
+    HTMLAnchorElement.prototype.click = function () { document.body.dataset.file = this.download; };
+    document.querySelector(".tools button").click();
+    document.body.dataset.said = said.join(";");
+    """
+    found = browsed(tmp_path, assembled("t", [{"id": "one", "title": "One", "html": TABLE}]), script)
+    assert (
+        re.search('data-said="(.*?)"', found)[1]
+        == "a, &quot;x&quot;|b|c;b|a, &quot;x&quot;|c;a, &quot;x&quot;|b|c;1 of 3 rows;light"
+    )
+    csv = re.search('data-csv="(.*?)"', found, re.S)[1].replace("&quot;", '"')
+    assert csv == 'name,size\n"a, ""x""",-9 (1 to 2)\n'
+    assert 'data-file="sizes.csv"' in found
+    assert 'aria-sort="ascending"' in found and 'aria-current="true"' in found
