@@ -204,11 +204,12 @@ pictures: $(SETUP)  ## the README's picture, from the finished default run
 pins: $(TESTING)  ## write the installed versions as the pins
 	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
 
-docs-pages: $(BASE)  ## write the page of the configuration's keys from its schema
+docs-pages: $(BASE)  ## write the page of the configuration's keys from its schema, and the picture of a sample
 	$(BIN)/python -m lowalt.common.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
+	$(BIN)/lowalt sample 'DJI Mini 2' 0 --out site/sample && cp site/sample/*-axes.png docs/pictures/sample.png
 
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
-	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 
 help:
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'
