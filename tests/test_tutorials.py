@@ -16,6 +16,7 @@ import pytest
 
 from dataset import build, publish
 from lowalt.__main__ import main
+from lowalt.common.config import load
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "docs/tutorials"
@@ -142,6 +143,8 @@ def test_shards_in_other_tools(page, checkout, shards, capsys, monkeypatch):
     shutil.copytree(shards, checkout / "results/default/shards")
     printed, names = followed(page, checkout, monkeypatch)
     if page == "pytorch":
+        config = load(["config/default.yaml", "backbone.yaml"], "workflow/schemas/config.schema.yaml")
+        assert config["recognition"]["network"]["backbone"] == "resnet18"
         assert re.search(r"loss \d+\.\d+ after 2 steps, \d+\.\d % of 6 validation samples", printed)
     else:
         assert {name: len(rows) for name, rows in names["seen"].items()} == {"train": 12, "validation": 6, "test": 6}

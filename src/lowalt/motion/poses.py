@@ -197,7 +197,7 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     `perturbation` is added to that motion. A node cloud gets zero rotations (read-only), and translations that carry
     the whole position.
     Raises: InputError where the row lacks a value the cloud needs, or a part that does not move is to be turned.
-    Source: paper Eqs. 17-21, Rodrigues' formula.
+    Source: paper Eqs. 17 to 20 and 22, Rodrigues' formula.
     """
     times_s = np.asarray(times_s, dtype=np.float64)
     more, offset, tilt = perturbation or Perturbation()
