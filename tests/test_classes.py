@@ -1,6 +1,7 @@
 """Classes are the words of the table of targets: two, five and others go from clouds to the page."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -72,8 +73,10 @@ def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
     text = reported(tmp_path, config, clouds, rows(targets))
     page = sound(text)
     assert page.links[1:] == [f"#{part.id}" for part in PARTS]
-    for name in names:
-        assert any(f"{name}: {subtype}" in text for subtype, category in targets.items() if category == name)
+    shown = json.loads(re.search(r'id="viewer-data">(.*?)</script>', text)[1])
+    assert shown["classes"] == list(names)
+    assert {sample["category"] for sample in shown["samples"]} == set(names)
+    assert all(targets[sample["subtype"]] == sample["category"] for sample in shown["samples"])
     assert f"is called {names[0]} where its {names[0]} probability" in text
 
 

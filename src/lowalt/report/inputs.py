@@ -31,6 +31,8 @@ OPTIONAL = (
     "published", "transfer", "echo_cost_figure", "effects_figure", *KEPT, *(f"kept_{name}" for name in KEPT),
 )  # fmt: skip
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""
+OPTIONAL_LISTS = ("predictions",)
+"""Names of lists that a manifest may leave out."""
 
 
 class Inputs:
@@ -42,12 +44,15 @@ class Inputs:
         Raises: InputError for names that are missing or unknown, and for a path in place of a list or the reverse.
         """
         missing = [name for name in (*FILES, *LISTS) if name not in files]
-        unknown = [name for name in files if name not in (*FILES, *LISTS, *OPTIONAL)]
+        unknown = [name for name in files if name not in (*FILES, *LISTS, *OPTIONAL, *OPTIONAL_LISTS)]
         if missing or unknown:
-            raise InputError(f"{source}: missing {missing}, unknown {unknown}, optional are {list(OPTIONAL)}")
+            raise InputError(
+                f"{source}: missing {missing}, unknown {unknown}, optional are {[*OPTIONAL, *OPTIONAL_LISTS]}"
+            )
         for name, value in files.items():
-            if isinstance(value, str) == (name in LISTS):
-                raise InputError(f"{source}: {name} is {value!r}, expected {'a list' if name in LISTS else 'a path'}")
+            many = name in (*LISTS, *OPTIONAL_LISTS)
+            if isinstance(value, str) == many:
+                raise InputError(f"{source}: {name} is {value!r}, expected {'a list' if many else 'a path'}")
         self.files = files
 
     @classmethod

@@ -111,7 +111,7 @@
     for (const name of links.keys()) watch.observe(document.getElementById(name));
   }
 
-  document.querySelectorAll("main table").forEach(equip);
+  document.querySelectorAll("main table:not(.plain)").forEach(equip);
   themes();
   places();
   window.addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((node) => { node.open = true; }));

@@ -223,6 +223,8 @@ class Products:
         # No rule makes it, so that no workflow needs the package of fifty digits: `make hard-cases` does.
         if Path(f"{base}/hard_cases.csv").is_file():
             files["hard_cases"] = f"{base}/hard_cases.csv"
+        if self._run.trainings:
+            files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
         if block["accuracy"]:
             files["accuracy_cost"] = block["accuracy"]
         if block["measured"]:

@@ -1,11 +1,18 @@
-"""Section: one sample of each category as the network sees it."""
+"""Section: a viewer of some samples: tile with axes, the networks' probabilities, the target's own motion in 3-D."""
 
-from lowalt.report.figures.style import embedded
-from lowalt.report.figures.tiles import example_tiles
+from lowalt.report import viewer
 from lowalt.report.run import Run
+from lowalt.targets.cloud import read
 
 
 def values(run: Run) -> dict:
-    """Return the stations and the example tiles with their captions."""
-    tiles = [{"caption": text, "picture": embedded(data)} for text, data in example_tiles(run.shards)]
-    return {"stations": run.stations, "tiles": tiles}
+    """Return the viewer's samples, the panels of a tile, and the sizes of images."""
+    clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
+    files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
+    groups = {name: row["unseen_protocol"] for name, row in run.targets.items()}
+    panels = viewer.panels(run.shards.renderer)
+    size = run.shards.index["render"]["images"]["size"]
+    return {
+        "data": viewer.samples(run.shards, clouds, files, groups), "panels": panels, "size": size,
+        "shown": min(size, viewer.PIXELS), "rows": panels[-1]["row"] + 1, "columns": panels[-1]["column"] + 1,
+    }  # fmt: skip

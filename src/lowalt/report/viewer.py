@@ -1,0 +1,151 @@
+"""The samples that the page lets its reader look at: which, their tiles with axes, probabilities, and motion.
+
+All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants of one cycle.
+"""
+
+import base64
+import csv
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.ticker import MaxNLocator
+
+from lowalt.common.files import slug, text_file
+from lowalt.motion import positions
+from lowalt.recognition import predictions
+from lowalt.recognition.distances import cycle_s, still_row
+from lowalt.report.figures.sample import axes_of
+from lowalt.report.figures.style import embedded
+from lowalt.shards import ShardSet
+from lowalt.shards.record import row_of
+from lowalt.spectra import spectrum
+from lowalt.targets.cloud import Cloud
+from lowalt.tiles import resize
+from lowalt.tiles.png import encode
+from lowalt.tiles.render import Renderer, join, split
+
+PIXELS = 80
+MODELS = 2
+"""Motion models of a subtype."""
+SNRS = 3
+"""SNRs of a motion model: the lowest, the highest, and between them."""
+BUDGET = 3_500_000
+"""Bytes of all tiles as the page holds them; samples after that are left out."""
+FRAMES = 24
+POINTS = 160
+KEY = re.compile(r"(.+)-(\d{6,})-snr.+")
+
+
+def chosen(shards: ShardSet, predicted: set[str], unseen: set[str]) -> list[int]:
+    """Return numbers of samples: of each class a seen and an unseen subtype, MODELS models each, SNRS SNRs each.
+
+    predicted: keys of samples with predictions, which go before others; unseen: slugs of subtypes held out. The order
+    is by rounds, a sample of every subtype in each, so that leaving out the last ones leaves out no subtype.
+    """
+    keys = [key.decode() for key in shards.keys.tolist()]
+    models: dict[tuple, dict[str, list[int]]] = {}
+    for number, (key, label) in enumerate(zip(keys, shards.labels.tolist(), strict=True)):
+        name = KEY.fullmatch(key)[1]
+        group = models.setdefault((label, name in unseen), {})
+        group.setdefault(name, []).append(number)
+    rounds: list[list[int]] = [[] for _ in range(MODELS * SNRS)]
+    for _, subtypes in sorted(models.items()):
+        known = [name for name in sorted(subtypes) if any(keys[n] in predicted for n in subtypes[name])]
+        mine: dict[tuple, list[int]] = {}
+        for number in subtypes[(known or sorted(subtypes))[0]]:
+            model = int(KEY.fullmatch(keys[number])[2])
+            mine.setdefault((keys[number] not in predicted, model), []).append(number)
+        for place, (_, numbers) in enumerate(sorted(mine.items())[:MODELS]):
+            levels = sorted(numbers, key=lambda number: shards.snrs_db[number])
+            wanted = dict.fromkeys([len(levels) - 1, 0, len(levels) // 2][:SNRS])
+            for step, level in enumerate(wanted):
+                rounds[step * MODELS + place].append(levels[level])
+    return [number for some in rounds for number in some]
+
+
+def predicted_keys(paths: Iterable[str | Path]) -> set[str]:
+    """Return the keys of all samples in prediction files."""
+    found = set()
+    for path in paths:
+        with text_file(path, "predictions") as file:
+            found.update(row[0] for row in csv.reader(file))
+    return found
+
+
+def probabilities(paths: Iterable[str | Path], keys: set[str], classes: tuple[str, ...]) -> dict[str, dict]:
+    """Return class probabilities as key -> "protocol scheme" -> list; one file a protocol and scheme, the first."""
+    columns, first, found = predictions.probability_columns(classes), {}, {}
+    for path in paths:
+        first.setdefault(Path(path).parent, Path(path))
+    for path in first.values():
+        about = predictions.record(path)
+        name = f"{about['protocol']} {about['scheme']}"
+        with text_file(path, "predictions") as file:
+            for row in csv.DictReader(file):
+                if row["key"] in keys:
+                    shares = [round(float(row[column]), 4) for column in columns]
+                    found.setdefault(row["key"], {})[name] = shares
+    return found
+
+
+def motion(cloud: Cloud, row: dict) -> dict:
+    """Return one cycle of a target's own motion for the page: seconds, shape, parts, points in mm (base64, int16)."""
+    moves = len(cloud.track) or row["rate_hz"] > 0
+    seconds = cycle_s(cloud, row) if moves else 1.0
+    points = positions(cloud, still_row(row), np.arange(FRAMES) / FRAMES * seconds)
+    some = np.unique(np.linspace(0, points.shape[1] - 1, POINTS).round().astype(int))
+    points = points[:, some]
+    points = points - (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
+    scale = max(float(abs(points).max()), 1e-9)
+    data = base64.b64encode((points / scale * 32767).round().astype("<i2").tobytes()).decode()
+    part = cloud.part[some].tolist() if len(cloud.part) == len(cloud.points) else [0] * len(some)
+    return {"seconds": seconds, "count": len(some), "frames": FRAMES, "scale_m": scale, "part": part, "points": data}
+
+
+def panels(renderer: Renderer) -> list[dict]:
+    """Return what the images of a tile show, station by station: names, seconds, speeds of the edges, ticks."""
+    found = []
+    for row, station in enumerate(renderer.network.stations):
+        for column, name in enumerate(renderer.spectra):
+            axes = axes_of(name, station, renderer)
+            low, high = sorted((axes.bottom_mps, axes.top_mps))
+            ticks = {
+                key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
+                for key, ends in (("x", (0.0, axes.seconds)), ("y", (low, high)))
+            }
+            found.append(
+                {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
+                 "high": high, "seconds": axes.seconds, "turned": axes.bottom_mps > axes.top_mps, **ticks}
+            )  # fmt: skip
+    return found
+
+
+def samples(shards: ShardSet, clouds: dict[str, Cloud], files: list[str], groups: dict[str, str]) -> dict:
+    """Return the viewer's samples: {"samples": [...], "motions": {...}}.
+
+    clouds: by subtype; files: prediction files; groups: "seen" or "unseen" by subtype.
+    """
+    unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
+    numbers = chosen(shards, predicted_keys(files), unseen)
+    shares = probabilities(files, {shards.keys[number].decode() for number in numbers}, shards.classes)
+    spectra, held, motions, total = len(shards.spectra), [], {}, 0
+    for number in numbers:
+        images = split(shards.tile(number), spectra)
+        images = resize(images, PIXELS) if images.shape[-1] > PIXELS else images
+        tile = embedded(encode(join(images, spectra), shards.palette))
+        total += len(tile)
+        if held and total > BUDGET:
+            break
+        record = shards.record(number)
+        name = f"{record['subtype']} {record['model']}"
+        if name not in motions and record["subtype"] in clouds and record["motion"].get("x_m") is not None:
+            motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
+        snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
+        held.append({
+            "subtype": record["subtype"], "category": record["category"], "model": record["model"],
+            "group": groups.get(record["subtype"], ""), "snr": snr,
+            "level": record["snr_db"], "tile": tile, "probabilities": shares.get(record["key"], {}),
+        })  # fmt: skip
+    return {"samples": held, "motions": motions, "classes": list(shards.classes)}

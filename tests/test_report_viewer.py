@@ -1,0 +1,119 @@
+"""The viewer of samples: which it holds, what its panels and points stand for, and its controls in a browser."""
+
+import base64
+import re
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from craft import craft, row
+from lowalt.motion import positions
+from lowalt.recognition.distances import cycle_s, still_row
+from lowalt.report import viewer
+from lowalt.report.figures.style import embedded
+from lowalt.report.page import assembled, rendered
+from lowalt.shards.record import sample_key
+from lowalt.tiles.png import encode
+from pages import browsed, sound
+from test_report_cost import IMAGES, NETWORK, SPECTRA
+
+LEVELS = (3.0, 8.0, 13.0, float("inf"))
+
+
+def shards(names):
+    """Keys, labels and SNRs of three motion models of each subtype; names: subtypes by label."""
+    found = [
+        (sample_key(name, model, snr).encode(), label, snr)
+        for label, some in enumerate(names) for name in some for model in (7, 1, 4) for snr in LEVELS
+    ]  # fmt: skip
+    keys, labels, snrs = (np.array(column) for column in zip(*found, strict=True))
+    return SimpleNamespace(keys=keys, labels=labels, snrs_db=snrs)
+
+
+def test_each_class_has_a_seen_and_an_unseen_subtype_and_predicted_samples_go_first():
+    held = shards((("Air B", "Air A", "Air C"), ("Owl",)))
+    predicted = {sample_key("Air B", 7, snr) for snr in LEVELS}
+    numbers = viewer.chosen(held, predicted, {"air-c"})
+    keys = [held.keys[number].decode() for number in numbers]
+    assert keys[0] == "air-b-000007-snrinf"
+    by_name = {key.rpartition("-0000")[0] for key in keys}
+    assert by_name == {"air-b", "air-c", "owl"}
+    assert len(keys) == len(set(keys)) == 3 * viewer.MODELS * viewer.SNRS
+    assert {key for key in keys if key.startswith("air-b")} == {
+        sample_key("Air B", model, snr) for model in (7, 1) for snr in (3.0, 13.0, float("inf"))
+    }
+    # The first rounds hold every subtype once a model, without noise.
+    assert {key.rpartition("-")[2] for key in keys[:6]} == {"snrinf"}
+
+
+def test_points_of_the_motion_are_those_of_the_target_in_order():
+    cloud, moving = craft(), row(0)
+    found = viewer.motion(cloud, moving)
+    kept = np.frombuffer(base64.b64decode(found["points"]), "<i2").reshape(viewer.FRAMES, found["count"], 3)
+    assert found["seconds"] == cycle_s(cloud, moving)
+    times = np.arange(viewer.FRAMES) / viewer.FRAMES * found["seconds"]
+    wanted = positions(cloud, still_row(moving), times)
+    assert found["count"] == len(cloud.points) <= viewer.POINTS
+    wanted = wanted - (wanted.min(axis=(0, 1)) + wanted.max(axis=(0, 1))) / 2
+    assert abs(kept / 32767 * found["scale_m"] - wanted).max() <= found["scale_m"] / 32767
+    assert found["part"] == cloud.part.tolist()
+
+
+def test_probabilities_are_those_of_the_first_seed_of_each_scheme(tmp_path):
+    for seed, share in (("0", "0.75"), ("1", "0.5")):
+        (tmp_path / f"{seed}.csv").write_text(f"key,p_uav,p_bird\na,{share},0.25\nb,1,0\n")
+        (tmp_path / f"{seed}.json").write_text('{"protocol": "seen", "scheme": "A:VRP"}')
+    files = [tmp_path / "0.csv", tmp_path / "1.csv"]
+    assert {"a", "b"} <= viewer.predicted_keys(files)
+    assert viewer.probabilities(files, {"a"}, ("UAV", "Bird")) == {"a": {"seen A:VRP": [0.75, 0.25]}}
+
+
+@pytest.fixture
+def page():
+    """A page of the viewer alone, with two subtypes whose tiles differ."""
+    renderer = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    panels = viewer.panels(renderer)
+    assert [(panel["row"], panel["column"]) for panel in panels] == [(r, c) for r in range(2) for c in range(3)]
+    vt = panels[2]
+    assert (vt["low"], vt["high"]) == (-6.0, 6.0) and set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
+    # Fewer symbols than the signal has: a window of 4 of 24, 2.5 ms apart.
+    assert vt["seconds"] == pytest.approx(20 * 2.5e-3) and max(vt["x"]) <= vt["seconds"]
+    tile = [
+        embedded(encode(np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette))
+        for step in (0, 1)
+    ]
+    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "level": 300.0}
+    one = {**shared, "subtype": "One", "model": 1, "tile": tile[0], "probabilities": {"seen A": [0.2, 0.8]}}
+    two = {**shared, "subtype": "Two", "model": 5, "tile": tile[1], "probabilities": {}}
+    data = {"samples": [one, two], "motions": {"One 1": viewer.motion(craft(), row(0))}, "classes": ["UAV", "Bird"]}
+    values = {"data": data, "panels": panels, "size": 16, "shown": 16, "rows": 2, "columns": 3}
+    text = assembled("viewer", [{"id": "samples", "title": "Samples", "html": rendered("samples", values)}])
+    sound(text)
+    return text, tile
+
+
+def test_every_control_of_the_viewer_works(page, tmp_path):
+    text, tiles = page
+    script = """
+    const at = (name) => document.getElementById("viewer-" + name), said = [], ink = () => at("motion").toDataURL();
+    const tell = () => said.push([at("name").textContent,
+      document.querySelector("image").getAttribute("href").length, at("shares").textContent].join("|"));
+    tell();
+    const before = ink();
+    at("motion").dispatchEvent(new KeyboardEvent("keydown", { key: "ArrowLeft" }));
+    const turned = ink();
+    at("frame").value = 7; at("frame").dispatchEvent(new Event("input"));
+    said.push(String(before !== turned), String(turned !== ink()), at("time").textContent);
+    at("play").click(); said.push(at("play").textContent); at("play").click(); said.push(at("play").textContent);
+    at("subtype").value = "Two"; at("subtype").dispatchEvent(new Event("change"));
+    tell();
+    document.body.dataset.said = said.join(";");
+    """
+    said = re.search('data-said="(.*?)"', browsed(tmp_path, text, script), re.S)[1].split(";")
+    assert said[0].startswith(f"UAV: One (seen), motion model 1, no noise|{len(tiles[0])}|")
+    assert "seen A20.080.0Bird, wrong" in said[0]
+    assert said[1:3] == ["true", "true"] and said[4:6] == ["Pause", "Play"]
+    assert said[3].endswith("ms.") and "of a cycle of" in said[3]
+    none = "No network was asked about this sample."
+    assert said[6] == f"UAV: Two (seen), motion model 5, no noise|{len(tiles[1])}|{none}"
