@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
+.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
 
 all: default
 
@@ -122,6 +122,9 @@ status: $(SETUP)  ## what a run in another terminal is doing
 
 cost: $(SETUP)  ## what the echo's accuracy costs in time, up to 1600 points: results/cost/cost.csv and cost.png
 	$(SNAKEMAKE) --configfile config/cost.yaml -- cost
+
+gallery: $(BASE)  ## a page that links all runs and compares any two: results/index.html
+	$(BIN)/lowalt report --gallery
 
 hard-cases: $(BASE)  ## inputs on which a naive formula fails, its error, ours and the bound: results/default/hard_cases.csv
 	$(BIN)/python -m lowalt.measure.hard_cases --out results/default/hard_cases.csv

@@ -9,7 +9,7 @@ import os
 import sys
 from pathlib import Path
 
-from lowalt.commands import compare, data, sample, spectra, target, workflow
+from lowalt.commands import compare, data, report, sample, spectra, target, workflow
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -52,13 +52,14 @@ def main(arguments: list[str] | None = None) -> int:
     sample.add_to(commands, CONFIG, SCHEMA)
     data.add_to(commands, CONFIG, SCHEMA)
     compare.add_to(commands)
+    report.add_to(commands)
     target.add_to(commands)
     spectra.add_to(commands, CONFIG, SCHEMA)
     given = line.parse_args(arguments)
     actions = {
         "run": workflow.run, "status": workflow.states, "sample": sample.run, "verify": data.verify,
         "remake": data.remake, "predict": data.predict, "compare": compare.run, "target": target.run,
-        "spectra": spectra.run, "explain": _explained,
+        "spectra": spectra.run, "report": report.run, "explain": _explained,
     }  # fmt: skip
     try:
         text = actions[given.command](given)

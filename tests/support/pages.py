@@ -72,7 +72,9 @@ def sound(text: str) -> Page:
     page = Page(text)
     assert not page.faults
     assert len(set(page.ids)) == len(page.ids)
-    assert page.links and {link.removeprefix("#") for link in page.links} <= set(page.ids)
+    inside = {link[1:] for link in page.links if link.startswith("#")}
+    assert inside and inside <= set(page.ids)
+    assert not [link for link in page.links if ":" in link or link.startswith("/")]
     assert all(source.startswith("data:") for source in page.sources)
     assert all(page.pictures) and "http" not in re.sub(r"https?://www\.w3\.org/\S+", "", text.partition("<body>")[0])
     for table in page.tables:

@@ -53,23 +53,34 @@ def _sizes(folder: Path) -> dict[str, int]:
     return {"samples": index["samples"], "bytes": index["bytes"]}
 
 
+def facts(folder: Path) -> dict[str, dict]:
+    """Return what one run's folder tells, {part: {what: value}}.
+
+    Parts: configuration (dotted keys), accuracy_percent, processor_s, data.
+    Raises: InputError naming the folder that is no run's.
+    """
+    if not (folder / "config.yaml").is_file():
+        raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
+    measured = {"accuracy_percent": _accuracies, "processor_s": _seconds, "data": _sizes}
+    return {"configuration": dict(leaves(load_yaml(folder / "config.yaml")))} | {
+        part: of(folder) for part, of in measured.items()
+    }
+
+
 def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
     """Return, of two runs' folders, {part: {what: (of the first, of the second)}} for all that differs or is measured.
 
     Parts: configuration (only what differs), accuracy_percent, processor_s, data. None stands where a run has none.
     Raises: InputError naming the folder that is no run's.
     """
-    for folder in (one, other):
-        if not (folder / "config.yaml").is_file():
-            raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
-    settings = [dict(leaves(load_yaml(folder / "config.yaml"))) for folder in (one, other)]
+    found = [facts(folder) for folder in (one, other)]
 
-    def pairs(first: dict, second: dict) -> dict[str, tuple]:
+    def pairs(part: str) -> dict[str, tuple]:
+        first, second = (mine[part] for mine in found)
         return {name: (first.get(name), second.get(name)) for name in dict.fromkeys([*first, *second])}
 
-    differs = {name: pair for name, pair in pairs(*settings).items() if pair[0] != pair[1]}
-    measured = {"accuracy_percent": _accuracies, "processor_s": _seconds, "data": _sizes}
-    return {"configuration": differs} | {part: pairs(of(one), of(other)) for part, of in measured.items()}
+    differs = {name: pair for name, pair in pairs("configuration").items() if pair[0] != pair[1]}
+    return {"configuration": differs} | {part: pairs(part) for part in ("accuracy_percent", "processor_s", "data")}
 
 
 def _cell(value: object) -> str:
