@@ -11,6 +11,7 @@ from lowalt.common import classes
 from lowalt.common.config import load
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
+from lowalt.common.files import sha256
 from lowalt.report.page import PARTS
 from lowalt.targets.records import load_table, merge
 from pages import sound
@@ -73,6 +74,7 @@ def test_every_command_takes_the_classes_of_the_table(tmp_path, targets):
     text = reported(tmp_path, config, clouds, rows(targets))
     page = sound(text)
     assert page.links[1:] == [f"#{part.id}" for part in PARTS]
+    assert f"<code>{sha256(tmp_path / 'index.json')}</code>" in text
     shown = json.loads(re.search(r'id="viewer-data">(.*?)</script>', text)[1])
     assert shown["classes"] == list(names)
     assert {sample["category"] for sample in shown["samples"]} == set(names)

@@ -1,10 +1,12 @@
-"""Section: the versions of the packages that made the run, and its whole configuration."""
+"""Section: what made the run: seed, hardware, checksum of the data set, versions of packages, whole configuration."""
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
 import yaml
 
+from lowalt.common.files import sha256
+from lowalt.common.hardware import describe
 from lowalt.report.run import Run
 
 NAMES = ("lowalt", "snakemake", "numpy", "scipy", "numba", "pillow", "deflate", "torch", "torchvision", "timm")
@@ -22,5 +24,6 @@ def versions() -> list[str]:
 
 
 def values(run: Run) -> dict:
-    """Return the versions and the configuration as YAML."""
-    return {"versions": versions(), "configuration": yaml.safe_dump(run.config, sort_keys=False)}
+    """Return the seed, the hardware, the checksum of the shards' index, the versions, and the configuration as YAML."""
+    made = {"seed": run.config["seed"], "hardware": describe(), "index": sha256(run.inputs.path("index"))}
+    return {**made, "versions": versions(), "configuration": yaml.safe_dump(run.config, sort_keys=False)}
