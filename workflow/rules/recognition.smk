@@ -77,10 +77,10 @@ rule train:
         "results/{run}/logs/train/{protocol}/{scheme}/{train_seed}.log",
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
-    conda:
-        "../../envs/environment.yaml"
     # Trainings of more images take longer. The longest start first, so that no core waits for one at the end.
     priority: scheduling.by_job(RUN.images_of_job)
+    conda:
+        "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"] * RUN.processes
     params:
         settings=settings.training,
