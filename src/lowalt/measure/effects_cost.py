@@ -52,7 +52,7 @@ def gathered(files: list[tuple[dict, dict]]) -> list[tuple[dict, dict]]:
         header, first = mine[0]
         if any(h["effects"] != header["effects"] or a["snr_db"].tolist() != first["snr_db"].tolist() for h, a in mine):
             raise InputError(f"{name}: files of other effects or SNRs than the first's, expected the same")
-        once = ("snr_db", "example", "example_subtype")
+        once = ("snr_db", "spectra", "example", "example_subtype")
         result.append((header, {
             key: value if key in once else np.concatenate([arrays[key] for _, arrays in mine])
             for key, value in first.items()

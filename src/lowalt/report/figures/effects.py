@@ -105,7 +105,7 @@ def figure(
         f"{row['motion_models']} test motion models; {row['scheme']}, {row['protocol']}, trained without effects, "
         f"{row['accuracy_without_percent']:.1f} % right without them; {row['hardware']}", fontsize=9,
     )  # fmt: skip
-    return png(result, 256)
+    return png(result, 48)
 
 
 def read_rows(path: str | Path) -> list[dict]:
