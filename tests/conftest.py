@@ -4,6 +4,8 @@ import math
 
 import pytest
 
+from meshes import write_bird, write_quad
+
 
 @pytest.fixture
 def mlcroissant(monkeypatch, tmp_path):
@@ -26,3 +28,15 @@ def always_approximate(monkeypatch):
 
     monkeypatch.setattr(refine, "PROBE_COST", -math.inf)
     monkeypatch.setattr(pose_series, "INTERPOLATION_COST", 1)
+
+
+@pytest.fixture
+def quad(tmp_path):
+    """A folder with the meshes of a made quadcopter."""
+    return write_quad(tmp_path)
+
+
+@pytest.fixture
+def bird(tmp_path):
+    """A folder with the meshes of a made bird."""
+    return write_bird(tmp_path)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import lowalt
+from lowalt.__main__ import main as lowalt_command
 from lowalt.common.command import settings
 from lowalt.common.config import canonical, load
 from lowalt.common.errors import InputError
@@ -18,12 +19,14 @@ from lowalt.common.files import slug
 from lowalt.echo.__main__ import main as echo
 from lowalt.motion.__main__ import main as motion
 from lowalt.noise.__main__ import main as noise
-from lowalt.shards import ShardSet
+from lowalt.shards import ShardSet, card
 from lowalt.shards.__main__ import main as shards
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset, Endless
+from lowalt.targets import occluders
 from lowalt.targets.cloud import read
 from lowalt.targets.cloud import write as write_cloud
+from lowalt.targets.records import records_of
 from lowalt.tiles.__main__ import main as tiles
 from lowalt.tiles.png import decode
 
@@ -214,3 +217,32 @@ def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
            "--out", str(tmp_path / "noisy.npy")])  # fmt: skip
     expected = np.load(tmp_path / "noisy.npy")[0]
     assert (scene.signal(0) == expected[0]).all() and (scene.signal(1) == expected[1]).all()
+
+
+def test_samples_of_a_scene_that_hides_points_are_made_again_with_its_surfaces(dataset, tmp_path, capsys):
+    config = configuration(effects={"occlusion": {"strength": 1.0}})
+    config["targets"]["select"] = ["DJI Mini 2"]
+    config["motion"] |= {"models": 4, "models_per_chunk": 4}
+    config["noise"] = {"snr_db": [13]}
+    record = records_of(config["targets"], None)["DJI Mini 2"]
+    surfaces = occluders.make(record, None, config["seed"])
+    scene = Dataset(config, dataset.clouds, occluders={"DJI Mini 2": surfaces | {"subtype": "DJI Mini 2"}})
+    write_run(scene, tmp_path, "signal")
+    index, key = str(tmp_path / "shards/index.json"), scene.key(0)
+    with pytest.raises(InputError, match="has no surfaces"):
+        shards(["remake", "--index", index, "--sample", key])
+    occluders.write(tmp_path / "occluders/dji-mini-2.npz", surfaces, "DJI Mini 2")
+    shards(["remake", "--index", index, "--sample", key])
+    (tmp_path / "config.yaml").write_text(json.dumps({"run": "hidden"}))
+    card.write(index, tmp_path / "config.yaml")
+    assert lowalt_command(["remake", index, key]) == lowalt_command(["verify", index, "--remake", "1"]) == 0
+    (tmp_path / "occluders").rename(tmp_path / "elsewhere")
+    assert lowalt_command(["remake", index, key]) == 2
+    capsys.readouterr()
+    assert lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")]) == 0
+    assert "1 samples made again, equal in every byte" in capsys.readouterr().out
+    moved = surfaces | {"vertices": surfaces["vertices"] + 1.0}
+    occluders.write(tmp_path / "elsewhere/dji-mini-2.npz", moved, "DJI Mini 2")
+    with pytest.raises(SystemExit):
+        lowalt_command(["remake", index, key, "--occluders", str(tmp_path / "elsewhere")])
+    assert f"sample {key}: its signal comes out otherwise" in capsys.readouterr().out

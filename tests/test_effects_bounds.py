@@ -41,6 +41,20 @@ def target(points, rotor=False, **motion):
     return cloud, row | {"z_m": 25.0} | motion
 
 
+def summed(asked: Scene, cloud: Cloud, row: dict) -> np.ndarray:
+    """The slow truth of a scene whose only effect is motion inside a symbol: every time sample has poses of its own."""
+    radio, station = asked.network, asked.network.stations[0]
+    view = observe(asked, station, cloud, row)
+    sent = waveform.sent(asked.stream("waveform", row, station.name), radio.symbols, radio.subcarriers)
+    samples = np.empty((radio.symbols, radio.subcarriers), complex)
+    for i in range(radio.subcarriers):
+        later = view.at(view.times_s + i / (radio.subcarriers * radio.subcarrier_spacing_hz))
+        whole = waveform.transmit(response(radio, station, later.places, cloud.rcs_m2, view.aim_m), sent)
+        samples[:, i] = whole[:, i]
+    cells = np.fft.ifft(waveform.demodulate(samples, sent), axis=1)
+    return cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
+
+
 def scene(radio, effects, tolerance=None):
     return Scene(radio, 3, tolerance, tuple(called(effects)))
 
@@ -76,15 +90,8 @@ def test_a_rotor_may_turn_far_within_a_symbol(turns, tolerance):
     cloud, row = target([[0.1, 0, 0], [-0.1, 0, 0], [0, 0.1, 0]], rotor=True, x_m=60.0, rate_hz=turns * 1e3)
     station = radio.stations[0]
     asked = scene(radio, {"symbol_motion": {}}, tolerance)
-    received, view = received_signal(asked, station, cloud, row), observe(asked, station, cloud, row)
-    sent = waveform.sent(asked.stream("waveform", row, "A"), radio.symbols, radio.subcarriers)
-    samples = np.empty((radio.symbols, radio.subcarriers), complex)
-    for i in range(radio.subcarriers):
-        later = view.at(view.times_s + i / (radio.subcarriers * radio.subcarrier_spacing_hz))
-        whole = waveform.transmit(response(radio, station, later.places, cloud.rcs_m2, view.aim_m), sent)
-        samples[:, i] = whole[:, i]
-    cells = np.fft.ifft(waveform.demodulate(samples, sent), axis=1)
-    truth = cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
+    received = received_signal(asked, station, cloud, row)
+    truth = summed(asked, cloud, row)
     assert abs(received.signal - truth).max() <= (tolerance or 1e-10) * abs(truth).max()
     assert received.decisions[0].computed
 

@@ -19,7 +19,7 @@ from lowalt.motion.poses import positions
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.freeze import freeze
-from lowalt.recognition.samples import Facts, ViewSamples, joined_views, write
+from lowalt.recognition.samples import Facts, ViewSamples, with_extra, write
 from lowalt.shards.record import record, row_of
 from lowalt.targets.cloud import cloud_of, extent, scaled
 from lowalt.targets.make import make
@@ -137,13 +137,13 @@ def views(path, run, models, value):
 
 def test_joined_samples_keep_images_and_labels_and_share_no_motion_model(tmp_path):
     first, second = views(tmp_path, "a", [0, 0, 3], 10), views(tmp_path, "b", [0, 2], 20)
-    both = joined_views(first, second)
+    both = with_extra(first, second)
     np.testing.assert_array_equal(both.views(np.arange(5))[:, 1, 0, 0], [10, 10, 10, 20, 20])
     assert both.facts.model.tolist() == [0, 0, 3, 4, 6]
     assert len(first.facts) == 3 and second.facts.model.tolist() == [0, 2]
     second.size = 24
     with pytest.raises(InputError, match="image sizes 16 and 24"):
-        joined_views(first, second)
+        with_extra(first, second)
 
 
 def test_the_command_trains_on_other_runs_samples_and_checks_what_they_were_made_of(tmp_path, capsys):

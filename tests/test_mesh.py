@@ -14,23 +14,13 @@ from lowalt.targets import cloud as clouds
 from lowalt.targets import mesh
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from lowalt.targets.records import read_records
-from meshes import TABLE, box, car_record, made, plain, quad_record, write_bird, write_quad
+from meshes import TABLE, box, car_record, made, plain, quad_record
 from real_inputs import FOLDER, needs_inputs
 
 ROOT = Path(__file__).parents[1]
 REAL = read_records(ROOT / "config/targets/real.yaml")
 UNITS = {"hatchback.obj": "in", "prius_hybrid.obj": "cm", "prius_body.obj": "cm", "prius_wheel.obj": "cm",
          "cowbird_fly.obj": "cm"}  # fmt: skip
-
-
-@pytest.fixture
-def quad(tmp_path):
-    return write_quad(tmp_path)
-
-
-@pytest.fixture
-def bird(tmp_path):
-    return write_bird(tmp_path)
 
 
 # --- the real ones ---

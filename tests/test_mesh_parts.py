@@ -9,17 +9,7 @@ import trimesh
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.targets.make import make
 from lowalt.targets.records import merge
-from meshes import TABLE, box, car_record, made, quad_record, write_bird, write_quad
-
-
-@pytest.fixture
-def quad(tmp_path):
-    return write_quad(tmp_path)
-
-
-@pytest.fixture
-def bird(tmp_path):
-    return write_bird(tmp_path)
+from meshes import TABLE, box, car_record, made, quad_record
 
 
 @pytest.mark.parametrize("names", [("front right", "body"), ("arm 1", "zebra"), ("back left wheel", "Aaa"), ("1", "0")])

@@ -31,12 +31,11 @@ def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
 
 
 def _accuracies(folder: Path) -> dict[str, float]:
-    """Mean accuracy over the SNRs (%) by "protocol scheme"; empty where the run trained nothing."""
+    """The table's averages over the SNRs (%) by "protocol scheme"; empty where the run trained nothing."""
     path = folder / "accuracy.csv"
-    found: dict[str, list[float]] = {}
-    for row in read_csv(path, "protocol", "scheme", "accuracy_percent") if path.exists() else []:
-        found.setdefault(f"{row['protocol']} {row['scheme']}", []).append(float(row["accuracy_percent"]))
-    return {name: sum(values) / len(values) for name, values in found.items()}
+    rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent") if path.exists() else []
+    averages = [row for row in rows if row["snr_db"] == "avg"]
+    return {f"{row['protocol']} {row['scheme']}": float(row["accuracy_percent"]) for row in averages}
 
 
 def _seconds(folder: Path) -> dict[str, float]:

@@ -27,6 +27,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
     for line in (verify, remake):
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
+        line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
         "predict", help="class probabilities of a tile or of signals by a trained model",
         epilog="example: lowalt predict results/default/models/seen/abc-vrp-trp-vt/0/model.pt sample.npy",
@@ -37,14 +38,6 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     predict.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
     predict.add_argument("--json", action="store_true", help="print JSON for a program")
-
-
-def _remaker(given: argparse.Namespace):
-    from lowalt.shards.read import ShardSet
-    from lowalt.shards.remake import CloudFolder, Remaker
-
-    clouds = given.clouds or given.index.resolve().parent.parent / "clouds"
-    return Remaker(ShardSet(given.index), CloudFolder(clouds))
 
 
 def _ended(lines: list[str], good: str) -> str:
@@ -60,11 +53,11 @@ def verify(given: argparse.Namespace) -> str:
 
     Raises: InputError where there is no index.
     """
-    from lowalt.shards.remake import some
+    from lowalt.shards.remake import opened, some
 
     lines = list(faults(given.index))
     if given.remake and not lines:
-        remaker = _remaker(given)
+        remaker = opened(given.index, given.clouds, given.occluders)
         lines = [line for number in some(remaker.shards, given.remake) for line in remaker.faults(number)]
     again = f", {given.remake} samples made again" if given.remake else ""
     return _ended(lines, f"{given.index}: every byte is as it was written{again}")
@@ -75,9 +68,9 @@ def remake(given: argparse.Namespace) -> str:
 
     Raises: InputError for a key that the data set lacks.
     """
-    from lowalt.shards.remake import number_of
+    from lowalt.shards.remake import number_of, opened
 
-    remaker = _remaker(given)
+    remaker = opened(given.index, given.clouds, given.occluders)
     lines = [line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key))]
     return _ended(lines, f"{len(given.sample)} samples made again, equal in every byte")
 

@@ -79,7 +79,7 @@ def _train(arguments: list[str]) -> None:
     classes."""
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
-    from lowalt.recognition.samples import ViewSamples, first_models, joined_views
+    from lowalt.recognition.samples import ViewSamples, first_models, with_extra
 
     line = parser("lowalt.recognition train", _train.__doc__)
     _sources(line)
@@ -104,7 +104,7 @@ def _train(arguments: list[str]) -> None:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
     if given.extra:
         more = ViewSamples(given.extra, scheme.columns, folds(given.protocol, "train"))
-        samples["train"] = joined_views(samples["train"], more)
+        samples["train"] = with_extra(samples["train"], more)
     train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
 
 

@@ -124,18 +124,26 @@ class ViewSamples:
 
 
 def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
-    """Return the samples of two sources as one; motion models of the second are counted on from those of the first.
+    """Return the samples of two sources as one.
 
-    So the two never share a motion model, of which an epoch visits few SNRs.
     Raises: InputError where their images differ in size.
     """
     if first.size != second.size:
         raise InputError(f"views: image sizes {first.size} and {second.size}, expected one size")
     found = copy.copy(first)
     found.images = np.concatenate([first.images, second.images])
-    later = replace(second.facts, model=second.facts.model + 1 + first.facts.model.max())
-    found.facts = joined([first.facts, later])
+    found.facts = joined([first.facts, second.facts])
     return found
+
+
+def with_extra(own: ViewSamples, extra: ViewSamples) -> ViewSamples:
+    """Return a run's own samples and those of other runs as one; motion models of the latter are counted on.
+
+    So the two never share a motion model, of which an epoch visits few SNRs. Raises: as `joined_views`.
+    """
+    later = copy.copy(extra)
+    later.facts = replace(extra.facts, model=extra.facts.model + 1 + own.facts.model.max())
+    return joined_views(own, later)
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
-from lowalt.recognition.samples import Facts, ViewSamples, joined_views
+from lowalt.recognition.samples import ViewSamples, joined_views, with_extra
 from lowalt.recognition.schemes import TABLE, Scheme, named
 
 BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
@@ -18,15 +18,6 @@ def part_of(samples: ViewSamples, numbers: np.ndarray) -> ViewSamples:
     """Return the samples `numbers` of a source as a source of its own."""
     found = copy.copy(samples)
     found.keep(numbers)
-    return found
-
-
-def joined(first: ViewSamples, second: ViewSamples) -> ViewSamples:
-    """Return the samples of two sources of one size as one."""
-    found = copy.copy(first)
-    found.images = np.concatenate([first.images, second.images])
-    pairs = zip(vars(first.facts).values(), vars(second.facts).values(), strict=True)
-    found.facts = Facts(*map(np.concatenate, pairs))
     return found
 
 
@@ -56,12 +47,12 @@ def trial(
     if extra:
         more = ViewSamples(extra, scheme.columns, choose.PAIRS)
         more.keep(np.flatnonzero(~np.isin(more.facts.subtype, held)))
-        parts["train"] = joined_views(parts["train"], more)
+        parts["train"] = with_extra(parts["train"], more)
     evaluation = block.pop("evaluation")
     given = {"train": parts["train"], "validation": parts["validation"]}
     block |= {"seed": seed, "colour_map": colour_map, "classes": classes}
     runs.train(given, scheme, f"without fold {fold}", block, out)
-    asked = joined(parts["held"], parts["validation"])
+    asked = joined_views(parts["held"], parts["validation"])
     about = {"candidate": name, "fold": fold, "held": held}
     runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
 

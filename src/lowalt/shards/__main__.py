@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Iterable
-from pathlib import Path
 
 from lowalt.common.classes import stated
 from lowalt.common.command import parser, pick, run
@@ -77,22 +76,7 @@ def index(arguments: list[str]) -> None:
 
 def _clouds_option(options: argparse.ArgumentParser) -> None:
     options.add_argument("--clouds", help="folder of the run's cloud files (default: ../clouds)")
-    options.add_argument("--occluders", help="folder of the run's surface files, where the scene hides points")
-
-
-def _remaker(given: argparse.Namespace):
-    """Return the object that makes the samples of the index again."""
-    # Imports wait: packing shards must not pay for the echo engine.
-    from lowalt.shards.read import ShardSet
-    from lowalt.shards.remake import CloudFolder, Remaker
-
-    occluders = None
-    if given.occluders:
-        from lowalt.targets.occluders import read_all
-
-        occluders = read_all(sorted(Path(given.occluders).glob("*.npz")))
-    clouds = given.clouds or Path(given.index).resolve().parent.parent / "clouds"
-    return Remaker(ShardSet(given.index), CloudFolder(clouds), occluders)
+    options.add_argument("--occluders", help="folder of the run's surface files (default: occluders next to clouds)")
 
 
 def _ended(lines: Iterable[str]) -> None:
@@ -114,9 +98,9 @@ def verify(arguments: list[str]) -> None:
     given = options.parse_args(arguments)
     _ended(faults(given.index))
     if given.remake:
-        from lowalt.shards.remake import some
+        from lowalt.shards.remake import opened, some
 
-        remaker = _remaker(given)
+        remaker = opened(given.index, given.clouds, given.occluders)
         _ended(line for number in some(remaker.shards, given.remake) for line in remaker.faults(number))
 
 
@@ -127,9 +111,9 @@ def remake(arguments: list[str]) -> None:
     options.add_argument("--sample", required=True, nargs="+", metavar="KEY", help="keys of the samples")
     _clouds_option(options)
     given = options.parse_args(arguments)
-    from lowalt.shards.remake import number_of
+    from lowalt.shards.remake import number_of, opened
 
-    remaker = _remaker(given)
+    remaker = opened(given.index, given.clouds, given.occluders)
     _ended(line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key)))
     print(f"{len(given.sample)} samples made again, equal in every byte")
 

@@ -15,6 +15,7 @@ from lowalt.shards.read import ShardSet
 from lowalt.shards.record import accompanied, record, row_of
 from lowalt.shards.write import npy
 from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.occluders import read_all
 
 
 class CloudFolder(Mapping):
@@ -103,3 +104,17 @@ def some(shards: ShardSet, count: int) -> list[int]:
     """Return the numbers of `count` samples drawn by the index's own checksum, or of all where there are no more."""
     draws = stream(0, "remake", shards.index["sha256"])
     return sorted(draws.choice(len(shards), min(count, len(shards)), replace=False).tolist())
+
+
+def opened(index: str | Path, clouds: str | Path | None = None, occluders: str | Path | None = None) -> Remaker:
+    """Return an object that makes the samples of a run's data set again.
+
+    clouds: folder of the run's clouds, by default `clouds` next to the folder of the index; occluders: folder of the
+    run's surfaces, by default `occluders` next to that of the clouds. Surfaces are read only if the scene hides points.
+    Raises: InputError if the index or a surface cannot be read, or the index is too old.
+    """
+    shards, surfaces = ShardSet(index), None
+    clouds = Path(clouds or Path(index).resolve().parent.parent / "clouds")
+    if "occlusion" in (shards.index.get("echo") or {}).get("effects", {}):
+        surfaces = read_all(sorted(Path(occluders or clouds.parent / "occluders").glob("*.npz")))
+    return Remaker(shards, CloudFolder(clouds), surfaces)
