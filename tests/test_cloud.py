@@ -71,6 +71,9 @@ WRONG = {
     "length other than 1 or NaN": craft(normals=np.ones((5, 3))),
     "record lacks": craft(record={"subtype": "x", "category": "UAV"}),
     "expected a key `like` with one of": craft(record=RECORD | {"category": "Boat"}),
+    "'tail'] are no parts that turn, expected some of": craft(record=RECORD | {"rate_factors": {"tail": 5}}),
+    "expected numbers from 0 to 100": craft(record=RECORD | {"rate_factors": {"rotor 1": -1}}),
+    "expected numbers by the parts' names": craft(record=RECORD | {"rate_factors": [1]}),
     "track has shape": recording(1, track_rate_hz=120.0),
     "track_rate_hz is missing": recording(5),
 }

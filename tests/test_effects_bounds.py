@@ -96,8 +96,10 @@ def test_a_rotor_may_turn_far_within_a_symbol(turns, tolerance):
     assert received.decisions[0].computed
 
 
-def test_travel_is_at_least_every_path_and_little_more():
-    cloud, row = target([[0.3, 0.1, 0.2], [0.0, 0.2, 0.0]], rotor=True, x_m=60.0, vx_mps=20.0, rate_hz=150.0)
+@pytest.mark.parametrize("factor", [1.0, 5.0])
+def test_travel_is_at_least_every_path_and_little_more(factor):
+    cloud, row = target([[0.3, 0.1, 0.2], [0.0, 0.2, 0.0]], rotor=True, x_m=60.0, vx_mps=20.0, rate_hz=150.0 / factor)
+    cloud.record["rate_factors"] = {cloud.names[1]: factor}
     radio = network()
     times = radio.times_s
     grid = np.append(times, 2 * times[-1] - times[-2])

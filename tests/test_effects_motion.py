@@ -100,8 +100,9 @@ def craft(rotors: int = 4, category: str = "UAV") -> SimpleNamespace:
     parts = list(range(rotors))
     record = {"published": {"size_m": 0.4}}
     return SimpleNamespace(
-        category=category, like=category, record=record, parts_of=lambda kind: parts if kind == "rotor" else []
-    )
+        category=category, like=category, record=record, parts_of=lambda kind: parts if kind == "rotor" else [],
+        rate_factors=np.ones(rotors),
+    )  # fmt: skip
 
 
 ROW = {
@@ -159,6 +160,17 @@ def test_a_set_rate_is_read_back_from_each_rotor_and_from_the_signal():
     line = np.exp(1j * (2 * np.pi * row["rate_hz"] * TIMES + one))
     frequency = np.fft.fftfreq(16 * len(TIMES), 2.5e-3)[np.abs(np.fft.fft(line, 16 * len(TIMES))).argmax()]
     assert abs((frequency - rate + 200) % 400 - 200) < 0.1
+
+
+def test_a_rotor_s_spread_is_a_share_of_its_own_rate():
+    settings = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
+    one, other = craft(2), craft(2)
+    other.rate_factors = np.array([1.0, 5.4])
+    plain, own = (
+        rotor_spread.perturb(settings, it, ROW, TIMES, np.random.default_rng(2)).angle_rad for it in (one, other)
+    )
+    assert plain[0].tobytes() == own[0].tobytes()
+    np.testing.assert_allclose(own[1], 5.4 * plain[1], rtol=1e-12)
 
 
 def test_steady_rotors_are_idle_and_the_limit_is_continuous():

@@ -114,6 +114,41 @@ def test_blade_tip_moves_at_two_pi_rate_times_radius():
     assert speed == pytest.approx(2 * math.pi * 50 * radius, rel=1e-6)
 
 
+def two_rotors(factors: dict) -> Cloud:
+    """A body and two rotors of one point each, with rate factors by part."""
+    nothing = np.full(3, np.nan)
+    record = {"subtype": "test", "category": "UAV", "source": "test", "checksum": "", "rate_factors": factors}
+    return Cloud(
+        points=np.array([[0.0, 0, 0], [0.5, 0, 0], [-0.5, 0, 0]]), part=np.arange(3), kinds=("body", "rotor", "rotor"),
+        names=("body", "main", "tail"), parents=np.full(3, -1), axes=np.array([nothing, [0, 0, 1.0], [1.0, 0, 0]]),
+        hinges=np.array([nothing, [0.3, 0, 0], [-0.5, 0.1, 0]]), normals=np.full((3, 3), np.nan), rcs_m2=np.ones(3),
+        record=record,
+    )  # fmt: skip
+
+
+def test_each_rotor_turns_at_its_own_factor_of_the_rate():
+    times = np.arange(400) * 2.5e-3
+    line = row(rate_hz=6.4, phase_0_rad=0.3, phase_1_rad=1.1)
+    plain = poses(two_rotors({}), line, times)
+    own = poses(two_rotors({"tail": 5.4}), line, times)
+    faster = poses(two_rotors({}), {**line, "rate_hz": 6.4 * 5.4}, times)
+    np.testing.assert_array_equal(own.rotation[:, 1], plain.rotation[:, 1])
+    np.testing.assert_array_equal(own.rotation[:, 2], faster.rotation[:, 2])
+    assert abs(own.rotation[:, 2] - plain.rotation[:, 2]).max() > 1
+    # The tail rotor's turns in one second, by its angle from symbol to symbol.
+    angle = np.unwrap(np.arctan2(own.rotation[:, 2, 2, 1], own.rotation[:, 2, 2, 2]))
+    assert np.ptp(angle) == pytest.approx(2 * np.pi * 6.4 * 5.4 * times[-1])
+    assert np.ptp(poses(two_rotors({"main": 0}), line, times).rotation[:, 1], axis=0).max() == 0
+
+
+def test_a_factor_of_one_leaves_every_bit():
+    times = np.arange(50) * 2.5e-3
+    line = row(rate_hz=93.7, phase_0_rad=0.3, phase_1_rad=1.1)
+    plain, ones = (poses(two_rotors(factors), line, times) for factors in ({}, {"main": 1, "tail": 1.0}))
+    assert plain.rotation.tobytes() == ones.rotation.tobytes()
+    assert plain.translation.tobytes() == ones.translation.tobytes()
+
+
 def test_a_wheel_point_on_the_ground_stands_still():
     diameter, speed = 0.56, 13.0
     wheel = rigid_cloud("wheel", "Vehicle", {"wheel_diameter_m": diameter})

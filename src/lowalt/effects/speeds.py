@@ -77,6 +77,11 @@ class Speeds:
         return sum(float((np.linalg.norm(np.diff(table, axis=0), axis=1) / step).max()) for table in tables)
 
     @cached_property
+    def _factors(self) -> np.ndarray:
+        """How many times the row's rate each part turns (P,)."""
+        return self.cloud.rate_factors
+
+    @cached_property
     def _chains(self) -> list[list[int]]:
         """Moving parts that carry each part, the part itself last."""
         result = []
@@ -120,7 +125,7 @@ class Speeds:
         if self.cloud.kinds[part] == "wing":
             amplitude, beat = self._beat(part)
             return amplitude * beat + self._added(part)
-        return 2 * np.pi * abs(self.row["rate_hz"]) + self._added(part)
+        return 2 * np.pi * abs(self.row["rate_hz"]) * self._factors[part] + self._added(part)
 
     def _imaginary_angle(self, part: int, imaginary_s: float) -> float:
         """Bound of the imaginary part of a part's angle at |Im t| <= `imaginary_s` (rad)."""

@@ -90,13 +90,17 @@ def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
 def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.ndarray], dict[int, tuple[str, float]]]:
     """Angles that change with time, (N,) rad by name, and the moving parts: part -> (name of its angle, phase in rad).
 
-    Rotors share one rate, and so do wheels: their angles differ by a constant only.
+    A rotor or wheel turns at the row's rate times its own factor; those of one factor differ by a constant angle only.
     Raises: InputError naming the parts without a rate or phase.
     """
     angles, phases = {"cycle": 2 * np.pi * turns(row["rate_hz"], times_s)}, {}
+    factors = cloud.rate_factors
     for kind in ("rotor", "wheel"):
         for order, part in enumerate(cloud.parts_of(kind)):
-            phases[part] = ("cycle", row[f"phase_{order}_rad"])
+            name = "cycle" if factors[part] == 1 else f"cycle times {factors[part]!r}"
+            if name not in angles:
+                angles[name] = 2 * np.pi * turns(row["rate_hz"] * factors[part], times_s)
+            phases[part] = (name, row[f"phase_{order}_rad"])
     wings = cloud.parts_of("wing")
     if wings:
         flap = cloud.record["flap"]

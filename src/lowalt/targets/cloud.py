@@ -14,7 +14,7 @@ up +z. Every point belongs to one part; every part but the body moves.
     hinges      (P, 3)  float64  m, a point on the part's axis (NaN for body and node)
     axes        (P, 3)  float64  unit vector of the axis; a rotor's sense is its sign (NaN for body and node)
     track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0 unless the parts are nodes)
-    record      str     JSON: subtype, category, source, checksum, track_rate_hz, sizes, ...
+    record      str     JSON: subtype, category, source, checksum, track_rate_hz, rate_factors, sizes, ...
 """
 
 import json
@@ -32,6 +32,8 @@ from lowalt.common.files import replacing
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16
 """Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs has 16 rotors)."""
+
+LARGEST_RATE_FACTOR = 100
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,12 @@ class Cloud:
     def like(self) -> str:
         """How the target is built, moves and reflects: one of the published classes."""
         return classes.like(self.record)
+
+    @property
+    def rate_factors(self) -> np.ndarray:
+        """How many times the rate of its motion model each part turns, (P,): 1 where the record says nothing else."""
+        given = self.record.get("rate_factors", {})
+        return np.array([float(given.get(name, 1.0)) for name in self.names])
 
     def parts_of(self, kind: str) -> list[int]:
         """Indices of the parts of one kind, in the cloud's order."""
@@ -122,6 +130,7 @@ def check(cloud: Cloud, where: str) -> Cloud:
     )
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
     need(not missing, f"record lacks {sorted(missing)}")
+    need(not (fault := _rate_fault(cloud)), f"rate_factors: {fault}")
     try:
         classes.like(cloud.record)
     except InputError as error:
@@ -136,6 +145,19 @@ def check(cloud: Cloud, where: str) -> Cloud:
         )
         need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
     return cloud
+
+
+def _rate_fault(cloud: Cloud) -> str | None:
+    """Return what is wrong with a cloud's rate factors, or None."""
+    given = cloud.record.get("rate_factors", {})
+    if not isinstance(given, dict):
+        return f"{given!r}, expected numbers by the parts' names"
+    turning = [name for name, kind in zip(cloud.names, cloud.kinds, strict=True) if kind in ("rotor", "wheel")]
+    strange = sorted(set(given) - set(turning))
+    if strange:
+        return f"{strange} are no parts that turn, expected some of {turning}"
+    good = all(isinstance(value, (int, float)) and 0 <= value <= LARGEST_RATE_FACTOR for value in given.values())
+    return None if good else f"{given}, expected numbers from 0 to {LARGEST_RATE_FACTOR}"
 
 
 def extent(cloud: Cloud) -> float:

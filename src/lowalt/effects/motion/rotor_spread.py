@@ -1,7 +1,8 @@
 """Rotors of one craft turn at slightly different rates, and each rate wanders.
 
 A flight controller keeps attitude by changing the rotors' rates against each other. Rotor p turns at
-F (1 + s_p + w_p(t)): s_p is drawn once, w_p is an Ornstein-Uhlenbeck process whose integral is the added phase.
+F_p (1 + s_p + w_p(t)): F_p is the motion model's rate times the rotor's own factor, s_p is drawn once, w_p is an
+Ornstein-Uhlenbeck process whose integral is the added phase.
 """
 
 import numpy as np
@@ -19,7 +20,7 @@ DEFAULTS = {"spread": 0.05, "wander": 0.02, "correlation_s": 1.5}
 
 
 def idle(settings: dict) -> bool:
-    """Return whether all rotors turn at the one rate of the motion table."""
+    """Return whether each rotor turns at the rate of the motion table times its own factor."""
     return settings["spread"] == 0 and settings["wander"] == 0
 
 
@@ -42,4 +43,5 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     start = np.stack([first * np.sqrt(stationary(drift[:1, :1], noise[:1])[0, 0]), np.zeros(len(rotors))], axis=1)
     path = walk([steps(drift, noise)] * len(rotors), start, normal)
     seconds = spread[:, None] * times_s + settings["wander"] * step * path[..., 1]
-    return Perturbation(dict(zip(rotors, 2 * np.pi * row["rate_hz"] * seconds, strict=True)))
+    radps = 2 * np.pi * row["rate_hz"] * cloud.rate_factors[rotors]
+    return Perturbation(dict(zip(rotors, radps[:, None] * seconds, strict=True)))

@@ -1,6 +1,7 @@
 """One target for the eye: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
 
 import io
+import math
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,7 @@ VIEWS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
 AXES = ("right x (m)", "front y (m)", "up z (m)")
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
-FRAMES = 24
+FRAMES, MOST_FRAMES = 24, 96
 FLOOR_DB = -40.0
 CONFIG = PACKAGE.parents[1] / "config/default.yaml"
 
@@ -141,12 +142,14 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
 def target_animation(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1, count: int = FRAMES) -> bytes:
     """Return a GIF of `count` frames of one cycle of a target's own motion, from above, from the right and from behind.
 
+    Where a rotor turns at several times the target's rate there are as many times the frames, at most MOST_FRAMES.
     Raises: as `target_picture`; also where nothing of the target moves.
     """
     row = _motion_row(cloud, load_yaml(config_path), seed)
     if not len(cloud.track) and all(kind == "body" for kind in cloud.kinds):
         raise InputError(f"{cloud.subtype}: no part moves, expected rotors, wings, wheels or a recording to animate")
     length = cycle_s(cloud, row)
+    count = min(MOST_FRAMES, count * max(1, math.ceil(cloud.rate_factors.max())))
     frames = positions(cloud, still_row(row), np.arange(count) / count * length)
     middle, half = _limits(frames)
     pictures = []
