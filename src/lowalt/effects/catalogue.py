@@ -29,6 +29,7 @@ LISTED = (
     "channel/line_of_sight",
     "channel/ground_reflection",
     "channel/walls",
+    "channel/reflected_aspect",
     "channel/squint",
     "channel/wavefront",
     "channel/symbol_motion",

@@ -21,6 +21,7 @@ from lowalt.effects.interface import (
     Quantises,
     SamplesTime,
     WeighsPoints,
+    WeighsRoutes,
 )
 from lowalt.effects.response import ImagePath
 from lowalt.effects.sending import Sending
@@ -72,9 +73,10 @@ class Chain:
         self.others: list[Chain] = []
         """Other targets of the beam, each with its own view; everything they ask for is computed."""
         self.step = 0.0
+        self._seen: dict[str, np.ndarray] = {}
         self.factor: np.ndarray | float = 1.0
         for effect in providing(self.channel, WeighsPoints):
-            self.factor = self.factor * effect.module.visible(effect.settings, view, draws(effect.name))
+            self.factor = self.factor * self._visible(effect, view)
 
     @property
     def bent(self) -> bool:
@@ -90,7 +92,16 @@ class Chain:
     def strengths(self) -> np.ndarray:
         """Largest sum of amplitudes (N, P) that each part can have in a range cell before the receiver."""
         amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
-        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.factor))
+        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.routes))
+
+    @cached_property
+    def routes(self) -> np.ndarray | float:
+        """Factor on the points' amplitudes: `factor`, or (R, N, L) of each route where the scene tells them apart."""
+        told = providing(self.channel, WeighsRoutes)
+        if not told or not self._paths:
+            return self.factor
+        weighing = providing(self.channel, WeighsPoints)
+        return told[0].module.routes(told[0].settings, self.view, self._paths, weighing, self._visible)
 
     @cached_property
     def direct(self) -> np.ndarray:
@@ -118,11 +129,11 @@ class Chain:
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
-        view, factor = self.view, self.factor
+        view, factor = self.view, self.routes
         rows = slice(None) if chosen is None else np.flatnonzero(chosen)
         if chosen is not None:
             view = view.at(view.times_s[rows])
-            factor = factor if np.ndim(factor) == 0 else factor[rows]
+            factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             samples = self._samples(view, on, factor, rows)
             for other in self.others:
@@ -149,12 +160,12 @@ class Chain:
     @cached_property
     def own_response(self) -> np.ndarray:
         """Subcarriers (N, M) of this target, everything asked for computed to rounding."""
-        return self._echo(self.view, frozenset(self.by_need), self.factor)
+        return self._echo(self.view, frozenset(self.by_need), self.routes)
 
     @cached_property
     def own_samples(self) -> np.ndarray:
         """Time samples (N, M) of this target, likewise."""
-        return self._samples(self.view, frozenset(self.by_need), self.factor, slice(None))
+        return self._samples(self.view, frozenset(self.by_need), self.routes, slice(None))
 
     @property
     def _company(self) -> frozenset[str]:
@@ -219,7 +230,7 @@ class Chain:
         bent = np.flatnonzero(moving.bent(view))
         if len(bent):
             part = view.at(view.times_s[bent])
-            own = factor if np.ndim(factor) == 0 else np.broadcast_to(factor, (len(samples), factor.shape[1]))[bent]
+            own = factor if np.ndim(factor) == 0 else _every_row(factor, len(samples))[..., bent, :]
             numbers = np.arange(len(self.view.times_s))[rows][bent]
             samples[bent] = self._summed(part, on, own, numbers, moving.every_sample(part))
         return samples
@@ -286,6 +297,15 @@ class Chain:
         offsets = [getattr(effect.module, "OFFSET_CELLS", 0.0) for effect in providing(self.channel, AddsEchoes)]
         return offsets[0] if offsets else 0.0
 
+    def _visible(self, effect: NamedEffect, view: View) -> np.ndarray:
+        """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time."""
+        if view is self.view and effect.name in self._seen:
+            return self._seen[effect.name]
+        found = effect.module.visible(effect.settings, view, self.draws(effect.name))
+        if view is self.view:
+            self._seen[effect.name] = found
+        return found
+
     @cached_property
     def _clutter(self) -> np.ndarray | None:
         """Sum of the echoes of everything but the target (N, M), None where there are none."""
@@ -305,6 +325,11 @@ class Chain:
         return Frame(
             view.network, view.station, self.sending.known, self.power, 2.0 * range_m / SPEED_OF_LIGHT, aired, starts
         )  # fmt: skip
+
+
+def _every_row(factor: np.ndarray, count: int) -> np.ndarray:
+    """A factor (N or 1, L) or (R, N or 1, L) with a row for each of `count` symbols."""
+    return np.broadcast_to(factor, (*factor.shape[:-2], count, factor.shape[-1]))
 
 
 def _any_of(chosen: np.ndarray) -> np.ndarray:

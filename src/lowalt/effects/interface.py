@@ -13,12 +13,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     import numpy as np
 
     from lowalt.common.network import Network
     from lowalt.effects.antenna import Element as AntennaElement
+    from lowalt.effects.catalogue import NamedEffect
     from lowalt.effects.checks import CheckedScene
     from lowalt.effects.response import ImagePath
     from lowalt.effects.transmitter.slow_time import Sampling
@@ -138,6 +139,20 @@ class WeighsPoints(Protocol):
 
 
 @runtime_checkable
+class WeighsRoutes(Protocol):
+    """Channel: an effect that tells the points' amplitudes on further paths from those on the direct one."""
+
+    def routes(
+        self, settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
+        visible: Callable[[NamedEffect, View], np.ndarray],
+    ) -> np.ndarray:  # fmt: skip
+        """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`.
+
+        weighing: the scene's effects that provide `WeighsPoints`; visible: returns the factor of one of them.
+        """
+
+
+@runtime_checkable
 class ShapesElements(Protocol):
     """Channel, optional: an effect that gives antenna elements a pattern, which `View.element` passes to the others."""
 
@@ -217,7 +232,16 @@ class ChoosesCells(Protocol):
 WORK = {
     "motion": (PerturbsMotion,),
     "transmitter": (DrawsData, ChangesWaveform, PicksSubcarriers, SamplesTime),
-    "channel": (PointsBeams, SetsCrossSections, WeighsPoints, AddsPaths, AddsEchoes, AddsTargets, BoundsItself),
+    "channel": (
+        PointsBeams,
+        SetsCrossSections,
+        WeighsPoints,
+        WeighsRoutes,
+        AddsPaths,
+        AddsEchoes,
+        AddsTargets,
+        BoundsItself,
+    ),
     "receiver": (ChangesSamples,),
     "detection": (FiltersCells, ChoosesCells),
 }

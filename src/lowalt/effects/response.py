@@ -24,11 +24,12 @@ class ImagePath(NamedTuple):
     """A one-way propagation path between a station and every point, given by the points' images.
 
     places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's complex factor in
-    addition to 1/r, a number or (N, L).
+    addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image, where the points see the station.
     """
 
     places: np.ndarray
     coefficient: np.ndarray | complex = 1.0
+    station_m: np.ndarray | None = None
 
 
 def response(
@@ -47,7 +48,8 @@ def response(
     """Return the subcarriers Y (N, M) complex128 of points at `places` (N, L, 3) m, the known symbol removed.
 
     rcs_m2: (L,) m2; aim_m: (3,) m, where both beams point; paths: all but the direct one; waves go out by any path
-    and come back by any; factor: real factor on every point's two-way amplitude, (N, L); squint: the arrays' phases
+    and come back by any; factor: real factor on every point's two-way amplitude, (N, L), or (R, N, L) for each of the R
+    routes there and back by one path, the direct one first; squint: the arrays' phases
     follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves; error:
     largest error of interpolation and truncation together, relative to the sum of peak amplitudes.
     A link goes out by its transmitter's array and comes back by its receiver's; it has no other paths.
@@ -91,10 +93,12 @@ class Rays:
     def summed(self, strength: np.ndarray) -> np.ndarray:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
 
-        Symbols without any strength are zero.
+        strength: also (R, N, L), factors of their own for each path there and back; out by one path and back by another
+        they are the geometric means. Symbols without any strength are zero.
         """
         radio, refs = self.radio, self.refs
         strength = radio.scale * np.atleast_2d(strength)
+        own_routes = strength.ndim == 3
         own, whole = np.exp(-2j * np.pi * refs[:, 4]), refs[:, 5].astype(np.int64)
         result = np.zeros((len(refs), radio.subcarriers), np.complex128)
         for a, b, times in self.pairs:
@@ -104,8 +108,11 @@ class Rays:
             reach = _round_up(0.5 * radio.cells * (there.reach + home.reach))
             table = _table(reach, radio.subcarriers, self.rest)
             sums = np.empty((len(self.weights), len(refs), len(table)), np.complex128)
+            paired = strength
+            if own_routes:
+                paired = strength[a] if a == b else np.sqrt(strength[a] * strength[b])
             moment_loops.moments(
-                strength, there.factors, home.factors, times, there.excess, home.excess, middle, 0.5 * radio.cells,
+                paired, there.factors, home.factors, times, there.excess, home.excess, middle, 0.5 * radio.cells,
                 reach, sums,
             )  # fmt: skip
             moment_loops.spread(sums, own, whole, refs[:, 6] + middle, table, self.weights, result)

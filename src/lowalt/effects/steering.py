@@ -37,7 +37,7 @@ class Steered:
             self.beams.append((rows, _kept_phase(view, aim), Rays(*given, view.places[rows], aim, some, **asked)))
 
     def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
-        """Return the subcarriers (N, M) with `factor` (N, L) on every point's amplitude, zero where all of it is."""
+        """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`, zero where it is."""
         view, roots = self.view, np.sqrt(self.view.cloud.rcs_m2)
         if view.beams is None or len(view.beams.starts_s) == 1:
             return self.beams[0][2].summed(roots * factor)
@@ -48,8 +48,8 @@ class Steered:
 
 
 def _rows_of(values: np.ndarray | complex, rows: np.ndarray) -> np.ndarray | complex:
-    """The rows of a table (N, ...), or the value that all rows share."""
-    return values[rows] if np.ndim(values) and len(values) > 1 else values
+    """The rows of a table (N, L) or (R, N, L), or the value that all rows share."""
+    return values[..., rows, :] if np.ndim(values) > 1 and values.shape[-2] > 1 else values
 
 
 def _kept_phase(view: View, aim_m: np.ndarray) -> complex:

@@ -97,6 +97,15 @@ class View:
         """Return the same target seen at other times (K,) s of the look."""
         return replace(self, times_s=times_s)
 
+    def seen_from(self, place_m: np.ndarray) -> "View":
+        """Return the same target, at the same instants and under the same beams, seen from another place (3,) m."""
+        place = tuple(float(value) for value in place_m)
+        other = replace(self, station=replace(self.station, position_m=place))
+        # The motion does not depend on the station.
+        known = {name: self.__dict__[name] for name in ("motion", "places", "normals") if name in self.__dict__}
+        other.__dict__.update(known)
+        return other
+
     @cached_property
     def centres(self) -> np.ndarray:
         """Middle (P, 3) of each part's points, in the part's own frame (m)."""

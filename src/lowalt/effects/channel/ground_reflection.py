@@ -97,4 +97,5 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     coefficient = fresnel(np.clip(sine, 0.0, 1.0), *properties)
     if settings["roughness_m"] > 0:
         coefficient *= roughness(sine, settings["roughness_m"], frequency)
-    return [ImagePath(mirrored, coefficient * view.relative_gain(mirrored))]
+    below = np.asarray(view.station.position_m) * [1.0, 1.0, -1.0]
+    return [ImagePath(mirrored, coefficient * view.relative_gain(mirrored), below)]

@@ -67,10 +67,12 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     frequency = radar(view.network, view.station).centre_hz
     result = []
     for facade in settings["facades"]:
-        images, sine, reflected = mirrored(facade, view.places, np.asarray(view.station.position_m))
+        station_m = np.asarray(view.station.position_m)
+        images, sine, reflected = mirrored(facade, view.places, station_m)
         # Antennas are vertically polarised, so the field is parallel to an upright wall, as a horizontal one to ground.
         mirror = fresnel(
             np.clip(sine, 0.0, 1.0), settings["permittivity"], settings["conductivity_s_m"], frequency, "horizontal"
         )
-        result.append(ImagePath(images, np.where(reflected, mirror * view.relative_gain(images), 0.0)))
+        behind = mirrored(facade, station_m[None, None], station_m)[0][0, 0]
+        result.append(ImagePath(images, np.where(reflected, mirror * view.relative_gain(images), 0.0), behind))
     return result

@@ -1,0 +1,61 @@
+"""Aspect and occlusion along reflected routes: by the ground or a facade a target shows another side.
+
+A point sees the station in the mirror, so the way there and back by one reflected path has the aspect and the shadows
+of a station at the mirror image's place. Out by one path and back by another, each way counts with the root of its own
+two-way factor. Without this effect all paths have the direct one's aspect and shadows.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.effects.catalogue import NamedEffect
+from lowalt.effects.checks import CheckedScene
+from lowalt.effects.response import ImagePath
+from lowalt.effects.view import View
+
+SOURCE = (
+    "images of the station: Balanis, Advanced Engineering Electromagnetics, section 7.4; product of one factor for "
+    "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and for opaque shadows, an "
+    "estimate for facets"
+)
+DEFAULTS = {"follow": ["cross_sections", "fluctuation", "occlusion"]}
+
+FOLLOWED = tuple(DEFAULTS["follow"])
+"""Effects that depend on the side that a target shows."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether nothing follows the reflected routes."""
+    return not settings["follow"]
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError where the scene has no reflected route, or nothing that could follow it."""
+    if not {"ground_reflection", "walls"} & set(scene.effects):
+        raise InputError(
+            "effects.reflected_aspect: there is no reflected route, expected ground_reflection or walls in the same "
+            "scene"
+        )
+    if not set(settings["follow"]) & set(scene.effects):
+        raise InputError(
+            f"effects.reflected_aspect.follow: {settings['follow']}, expected one of the scene's effects among "
+            f"{list(FOLLOWED)}"
+        )
+
+
+def routes(
+    settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
+    visible: Callable[[NamedEffect, View], np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`."""
+    shape = view.places.shape[:2]
+    own = {effect.name: visible(effect, view) for effect in weighing}
+    result = np.ones((1 + len(paths), *shape))
+    for number, path in enumerate((None, *paths)):
+        mirrored = None if path is None or path.station_m is None else view.seen_from(path.station_m)
+        for effect in weighing:
+            follows = mirrored is not None and effect.name in settings["follow"]
+            result[number] *= visible(effect, mirrored) if follows else own[effect.name]
+    return result
