@@ -9,9 +9,10 @@ from lowalt.common import portable
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.motion import positions
+from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw
 from lowalt.targets import cyclist, quadruped
+from lowalt.targets.dimensions import estimates, own_cells, rows
 from lowalt.targets.gallery import bones
 from lowalt.targets.limbs import circle, joint
 from lowalt.targets.make import make
@@ -32,14 +33,14 @@ def clouds():
 def test_the_forty_stay_as_they_are():
     plain = CONFIG["targets"]
     assert load_records(plain["table"], plain["records"]) == {name: RECORDS[name] for name in list(RECORDS)[:40]}
-    assert len(MORE) == 8 and {RECORDS[name]["category"] for name in MORE} == {
+    assert len(MORE) == 10 and {RECORDS[name]["category"] for name in MORE} == {
         "UAV", "Fixed-wing", "Helicopter", "Vehicle", "Cyclist", "Animal", "Balloon"
     }  # fmt: skip
 
 
 def test_each_is_as_large_as_its_row_says(clouds):
     for name, extent in {
-        "Cessna 172S": (11.0, None, None), "JOUAV CW-15": (3.54, None, None), "City bus": (2.55, 12.0, 3.1),
+        "Cessna 172S": (11.0, 8.28, None), "JOUAV CW-15": (3.54, None, None), "City bus": (2.55, 11.95, 3.076),
         "Weather balloon": (1.8, 1.8, None),
     }.items():  # fmt: skip
         found = np.ptp(clouds[name].points, axis=0)
@@ -53,7 +54,15 @@ def test_each_is_as_large_as_its_row_says(clouds):
     hexacopter = clouds["Yuneec H520"]
     assert hexacopter.kinds.count("rotor") == 6
     reach = portable.norm(hexacopter.hinges[1:, :2])
-    assert np.allclose(reach, 0.48 / 2)
+    assert np.allclose(reach, 0.52 / 2)
+    tail = clouds["Agusta A109A"]
+    assert tail.names == ("body", "main rotor", "tail rotor") and np.ptp(tail.points[:, 0]) == pytest.approx(
+        10.97, 0.01
+    )
+    assert np.allclose(tail.hinges[1] - tail.hinges[2], [0.33, 6.57, 0.72]) and np.allclose(tail.axes[2], [1, 0, 0])
+    counts = tail.record["points_by_part"]
+    # Points go by the area of the blades: 4 x 10.97 x 0.335 and 2 x 1.89 x 0.199.
+    assert counts["main rotor"] / counts["tail rotor"] == pytest.approx(14.70 / 0.75, rel=0.3)
 
 
 def test_a_propeller_turns_about_the_axis_to_the_front(clouds):
@@ -70,6 +79,39 @@ def test_a_propeller_turns_about_the_axis_to_the_front(clouds):
     assert np.allclose((now - hub)[:, [0, 2]], -(half - hub)[:, [0, 2]], atol=1e-9)
 
 
+def phases(cloud, rate_hz):
+    """A row of a target at rest whose parts turn at `rate_hz`."""
+    rest = dict.fromkeys(("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad"), 0.0)
+    turning = {f"phase_{index}_rad": 0.4 * index for index in range(len(cloud.parts_of("rotor")))}
+    return {"subtype": "x", "model": 0, "rate_hz": rate_hz, **rest, **turning}
+
+
+def test_a_tail_rotor_and_lift_propellers_turn_at_rates_of_their_own(clouds):
+    times = np.arange(400) * 2e-4
+    for name, rate in {"Agusta A109A": 6.4, "JOUAV CW-15 in transition": 90.0}.items():
+        cloud = clouds[name]
+        turned = poses(cloud, phases(cloud, rate), times).rotation
+        for part in cloud.parts_of("rotor"):
+            still = turned[0, part].T
+            trace = np.trace(turned[1, part] @ still)
+            found = np.arccos((trace - 1) / 2) / (2 * np.pi * times[1])
+            wanted = RECORDS[name]["rate_factors"].get(cloud.names[part], 1) * rate
+            assert found == pytest.approx(wanted, rel=1e-6), cloud.names[part]
+    lifting = [cloud.axes[cloud.names.index(f"lift {place}")][2] for place in
+               ("front left", "front right", "rear left", "rear right")]  # fmt: skip
+    assert lifting == [-1, 1, 1, -1]
+
+
+def test_every_cell_and_figure_has_a_source_or_is_called_an_estimate():
+    lines = {(line[0], line[2]): line for line in rows(RECORDS) if line[0] in MORE}
+    assert lines["Agusta A109A", "size"][3:5] == (10.97, "m") and "CR-177476" in lines["Agusta A109A", "size"][5]
+    assert lines["City bus", "length"][5].startswith("Mercedes-Benz Citaro")
+    assert lines["Weather balloon", "highest speed along x"][5] == "estimate"
+    assert all(line[5] for line in lines.values())
+    assert estimates(RECORDS["Road cyclist"]) == (3, 3) and estimates(RECORDS["DJI Mini 2"])[1] > 0
+    assert own_cells(RECORDS["DJI Mini 2"]) == []
+
+
 def drawn(cloud, name, cadence="free", seed=1):
     settings = {"region": {"mast_clearance_m": 0}, "height_m": CONFIG["motion"]["height_m"], "tilt_deg": 20.0,
                 "cadence": cadence}  # fmt: skip
@@ -84,7 +126,7 @@ def test_motion_is_drawn_for_all_of_them_and_wheels_follow_the_road(clouds):
     for name, cloud in clouds.items():
         assert np.isfinite(positions(cloud, rows[name] | {"model": 0}, np.linspace(0, 1, 5))).all()
     row, bus = rows["City bus"], np.hypot(rows["City bus"]["vx_mps"], rows["City bus"]["vy_mps"])
-    assert row["rate_hz"] == pytest.approx(bus / (np.pi * 0.96))
+    assert row["rate_hz"] == pytest.approx(bus / (np.pi * 0.9565))
     # The walker keeps its pace under `free`, the bicycle's wheels cannot.
     speed = np.hypot(rows["Road cyclist"]["vx_mps"], rows["Road cyclist"]["vy_mps"])
     assert rows["Road cyclist"]["playback"] == pytest.approx(speed / 6.0) and rows["Labrador"]["playback"] == 1
@@ -155,6 +197,9 @@ def test_a_joint_lies_at_both_lengths_on_the_side_asked_for():
     [
         ("Cessna 172S", {"size_is": "motor diagonal"}, "expected 'wing span' with model plane"),
         ("Cessna 172S", {"row": {"category": "Fixed-wing", "n_rotors_or_wings": 2}}, "expected n_rotors_or_wings 1"),
+        ("JOUAV CW-15", {"row": {"n_rotors_or_wings": 3}}, "expected n_rotors_or_wings 1 or 5 in the table"),
+        ("Agusta A109A", {"row_from": {"length": "x"}}, r"row_from names \['length'\], expected columns"),
+        ("Agusta A109A", {"rate_factors": {"tail rotor": -5}}, "-5 is less than the minimum of 0"),
         ("Yuneec H520", {"size_is": "wing span"}, "with model radial"),
         ("Labrador", {"mass_kg": 500}, "mass_kg is 500, expected a number from 2 to 120"),
         ("Road cyclist", {"mass_kg": 30}, "expected it with trot alone"),

@@ -10,6 +10,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, slug
 from lowalt.common.street import PACKAGE
 from lowalt.targets.cloud import read, write
+from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import drafted
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
@@ -105,7 +106,9 @@ def _make(given: argparse.Namespace) -> str:
     out = given.out or Path(f"{slug(subtype)}.npz")
     write(out, cloud)
     picture = _picture(out, out.with_suffix(".png"))
-    return f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}"
+    guessed, figures = estimates(cloud.record)
+    words = f"; {guessed} of its {figures} figures are estimates" if guessed else ""
+    return f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}{words}"
 
 
 def _picture(cloud: Path, out: Path) -> str:

@@ -1,4 +1,4 @@
-"""Built-in aircraft beyond multirotors: planes, planes with lift rotors in cruise, helicopters and balloons.
+"""Built-in aircraft beyond multirotors: planes, planes with lift propellers, helicopters and balloons.
 
 Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter chord, under the rotor's hub at mid
 cabin, or in the middle of the envelope. A plane's wing span, a helicopter's rotor diameter and a balloon's diameter are
@@ -18,13 +18,17 @@ _PLANE = _PROPELLER | _BODY | {
     "wing_station": "ratio", "wing_height": "offset", "root_chord": "length", "tip_chord": "length",
     "tail_span": "length", "tail_chord": "length", "fin_height": "length",
 }  # fmt: skip
+_HELICOPTER = _BODY | {
+    "blade_count": "count", "blade_chord": "length", "mast_height": "length", "boom_length": "length",
+    "boom_diameter": "length", "tail_span": "length", "fin_height": "length",
+}  # fmt: skip
 FIGURES = {
     "plane": _PLANE,
     "lift and cruise": _PLANE | {"boom_spacing": "length", "boom_length": "length", "lift_diameter": "length"},
-    "helicopter": _BODY | {
-        "blade_count": "count", "blade_chord": "length", "mast_height": "length", "boom_length": "length",
-        "boom_diameter": "length", "tail_span": "length", "fin_height": "length", "skid_track": "length",
-        "skid_height": "length",
+    "helicopter": _HELICOPTER | {"skid_track": "length", "skid_height": "length"},
+    "tail rotor": _HELICOPTER | {
+        "tail_arm": "length", "tail_rotor_arm": "length", "tail_rotor_drop": "length", "tail_rotor_diameter": "length",
+        "tail_blade_count": "count", "tail_blade_chord": "length",
     },
     "balloon": {
         "envelope_height": "length", "line_length": "length", "load_length": "length", "load_width": "length",
@@ -32,19 +36,24 @@ FIGURES = {
     },
 }  # fmt: skip
 """The figures each layout needs. `wing_station` is where the quarter chord lies, in body lengths from the nose;
-`wing_height` its height over the body's middle, in body heights."""
+`wing_height` its height over the body's middle, in body heights. `tail_arm` and `tail_rotor_arm` are how far the tail
+plane and the tail rotor lie behind the main rotor's hub, `tail_rotor_drop` how far the tail rotor lies below it."""
 
 SIZES = {
     "plane": "wing span", "lift and cruise": "wing span", "helicopter": "rotor diameter",
-    "balloon": "envelope diameter",
+    "tail rotor": "rotor diameter", "balloon": "envelope diameter",
 }  # fmt: skip
 """What the published size of each layout is."""
 
-_ROTORS = {"plane": 1, "lift and cruise": 1, "helicopter": 1, "balloon": None}
+_ROTORS = {"plane": (1,), "lift and cruise": (1, 5), "helicopter": (1,), "tail rotor": (2,), "balloon": (None,)}
+"""Rotors that turn: a plane's lift propellers stand still in cruise and turn in hover and transition."""
+_UP = np.eye(3)
 _AHEAD = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 """Turns the axis of a propeller from up to the front."""
 _UPRIGHT = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
 """Turns a foil from the right to upwards."""
+_SIDEWAYS = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+"""Turns the axis of a propeller from up to the right."""
 _LEFT = np.diag([-1.0, 1.0, 1.0])
 
 
@@ -54,15 +63,16 @@ def fault(record: dict) -> str | None:
     model, size, count = record["model"], record["published"]["size_m"], record["published"]["n_rotors_or_wings"]
     if record["size_is"] != SIZES[model]:
         return f"size_is is {record['size_is']!r}, expected {SIZES[model]!r} with model {model}"
-    if count != _ROTORS[model]:
-        return f"model is {model}, expected n_rotors_or_wings {_ROTORS[model]} in the table of targets, not {count}"
+    if count not in _ROTORS[model]:
+        wanted = " or ".join(map(str, _ROTORS[model]))
+        return f"model is {model}, expected n_rotors_or_wings {wanted} in the table of targets, not {count}"
     if "tip_chord" in f and not f["tip_chord"] <= f["root_chord"] < f["body_length"]:
         return f"figures.root_chord is {f['root_chord']:.4g} m, expected from the tip's chord to the body's length"
     if "wing_station" in f and not 0 < f["wing_station"] < 1:
         return f"figures.wing_station is {f['wing_station']}, expected between 0 (nose) and 1 (tail)"
     if "boom_spacing" in f and f["boom_spacing"] >= size:
         return f"figures.boom_spacing is {f['boom_spacing']:.4g} m, expected less than the span of {size} m"
-    if record["points"] <= f.get("blade_count", 0):
+    if record["points"] <= (count or 0) * max(f.get("blade_count", 0), f.get("tail_blade_count", 0)):
         return f"points is {record['points']}, expected more than one for each blade"
     return None
 
@@ -72,12 +82,25 @@ def _both(shell: Surface) -> list[Surface]:
     return [shell, shell.mapped(_LEFT)]
 
 
-def _propeller(name: str, hub: tuple[float, float, float], diameter: float, f: dict, ahead: bool) -> Part:
-    """A turning propeller with its axis up or to the front."""
-    shell, axis = blade(diameter / 2, f["blade_chord"]), (0.0, 0.0, 1.0)
-    if ahead:
-        shell, axis = shell.mapped(_AHEAD), (0.0, 1.0, 0.0)
-    return Part(name, "rotor", (shell.moved(hub),), hub, axis, copies=int(f["blade_count"]))
+def _propeller(
+    name: str, hub: tuple[float, float, float], size: tuple[float, float, float], facing: np.ndarray, sense: int = 1
+) -> Part:
+    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is what `facing` makes of up.
+
+    Rotors share their points by the area of their blades.
+    """
+    diameter, chord, count = size
+    shell = blade(diameter / 2, chord)
+    if sense < 0:
+        shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
+    axis = tuple(float(value) for value in sense * facing[:, 2])
+    shells = (shell.mapped(facing).moved(hub),)
+    return Part(name, "rotor", shells, hub, axis, copies=int(count), weight=diameter * chord * count)
+
+
+def _main_size(f: dict) -> tuple[float, float, float]:
+    """Diameter, chord and blades of a plane's propeller."""
+    return f["propeller_diameter"], f["blade_chord"], f["blade_count"]
 
 
 def _airframe(span: float, f: dict, booms: float = 0.0) -> list[Surface]:
@@ -102,36 +125,58 @@ def plane(record: dict, f: dict) -> list[Part]:
     """Return a plane with a tractor propeller at the nose."""
     shells = _airframe(record["published"]["size_m"], f)
     hub = (0.0, f["wing_station"] * f["body_length"] + 0.02 * f["body_length"], -f["wing_height"] * f["body_height"])
-    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, f["propeller_diameter"], f, ahead=True)]
+    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, _main_size(f), _AHEAD)]
 
 
 def lift_and_cruise(record: dict, f: dict) -> list[Part]:
-    """Return a plane in cruise: a pusher turns behind the body, four lift propellers stand still along two booms."""
+    """Return a plane with a pusher behind its body and four lift propellers on two booms.
+
+    With one rotor in the table of targets the lift propellers stand still along the booms; with five they turn.
+    """
+    turn = record["published"]["n_rotors_or_wings"] == 5
     shells = _airframe(record["published"]["size_m"], f, f["boom_spacing"])
     x, reach, radius = f["boom_spacing"] / 2, f["boom_length"], 0.03 * f["boom_length"] / 2
     back = f["wing_station"] * f["body_length"] - f["body_length"]
     ahead = back + reach
     shells += _both(tube([(x, ahead, 0), (x, back, 0)], radius, 8))
-    lift = f["lift_diameter"]
-    for y in (ahead - 0.02 * reach, back + 0.25 * reach):
+    lift, chord, lifting = f["lift_diameter"], 0.08 * f["lift_diameter"], []
+    for sense, place, y in ((1, "front", ahead - 0.02 * reach), (-1, "rear", back + 0.25 * reach)):
         top = 2.5 * radius
         shells += _both(cylinder(1.5 * radius, (x, y, 0), (x, y, top), 10))
-        # A stopped lift propeller is held along its boom, where it resists least.
-        shells += _both(box((0.08 * lift, lift, 0.012 * lift), (x, y, top)))
+        if turn:
+            size = (lift, chord, f["blade_count"])
+            lifting.append(_propeller(f"lift {place} right", (x, y, top), size, _UP, sense))
+            lifting.append(_propeller(f"lift {place} left", (-x, y, top), size, _UP, -sense))
+        else:
+            # A stopped lift propeller is held along its boom, where it resists least.
+            shells += _both(box((chord, lift, 0.012 * lift), (x, y, top)))
     hub = (0.0, back - 0.02 * f["body_length"] + 0.1 * f["tail_chord"], -f["wing_height"] * f["body_height"])
-    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, f["propeller_diameter"], f, ahead=True)]
+    return [Part("body", "body", tuple(shells)), _propeller("propeller", hub, _main_size(f), _AHEAD), *lifting]
 
 
-def helicopter(record: dict, f: dict) -> list[Part]:
-    """Return a helicopter without a tail rotor: egg-shaped cabin, mast and main rotor, tail boom, two fins, skids."""
+def _cabin(f: dict) -> tuple[list[Surface], float, float]:
+    """Egg-shaped cabin, mast and tail boom, the boom's end (m, to the front) and its height (m)."""
     long, half, high = f["body_length"], f["body_width"] / 2, f["body_height"]
     shape = ((0.5, 0.25, -0.25, 0.1), (0.4, 0.7, -0.42, 0.32), (0.15, 1, -0.5, 0.5), (-0.2, 0.95, -0.48, 0.5),
              (-0.42, 0.55, -0.2, 0.42), (-0.5, 0.35, 0.0, 0.36))  # fmt: skip
     cabin = hull([(y * long, w * half, a * high, b * high) for y, w, a, b in shape], 2.4, bow=0.03 * long)
     top, start = 0.5 * high + f["mast_height"], -0.4 * long
     end, level, wide = start - f["boom_length"], 0.2 * high, f["boom_diameter"] / 2
-    shells = [cabin, cylinder(0.06 * half, (0, 0, 0.4 * high), (0, 0, top)),
-              tube([(0, start, level), (0, end, level)], [wide, 0.7 * wide])]  # fmt: skip
+    mast = cylinder(0.06 * half, (0, 0, 0.4 * high), (0, 0, top))
+    return [cabin, mast, tube([(0, start, level), (0, end, level)], [wide, 0.7 * wide])], end, level
+
+
+def _main_rotor(record: dict, f: dict) -> Part:
+    """The main rotor on its mast."""
+    hub = (0.0, 0.0, 0.5 * f["body_height"] + f["mast_height"])
+    size = (record["published"]["size_m"], f["blade_chord"], f["blade_count"])
+    return _propeller("main rotor", hub, size, _UP)
+
+
+def helicopter(record: dict, f: dict) -> list[Part]:
+    """Return a helicopter without a tail rotor: cabin, mast and main rotor, tail boom, two fins, skids."""
+    shells, end, level = _cabin(f)
+    long, half, high = f["body_length"], f["body_width"] / 2, f["body_height"]
     chord, reach = 0.45 * f["fin_height"], f["tail_span"] / 2
     shells += _both(foil([(0, end, level, chord, 0), (reach, end, level, chord, 0)], 0.1))
     fin = foil([(-f["fin_height"] / 2, end, 0, chord, 0), (f["fin_height"] / 2, end, 0, chord, 0)], 0.1)
@@ -140,9 +185,25 @@ def helicopter(record: dict, f: dict) -> list[Part]:
     shells += _both(tube([(foot, -0.45 * long, low), (foot, 0.4 * long, low)], 1.5 * thin, 8))
     for y in (-0.25 * long, 0.2 * long):
         shells += _both(tube([(0.4 * half, y, -0.4 * high), (foot, y, low)], thin, 8))
-    hub = (0.0, 0.0, top)
-    main = _propeller("main rotor", hub, record["published"]["size_m"], f, ahead=False)
-    return [Part("body", "body", tuple(shells)), main]
+    return [Part("body", "body", tuple(shells)), _main_rotor(record, f)]
+
+
+def tail_rotor(record: dict, f: dict) -> list[Part]:
+    """Return a helicopter with a tail rotor, its wheels drawn in: cabin, tail boom, tail plane, fin and two rotors."""
+    shells, end, level = _cabin(f)
+    main = _main_rotor(record, f)
+    chord = 0.35 * f["fin_height"]
+    plane = foil(
+        [(0, -f["tail_arm"], level, chord, 0), (f["tail_span"] / 2, -f["tail_arm"], level, 0.8 * chord, 0)], 0.1
+    )
+    fin = foil([(-0.4 * f["fin_height"], end - 0.3 * chord, 0, 0.6 * chord, 0), (0, end, 0, 1.2 * chord, 0),
+                (0.6 * f["fin_height"], end - 0.5 * chord, 0, 0.7 * chord, 0)], 0.1)  # fmt: skip
+    hub = (-0.6 * f["boom_diameter"], -f["tail_rotor_arm"], main.hinge[2] - f["tail_rotor_drop"])
+    shells += [*_both(plane), fin.mapped(_UPRIGHT).moved((0, 0, level))]
+    # The shaft from the fin to the tail rotor.
+    shells.append(cylinder(0.1 * f["boom_diameter"], (0, hub[1], hub[2]), hub, 8))
+    size = (f["tail_rotor_diameter"], f["tail_blade_chord"], f["tail_blade_count"])
+    return [Part("body", "body", tuple(shells)), main, _propeller("tail rotor", hub, size, _SIDEWAYS)]
 
 
 def balloon(record: dict, f: dict) -> list[Part]:
@@ -154,4 +215,7 @@ def balloon(record: dict, f: dict) -> list[Part]:
     return [Part("body", "body", (ellipsoid((half, half, high), sides=24), line, load))]
 
 
-LAYOUTS = {"plane": plane, "lift and cruise": lift_and_cruise, "helicopter": helicopter, "balloon": balloon}
+LAYOUTS = {
+    "plane": plane, "lift and cruise": lift_and_cruise, "helicopter": helicopter, "tail rotor": tail_rotor,
+    "balloon": balloon,
+}  # fmt: skip

@@ -17,14 +17,50 @@ _PUBLISHED = {
 }
 
 
+_RATES = {
+    "freq_lo_hz": ("lowest rate", "Hz"),
+    "freq_hi_hz": ("highest rate", "Hz"),
+    "vx_abs_max": ("highest speed along x", "m/s"),
+    "vy_abs_max": ("highest speed along y", "m/s"),
+    "vz_abs_max": ("highest vertical speed", "m/s"),
+    "speed_lo": ("lowest speed", "m/s"),
+    "speed_hi": ("highest speed", "m/s"),
+}
+"""Cells that a row of one's own has a source for each; those of published rows are all published."""
+
+
+def own_cells(record: dict) -> list[tuple[str, float, str, str]]:
+    """Return name, value, unit and source of the sizes, rates and speeds in a merged record's own row.
+
+    A published row gives none. A cell that the record's `row_from` does not name is an estimate.
+    """
+    if record["published"]["idx"] is not None:
+        return []
+    names = {column: (figure, "m") for column, figure in _PUBLISHED.items()} | _RATES
+    given = record.get("row_from", {})
+    return [
+        (figure, record["published"][column], unit, given.get(column, "estimate"))
+        for column, (figure, unit) in names.items()
+        if record["published"][column] is not None
+    ]
+
+
+def estimates(record: dict) -> tuple[int, int]:
+    """Return how many figures and cells of a merged record are estimates, and how many there are."""
+    sources = [source for *_, source in own_cells(record)]
+    sources += [entry["source"] for entry in record.get("figures", {}).values()]
+    return sources.count("estimate"), len(sources)
+
+
 def rows(records: dict[str, dict]) -> list[tuple]:
-    """Return the table's rows from merged records: the published sizes first, then each figure as written."""
+    """Return the table's rows from merged records: the row's sizes first, then each figure as written."""
     result = []
     for name, record in records.items():
         head = (name, record["category"])
         for column, figure in _PUBLISHED.items():
-            if record["published"][column] is not None:
+            if record["published"]["idx"] is not None and record["published"][column] is not None:
                 result.append((*head, figure, record["published"][column], "m", "published table"))
+        result += [(*head, *cell) for cell in own_cells(record)]
         if record["source"] != "builtin":
             continue
         for figure, entry in record["figures"].items():

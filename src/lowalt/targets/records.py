@@ -169,6 +169,9 @@ def merge(row: dict, record: dict, where: str) -> dict:
         "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
     }  # fmt: skip
     _check_like(merged, where)
+    unknown = sorted(set(record.get("row_from") or {}) - set(row))
+    if unknown:
+        raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
     points, rcs = merged["points"], merged["rcs_m2_per_point"]
     if isinstance(points, bool) or not isinstance(points, int) or not 1 <= points <= MOST_POINTS:
         raise InputError(f"{where}: points is {points!r}, expected a whole number from 1 to {MOST_POINTS}")

@@ -9,6 +9,7 @@ from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
 from lowalt.report.tables import cloud_seconds
 from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.dimensions import estimates
 
 
 def cloud_rows(clouds: dict[str, Cloud], published: dict[str, dict], seconds: dict[str, float]) -> list[dict]:
@@ -26,6 +27,7 @@ def cloud_rows(clouds: dict[str, Cloud], published: dict[str, dict], seconds: di
                 "category": cloud.category,
                 "group": row["unseen_protocol"],
                 "source": cloud.record["source"],
+                "estimates": "{} of {}".format(*estimates(cloud.record)),
                 "points": len(cloud.points),
                 "published": row["points_in_published_cloud_approx"],
                 "seconds": seconds.get(Path(path).stem, float("nan")),
