@@ -84,7 +84,9 @@ def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
 def given(**changes):
     from types import SimpleNamespace
 
-    return SimpleNamespace(**{"overlay": [], "target": [], "cores": "all", "dry_run": False, "profile": None} | changes)
+    return SimpleNamespace(
+        **{"overlay": [], "configfile": [], "target": [], "cores": "all", "dry_run": False, "profile": None} | changes
+    )
 
 
 def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatch, capsys):

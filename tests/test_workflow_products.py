@@ -12,13 +12,13 @@ import yaml
 
 from lowalt.common.config import merge, plain
 from lowalt.common.errors import InputError
+from lowalt.common.shipped import located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
-from lowalt.workflow.located import located
 from lowalt.workflow.products import FIDELITY, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings

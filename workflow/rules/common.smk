@@ -10,7 +10,7 @@ from lowalt.common.errors import InputError
 from lowalt.effects.catalogue import dotted
 from lowalt.workflow import locks, options, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
-from lowalt.workflow.located import located
+from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
@@ -19,7 +19,7 @@ from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 locks.install()
 scheduling.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
-config.update(located(config, ROOT.parent))
+config.update(located(config))
 try:
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
 except InputError as error:

@@ -8,7 +8,7 @@ import yaml
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, slug
-from lowalt.common.street import PACKAGE
+from lowalt.common.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import drafted
@@ -16,7 +16,7 @@ from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.records import load_table, merge, read_records, with_row
 
-TABLE = PACKAGE.parents[1] / "config/targets.csv"
+TABLE = SHIPPED / "config/targets.csv"
 
 
 def _unit(text: str) -> str | float:
@@ -53,7 +53,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
     for parser in (new, make):
-        parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the checkout's)")
+        parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
         parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
                             help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
 

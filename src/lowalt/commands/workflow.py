@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 
 from lowalt.common.errors import InputError
+from lowalt.common.shipped import SHIPPED, shipped
 from lowalt.workflow import status
-from lowalt.workflow.sources import ROOT
 
-SNAKEFILE = ROOT.parent / "Snakefile"
+SNAKEFILE = SHIPPED / "Snakefile"
 
 
 def add_to(commands: argparse._SubParsersAction) -> None:
@@ -20,11 +20,14 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         "run", help="run the workflow: the default, or with overlays",
         epilog="example: lowalt run config/tiny.yaml --target data --cores 2",
     )  # fmt: skip
-    line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default configuration")
+    line.add_argument("overlay", type=shipped, nargs="*", help="overlays on the default configuration")
+    line.add_argument(
+        "--configfile", type=shipped, nargs="+", default=[], help="more overlays, as snakemake names them"
+    )
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
-    line.add_argument("--profile", type=Path, help="profile of a cluster, such as profiles/slurm")
+    line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
     state = commands.add_parser(
         "status", help="what a run in another terminal is doing", epilog="example: lowalt status"
     )
@@ -37,15 +40,16 @@ def command(given: argparse.Namespace) -> list[str]:
     Raises: InputError naming an overlay that is not there, or where no Snakefile came with this installation.
     """
     if not SNAKEFILE.is_file():
-        raise InputError(
-            f"no {SNAKEFILE}: this installation has no workflow, expected one from a clone (pip install -e)"
-        )
-    for path in given.overlay:
+        raise InputError(f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a clone")
+    overlays = [*given.overlay, *given.configfile]
+    for path in overlays:
         if not path.is_file():
             raise InputError(f"configuration: no file at {path}")
+    base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--cores", given.cores]
-    line += ["--workflow-profile", str(given.profile)] if given.profile else []
-    line += ["--configfile", *map(str, given.overlay)] if given.overlay else []
+    profile = given.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
+    line += ["--workflow-profile", str(profile)] if profile else []
+    line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
     line += ["--dry-run"] if given.dry_run else []
     return [*line, "--", *given.target] if given.target else line
 

@@ -15,6 +15,7 @@ import yaml
 from lowalt.common.command import parser, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
 
@@ -103,12 +104,13 @@ def check(config: dict, schema_path: str | Path) -> dict:
 def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     """Return the checked configuration of a base file and its overlays, in order.
 
+    A file that the working directory lacks is taken from those that came with the package.
     Raises: InputError naming file, key and value.
     """
     result: dict = {}
     for path in paths:
-        result = merge(result, load_yaml(path))
-    return check(result, schema_path)
+        result = merge(result, load_yaml(shipped(path)))
+    return located(check(result, shipped(schema_path)))
 
 
 def main(arguments: list[str]) -> None:

@@ -17,6 +17,7 @@ from lowalt.common.command import run
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.shipped import shipped
 from lowalt.recordings import compare, samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
@@ -31,14 +32,16 @@ FOLDER = "config/measured"
 
 def _line(name: str, description: str, *, inputs: bool = False) -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(prog=f"python -m lowalt.recordings {name}", description=description)
-    options.add_argument("--twins", default=f"{FOLDER}/twins.yaml", help="radars and scenes")
-    options.add_argument("--recognition", default=f"{FOLDER}/recognition.yaml", help="network and training")
+    options.add_argument("--twins", type=shipped, default=f"{FOLDER}/twins.yaml", help="radars and scenes")
+    options.add_argument(
+        "--recognition", type=shipped, default=f"{FOLDER}/recognition.yaml", help="network and training"
+    )
     options.add_argument("--out", required=True, type=Path, help="folder to write")
     if inputs:
         options.add_argument("--inputs", required=True, type=Path, help="folder of the measured sets")
-        options.add_argument("--sets", default=f"{FOLDER}/sets.yaml")
-        options.add_argument("--split", default=f"{FOLDER}/split.yaml")
-        options.add_argument("--pairs", default=f"{FOLDER}/pictures.yaml")
+        options.add_argument("--sets", type=shipped, default=f"{FOLDER}/sets.yaml")
+        options.add_argument("--split", type=shipped, default=f"{FOLDER}/split.yaml")
+        options.add_argument("--pairs", type=shipped, default=f"{FOLDER}/pictures.yaml")
     else:
         options.add_argument("--record", required=True, type=Path, help="record of the recording (.yaml)")
         options.add_argument("--radar", required=True, help="the twin whose symbol rate the signals get")
@@ -154,7 +157,7 @@ def recognise(arguments: list[str]) -> None:
 def ablate(arguments: list[str]) -> None:
     """Train networks without one randomisation each and test them on the tuning half: measured-ablation.csv."""
     options = _line("ablate", ablate.__doc__, inputs=True)
-    options.add_argument("--ablation", default=f"{FOLDER}/ablation.yaml", help="what is left out")
+    options.add_argument("--ablation", type=shipped, default=f"{FOLDER}/ablation.yaml", help="what is left out")
     options.add_argument("--models", required=True, type=Path, help="folder for the trained networks")
     given = options.parse_args(arguments)
     from lowalt.recordings.ablate import ABLATION, ablation

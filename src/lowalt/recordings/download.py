@@ -14,6 +14,7 @@ from lowalt.common.command import run
 from lowalt.common.download import download
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
+from lowalt.common.shipped import shipped
 from lowalt.common.yaml_files import load_yaml
 
 SOURCES = "config/measured/sources.yaml"
@@ -56,7 +57,7 @@ def main(arguments: list[str]) -> None:
     """
     line = argparse.ArgumentParser(prog="python -m lowalt.recordings.download", description=__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder of the measured sets")
-    line.add_argument("--sources", default=SOURCES, help="addresses and checksums (.yaml)")
+    line.add_argument("--sources", type=shipped, default=SOURCES, help="addresses and checksums (.yaml)")
     given = line.parse_args(arguments)
     wanted, failed = addresses(load_yaml(given.sources, "sources of recordings")), 0
     for name, (places, pinned) in wanted.items():

@@ -6,6 +6,7 @@ from typing import Any
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
+from lowalt.common.shipped import shipped
 from lowalt.common.street import PACKAGE
 from lowalt.recognition import choose
 from lowalt.report.inputs import KEPT
@@ -218,7 +219,9 @@ class Products:
         if self._config["recognition"]["transfer"]:
             files["transfer"] = f"{base}/transfer.csv"
         files |= {
-            f"kept_{name}": f"{REFERENCE}/{file}" for name, file in KEPT.items() if Path(REFERENCE, file).is_file()
+            f"kept_{name}": str(shipped(f"{REFERENCE}/{file}"))
+            for name, file in KEPT.items()
+            if shipped(f"{REFERENCE}/{file}").is_file()
         }
         # No rule makes it, so that no workflow needs the package of fifty digits: `make hard-cases` does.
         if Path(f"{base}/hard_cases.csv").is_file():

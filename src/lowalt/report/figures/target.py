@@ -11,8 +11,8 @@ from PIL import Image
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, masts_m
+from lowalt.common.shipped import SHIPPED
 from lowalt.common.streams import stream
-from lowalt.common.street import PACKAGE
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw, region_polygon
@@ -27,7 +27,7 @@ NORMALS = 150
 """Normals drawn at most: more would hide the points."""
 FRAMES, MOST_FRAMES = 24, 96
 FLOOR_DB = -40.0
-CONFIG = PACKAGE.parents[1] / "config/default.yaml"
+CONFIG = SHIPPED / "config/default.yaml"
 
 
 def _colours(cloud: Cloud) -> np.ndarray:

@@ -1,0 +1,95 @@
+"""The source distribution and the wheel built from it carry the workflow: they make data anywhere, with no checkout."""
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from lowalt.common.shipped import SHIPPED, located, shipped
+
+ROOT = Path(__file__).parents[1]
+BUILD = "from setuptools import build_meta; print(build_meta.build_{kind}({out!r}))"
+
+
+def built(kind, tree, out):
+    """Build an sdist or a wheel from a tree with the setuptools of this environment, and return its path."""
+    run = subprocess.run([sys.executable, "-c", BUILD.format(kind=kind, out=str(out))], cwd=tree, capture_output=True,
+                         text=True)  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    return out / run.stdout.split()[-1]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory):
+    """A folder with what the wheel installs, built from the source distribution alone."""
+    folder = tmp_path_factory.mktemp("wheel")
+    tree = folder / "checkout"
+    ignored = shutil.ignore_patterns("__pycache__", ".*", "*.egg-info", "results", "site")
+    shutil.copytree(ROOT, tree, ignore=ignored)
+    shutil.copytree(ROOT / "results/reference", tree / "results/reference")
+    with tarfile.open(built("sdist", tree, folder)) as archive:
+        archive.extractall(folder / "unpacked", filter="data")
+    (unpacked,) = (folder / "unpacked").iterdir()
+    shutil.rmtree(tree)
+    with zipfile.ZipFile(built("wheel", unpacked, folder)) as archive:
+        archive.extractall(folder / "site")
+    return folder / "site"
+
+
+def test_the_wheel_holds_the_workflow_and_says_that_it_is_typed(installed):
+    package = installed / "lowalt"
+    for name in ("Snakefile", "config", "workflow", "profiles", "envs", "results/reference"):
+        files = [path for path in [ROOT / name, *(ROOT / name).rglob("*")] if path.is_file()]
+        kept = {str(path.relative_to(ROOT)) for path in files if "__pycache__" not in path.parts}
+        assert kept and all((package / "shipped" / path).read_bytes() == (ROOT / path).read_bytes() for path in kept)
+    assert (package / "py.typed").is_file()
+    assert (installed / "snakemake_logger_plugin_lowalt/__init__.py").is_file()
+
+
+@pytest.mark.workflow
+def test_the_installed_command_makes_the_reference_s_bytes_in_an_empty_folder(installed, tmp_path):
+    environment = os.environ | {"PYTHONPATH": str(installed)}
+    goal = "results/tiny/motion/seen-00000.csv"
+    command = [
+        sys.executable,
+        "-m",
+        "lowalt",
+        "run",
+        "--configfile",
+        "config/tiny.yaml",
+        "--target",
+        goal,
+        "--cores",
+        "1",
+    ]
+    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stdout + run.stderr
+    sums = dict(line.split()[::-1] for line in (ROOT / "results/reference/tiny.sha256").read_text().splitlines())
+    assert hashlib.sha256((tmp_path / goal).read_bytes()).hexdigest() == sums["motion/seen-00000.csv"]
+
+
+def test_configurations_of_the_package_are_found_from_any_folder(installed, tmp_path):
+    command = [sys.executable, "-m", "lowalt", "spectra", "config/scenes/urban.yaml"]
+    run = subprocess.run(command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(installed)}, capture_output=True,
+                         text=True)  # fmt: skip
+    assert run.returncode == 0, run.stderr
+    assert all(name in run.stdout for name in ("vrp", "trp", "vt"))
+
+
+def test_a_file_of_the_working_directory_comes_before_the_package_s(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert shipped("config/targets.csv") == SHIPPED / "config/targets.csv"
+    assert located({"targets": {"table": "config/targets.csv"}})["targets"]["table"] == str(
+        SHIPPED / "config/targets.csv"
+    )
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config/targets.csv").write_text("own")
+    assert shipped("config/targets.csv") == Path("config/targets.csv")
+    assert located({"targets": {"table": "config/targets.csv"}})["targets"]["table"] == "config/targets.csv"
+    assert shipped("config/none.yaml") == Path("config/none.yaml")
