@@ -28,7 +28,7 @@ def test_the_download_tries_every_address_and_goes_on(tmp_path, capsys):
     lines += [f'      "{name}": {digest}' for name, digest in sums.items()]
     (tmp_path / "sources.yaml").write_text("set:\n" + "\n".join(lines) + "\n")
     arguments = ["--out", str(tmp_path / "out"), "--sources", str(tmp_path / "sources.yaml")]
-    with pytest.raises(InputError, match="1 of 2 recordings failed"):
+    with pytest.raises(InputError, match="1 of 2 files could not be fetched"):
         download.main(arguments)
     assert (tmp_path / "out/set/a b.wav").read_bytes() == b"sound"
     assert "set/c.wav" in capsys.readouterr().err

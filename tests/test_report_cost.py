@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from chain import SPECTRA, WAVE
 from craft import craft
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
@@ -19,16 +20,8 @@ from lowalt.targets.records import load_table
 from lowalt.tiles.render import Renderer
 
 TARGETS = Path(__file__).parents[1] / "config/targets.csv"
-NETWORK = {
-    "carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 64, "guard_subcarriers": 10,
-    "symbol_interval_s": 2.5e-3, "symbols": 24, "transmit_array": [4, 2], "receive_array": [4, 2], "power_w": 1.0,
-    "stations": {"A": {"position_m": [0, 0, 25], "normal_deg": 0}, "B": {"position_m": [400, 0, 25],
-                                                                          "normal_deg": 180}},
-}  # fmt: skip
-SPECTRA = {
-    "vrp": {"window": 8, "hop": 1, "points": 16}, "trp": {"window": 4, "hop": 1, "points": 32},
-    "vt": {"window": 4, "hop": 1, "speed_min_mps": -6.0, "speed_max_mps": 6.0, "speed_step_mps": 0.5},
-}  # fmt: skip
+STATIONS = {"A": {"position_m": [0, 0, 25], "normal_deg": 0}, "B": {"position_m": [400, 0, 25], "normal_deg": 180}}
+NETWORK = WAVE | {"stations": STATIONS}
 IMAGES = {"size": 16, "scale": "decibel", "floor_db": 40.0, "gamma": 1.0, "colour_map": "viridis"}
 BLOCK = {
     "motion": {

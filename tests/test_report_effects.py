@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from craft import NETWORK as WIDE
+from chain import SPECTRA
+from chain import WAVE as NETWORK
 from craft import craft, row
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load, merge
@@ -40,11 +41,6 @@ from lowalt.tiles import Renderer, resize, split
 
 BASE, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
 INFINITY = float("inf")
-NETWORK = WIDE | {"subcarriers": 64, "symbols": 24, "transmit_array": [4, 2], "receive_array": [4, 2]}
-SPECTRA = {
-    "vrp": {"window": 8, "hop": 1, "points": 16}, "trp": {"window": 4, "hop": 1, "points": 32},
-    "vt": {"window": 4, "hop": 1, "speed_min_mps": -6.0, "speed_max_mps": 6.0, "speed_step_mps": 0.5},
-}  # fmt: skip
 IMAGES = {"size": 16, "scale": "power", "floor_db": 40.0, "gamma": 0.5, "colour_map": "viridis"}
 SPLIT = {"by": "motion", "train": 2, "val": 1, "test": 2}
 SIZE = 8

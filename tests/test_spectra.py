@@ -20,7 +20,7 @@ def noise(*shape, seed=0):
     return pair[0] + 1j * pair[1]
 
 
-def close(found, expected):
+def assert_close(found, expected):
     """Agreement to 1e-10 of the largest value."""
     assert found.shape == expected.shape
     assert np.abs(found - expected).max() <= 1e-10 * np.abs(expected).max()
@@ -29,7 +29,7 @@ def close(found, expected):
 @pytest.mark.parametrize(("symbols", "window", "hop", "points"), [(40, 16, 1, 16), (41, 8, 3, 32), (20, 2, 4, 2)])
 def test_magnitudes_are_the_definition(symbols, window, hop, points):
     signal = noise(symbols)
-    close(magnitudes(signal, Fourier(window, hop, points)), reference.stft(signal, window, hop, points))
+    assert_close(magnitudes(signal, Fourier(window, hop, points)), reference.stft(signal, window, hop, points))
 
 
 def test_published_shapes_and_definition_at_published_settings():
@@ -38,8 +38,8 @@ def test_published_shapes_and_definition_at_published_settings():
     assert trp(signal).shape == (1024, 392)
     assert vt(signal, CARRIER, INTERVAL).shape == (123, 392)
     # Four windows of the long transform and thirteen of the short one keep the loops short.
-    close(vrp(signal[:260]), reference.stft(signal[:260], 256, 1, 256))
-    close(trp(signal[:21]), reference.stft(signal[:21], 8, 1, 1024))
+    assert_close(vrp(signal[:260]), reference.stft(signal[:260], 256, 1, 256))
+    assert_close(trp(signal[:21]), reference.stft(signal[:21], 8, 1, 1024))
 
 
 @pytest.mark.parametrize(("window", "hop"), [(8, 1), (5, 2)])
@@ -48,7 +48,7 @@ def test_velocity_transfer_is_the_definition(window, hop):
     setting = Spectra(vt=Transfer(window, hop, -6.1, 6.1, 0.1))
     speeds = [-6.1 + 0.1 * step for step in range(123)]
     expected = reference.velocity_transfer(signal, CARRIER, INTERVAL, window, hop, speeds)
-    close(vt(signal, CARRIER, INTERVAL, setting), expected)
+    assert_close(vt(signal, CARRIER, INTERVAL, setting), expected)
 
 
 def test_batches_are_single_signals():

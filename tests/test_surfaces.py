@@ -26,7 +26,7 @@ from lowalt.targets.surfaces import (
 LENGTH = st.floats(0.01, 10)
 
 
-def closed(surface: Surface) -> None:
+def assert_closed(surface: Surface) -> None:
     """Assert by trimesh that the surface is one closed shell with consistent outward faces."""
     mesh = trimesh.Trimesh(surface.vertices, surface.faces, process=False)
     assert mesh.is_watertight and mesh.is_winding_consistent
@@ -50,8 +50,8 @@ def closed(surface: Surface) -> None:
     ids=lambda surface: len(surface.faces),
 )
 def test_primitives_are_closed_and_outward(surface):
-    closed(surface)
-    closed(surface.mapped(np.diag([-1.0, 1, 1])).moved((1, 2, 3)))
+    assert_closed(surface)
+    assert_closed(surface.mapped(np.diag([-1.0, 1, 1])).moved((1, 2, 3)))
 
 
 @settings(max_examples=30, deadline=None)

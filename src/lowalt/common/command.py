@@ -62,6 +62,16 @@ def pick(block: dict, *keys: str) -> list:
     return [block[key] for key in keys]
 
 
+def dispatch(module: str, commands: dict[str, Callable[[list[str]], None]], arguments: list[str]) -> None:
+    """Run the command that the first argument names, on the other arguments.
+
+    Raises: InputError naming the module's commands where the first argument is none of them.
+    """
+    if not arguments or arguments[0] not in commands:
+        raise InputError(f"{module}: {arguments[:1]}, expected one of {list(commands)}")
+    commands[arguments[0]](arguments[1:])
+
+
 def run(main: Callable[[list[str]], None]) -> None:
     """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2, an
     InputWarning one line."""

@@ -1,9 +1,10 @@
 """One file from a public address, kept only if its content is the pinned one. No stage is known here."""
 
 import shutil
+import sys
 import urllib.error
 import urllib.request
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from lowalt.common.errors import InputError
@@ -26,3 +27,20 @@ def download(address: str, target: Path, pinned: str, checksum: Callable[[Path],
         found = checksum(temporary)
         if found != pinned:
             raise InputError(f"{address}: SHA-256 is {found}, expected {pinned}; nothing was kept")
+
+
+def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
+    """Call `fetch` for each file's name and print what became of it; a file that fails does not stop the others.
+
+    fetch: returns False where the file was there already. Failures go to standard error.
+    Raises: InputError with the count of files that failed.
+    """
+    names, failed = list(names), 0
+    for name in names:
+        try:
+            print(name, "fetched" if fetch(name) else "already there")
+        except InputError as error:
+            failed += 1
+            print(f"failed: {error}", file=sys.stderr)
+    if failed:
+        raise InputError(f"{failed} of {len(names)} files could not be fetched (named above), the others are there")

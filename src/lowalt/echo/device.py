@@ -20,7 +20,10 @@ LARGEST_ARRAY = 2**23
 
 
 def _dirichlet(torch, x, count: int):
-    """Return sin(pi count x) / sin(pi x) with its limits at whole x; both arguments are reduced before pi comes in."""
+    """Return sin(pi count x) / sin(pi x) with its limits at whole x; both arguments are reduced before pi comes in.
+
+    `terms.dirichlet` for torch tensors, which no compiled function takes.
+    """
     whole = torch.round(x)
     part = x - whole
     many = count * part

@@ -4,6 +4,7 @@ Rigid parts are the better form: no array of symbols x points ever exists, and s
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -38,16 +39,8 @@ class Target(NamedTuple):
     rcs_m2: np.ndarray
 
 
-class EchoScene(NamedTuple):
-    """Checked input of the kernels: a `Target`'s fields, and where the beams point."""
-
-    rotation: np.ndarray
-    translation: np.ndarray
-    points: np.ndarray
-    part: np.ndarray
-    root_rcs: np.ndarray
-    rcs_m2: np.ndarray
-    aim: np.ndarray
+EchoScene = namedtuple("EchoScene", [*Target._fields, "aim"])
+"""Checked input of the kernels: a `Target`'s fields, and where the beams point, (3,) m."""
 
 
 def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.ndarray:

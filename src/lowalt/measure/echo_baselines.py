@@ -18,7 +18,7 @@ def positions(motion: Rigid) -> np.ndarray:
 
 
 def _ratio(x: np.ndarray, count: int) -> np.ndarray:
-    """sin(count x) / sin(x) with its limit."""
+    """Return sin(count x) / sin(x) with its limit, written apart from the echo engine that it judges."""
     s = np.sin(x)
     small = abs(s) < 1e-12
     return np.where(small, count, np.sin(count * x) / np.where(small, 1.0, s))

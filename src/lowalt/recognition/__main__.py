@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from lowalt.common.command import parser, pick, run
+from lowalt.common.command import dispatch, parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
 from lowalt.common.yaml_files import load_yaml
@@ -232,9 +232,7 @@ def main(arguments: list[str]) -> None:
 
     Raises: InputError for an unknown command.
     """
-    if not arguments or arguments[0] not in COMMANDS:
-        raise InputError(f"command {arguments[:1]}: expected one of {list(COMMANDS)}")
-    COMMANDS[arguments[0]](arguments[1:])
+    dispatch("lowalt.recognition", COMMANDS, arguments)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.classes import CATEGORIES
-from lowalt.common.command import run
+from lowalt.common.command import dispatch, run
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
@@ -178,9 +178,7 @@ COMMANDS = {
 
 def main(arguments: list[str]) -> None:
     """Run one command of the stage."""
-    if not arguments or arguments[0] not in COMMANDS:
-        raise InputError(f"lowalt.recordings: {arguments[:1]}, expected one of {list(COMMANDS)}")
-    COMMANDS[arguments[0]](arguments[1:])
+    dispatch("lowalt.recordings", COMMANDS, arguments)
 
 
 if __name__ == "__main__":

@@ -6,12 +6,11 @@ Run `python -m lowalt.recordings.download --out FOLDER`; FOLDER is then what `ma
 """
 
 import argparse
-import sys
 import urllib.parse
 from pathlib import Path
 
 from lowalt.common.command import run
-from lowalt.common.download import download
+from lowalt.common.download import download, fetch_each
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
 from lowalt.common.shipped import shipped
@@ -24,7 +23,7 @@ def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
     """Put the file `name` (SET/FILE) from the first of its `places` (addresses) that has it into `folder`.
 
     Return False where it already was there. Nothing is kept unless its SHA-256 is the pinned one.
-    Raises: InputError naming every address and what failed there, a download or the checksum.
+    Raises: InputError naming the file, every address and what failed there, a download or the checksum.
     """
     target = folder / name
     if target.is_file() and sha256(target) == pinned:
@@ -36,7 +35,7 @@ def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
             return True
         except InputError as error:
             failures.append(str(error))
-    raise InputError("; ".join(failures))
+    raise InputError(f"{name}: {'; '.join(failures)}")
 
 
 def addresses(sources: dict) -> dict[str, tuple[list[str], str]]:
@@ -51,23 +50,16 @@ def addresses(sources: dict) -> dict[str, tuple[list[str], str]]:
 
 
 def main(arguments: list[str]) -> None:
-    """Fetch all recordings; one that cannot be had does not stop the others.
+    """Fetch all recordings.
 
-    Raises: InputError with the count of files that failed, after each was named on standard error.
+    Raises: as `fetch_each`.
     """
     line = argparse.ArgumentParser(prog="python -m lowalt.recordings.download", description=__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder of the measured sets")
     line.add_argument("--sources", type=shipped, default=SOURCES, help="addresses and checksums (.yaml)")
     given = line.parse_args(arguments)
-    wanted, failed = addresses(load_yaml(given.sources, "sources of recordings")), 0
-    for name, (places, pinned) in wanted.items():
-        try:
-            print(name, "fetched" if fetch(name, places, pinned, given.out) else "already there")
-        except InputError as error:
-            failed += 1
-            print(f"{name}: {error}", file=sys.stderr)
-    if failed:
-        raise InputError(f"{failed} of {len(wanted)} recordings failed, the others are in {given.out}")
+    wanted = addresses(load_yaml(given.sources, "sources of recordings"))
+    fetch_each(wanted, lambda name: fetch(name, *wanted[name], given.out))
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import argparse
 from collections.abc import Iterable
 
 from lowalt.common.classes import stated
-from lowalt.common.command import parser, pick, run
+from lowalt.common.command import dispatch, parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.motion import read_table
@@ -123,9 +123,7 @@ COMMANDS = {"write": write, "index": index, "verify": verify, "remake": remake}
 
 def main(arguments: list[str]) -> None:
     """Run one command of the stage."""
-    if not arguments or arguments[0] not in COMMANDS:
-        raise InputError(f"lowalt.shards: {arguments[:1]}, expected one of {list(COMMANDS)}")
-    COMMANDS[arguments[0]](arguments[1:])
+    dispatch("lowalt.shards", COMMANDS, arguments)
 
 
 if __name__ == "__main__":

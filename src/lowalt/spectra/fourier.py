@@ -9,6 +9,9 @@ from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Fourier
 from lowalt.spectra.sliding import fourier_magnitudes, turns
 
+SIGNED = False
+ZERO_FIRST = True
+
 
 def rows(settings: Fourier) -> int:
     """Return the number of frequencies."""

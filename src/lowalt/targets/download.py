@@ -7,11 +7,10 @@ Run `python -m lowalt.targets.download --out FOLDER`; FOLDER is then what LOWALT
 
 import argparse
 import hashlib
-import sys
 from pathlib import Path
 
 from lowalt.common.command import run
-from lowalt.common.download import download
+from lowalt.common.download import download, fetch_each
 from lowalt.common.errors import InputError
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
@@ -69,25 +68,16 @@ def fetch(name: str, folder: Path, base: str = OFFICIAL) -> bool:
 
 
 def main(arguments: list[str]) -> None:
-    """Fetch the named files, all by default; a file that fails does not stop the others.
+    """Fetch the named files, all by default.
 
-    Raises: InputError with the count of files that failed, after each was named on standard error.
+    Raises: as `fetch_each`.
     """
     line = argparse.ArgumentParser(prog="python -m lowalt.targets.download", description=__doc__)
     line.add_argument("--out", required=True, type=Path, help="folder of inputs; files go to its cmu/")
     line.add_argument("--base", default=OFFICIAL, help="address of the folder of subjects")
     line.add_argument("names", nargs="*", help="SS/SS.asf or SS/SS_TT.amc; all by default")
     given = line.parse_args(arguments)
-    names = given.names or list(SHA256)
-    failed = 0
-    for name in names:
-        try:
-            print(name, "fetched" if fetch(name, given.out, given.base) else "already there")
-        except InputError as error:
-            failed += 1
-            print(f"failed: {error}", file=sys.stderr)
-    if failed:
-        raise InputError(f"{failed} of {len(names)} files could not be fetched (named above), the others are there")
+    fetch_each(given.names or SHA256, lambda name: fetch(name, given.out, given.base))
 
 
 if __name__ == "__main__":

@@ -78,7 +78,10 @@ def odd_sign(whole):
 
 @INLINED
 def dirichlet(x, count):
-    """Return sin(pi count x) / sin(pi x), with its limits at whole x; count: a whole double."""
+    """Return sin(pi count x) / sin(pi x), with its limits at whole x; count: a whole double.
+
+    `echo.pointwise.terms.dirichlet` in double-double: the sines, the quotient and the limits need their own arithmetic.
+    """
     f, whole = fraction(x)
     top, turns = fraction(scale(f, count))
     zero = f[0] == 0.0

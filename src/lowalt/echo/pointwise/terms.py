@@ -21,7 +21,10 @@ def sin_pi(x):
 
 @PLAIN
 def dirichlet(x, count):
-    """Return U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x."""
+    """Return U_{count-1}(cos(pi x)) = sin(pi count x) / sin(pi x), with its limits at whole x.
+
+    This is the definition for compiled doubles. Double-doubles, torch tensors and slow references have their own.
+    """
     k = np.rint(x)
     f = x - k
     sign = -1.0 if (int(k) & 1) and (count - 1) & 1 else 1.0

@@ -1,12 +1,9 @@
 """TRP: the short-time Fourier spectrum whose short window prefers resolution in time."""
 
-from lowalt.spectra import fourier
+# Both short-time Fourier spectra share everything that does not stand below.
+from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, definition, fill, on_device, rows, speeds, tables  # noqa: F401
+from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "time preferred (TRP)"
 SOURCE = "paper, Eq. 29"
-SIGNED = False
-ZERO_FIRST = True
-Settings = fourier.Fourier
 DEFAULTS = Settings(8, 1, 1024)
-rows, speeds, definition = fourier.rows, fourier.speeds, fourier.definition
-tables, fill, on_device = fourier.tables, fourier.fill, fourier.on_device

@@ -1,12 +1,9 @@
 """VRP: the short-time Fourier spectrum whose long window prefers resolution in velocity."""
 
-from lowalt.spectra import fourier
+# Both short-time Fourier spectra share everything that does not stand below.
+from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, definition, fill, on_device, rows, speeds, tables  # noqa: F401
+from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "velocity preferred (VRP)"
 SOURCE = "paper, Eq. 28"
-SIGNED = False
-ZERO_FIRST = True
-Settings = fourier.Fourier
 DEFAULTS = Settings(256, 1, 256)
-rows, speeds, definition = fourier.rows, fourier.speeds, fourier.definition
-tables, fill, on_device = fourier.tables, fourier.fill, fourier.on_device
