@@ -51,9 +51,11 @@ $(DOCS): $(BASE)
 	$(call install,$(call of_extra,docs))
 	touch $@
 
-# Where the packages of training are not there yet, they come while the data are made.
+# Where the packages of training are not there yet, they come while the data are made; so does the machine code, for
+# which jobs wait that need it.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
-	@test -e $(SETUP) || $(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile
+	@test -e $(SETUP) || { $(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log & \
+		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile; }
 	$(SNAKEMAKE)
 
 # From a warm cache the packages are there in seconds; only a download is worth a Snakemake of its own.

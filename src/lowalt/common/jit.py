@@ -3,11 +3,13 @@
 numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
 kernel's bytecode, of all kernels and constants that it uses, of those that these use, and so on. Code that is not
-compiled has no part in it.
+compiled has no part in it. Processes that need the same machine code at the same time take turns: one compiles, the
+others load what it kept.
 """
 
 import hashlib
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 
 import numpy as np
@@ -15,6 +17,8 @@ from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.core.runtime import rtsys
+
+from lowalt.common.turns import Turn
 
 
 def _text_of(value) -> str:
@@ -83,14 +87,38 @@ class _DigestCache(FunctionCache):
     counted = True
     """Whether the function may use counted references, and so allocate."""
 
+    def __init__(self, function):
+        super().__init__(function)
+        # In a folder of its own: tools that list kept machine code see no other file.
+        self._turn = Turn(Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock")
+
     def _index_key(self, sig, codegen):
         return (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
 
     def load_overload(self, sig, target_context):
-        """Return finished machine code for a signature, or None.
+        """Return finished machine code for a signature, or None where this process must compile it.
 
-        Like numba's method, except that it does not load the compiler before it looks for finished machine code.
+        Like numba's method, except that it does not load the compiler before it looks for finished machine code, and
+        that it waits while another process compiles this function.
         """
+        found = self._kept(sig, target_context)
+        if found is None and self._enabled:
+            # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
+            # nobody waits for a process that waits for him.
+            self._turn.take()
+            found = self._kept(sig, target_context)
+            if found is not None:
+                self._turn.give()
+        return found
+
+    def save_overload(self, sig, data):
+        """Keep machine code as numba's method does, then let other processes go on."""
+        try:
+            super().save_overload(sig, data)
+        finally:
+            self._turn.give()
+
+    def _kept(self, sig, target_context):
         # numba's method first loads everything that a compilation may need, scipy.linalg included: a third of a
         # job's start. Finished machine code needs the counted references' runtime at most; compilation loads the rest.
         if self.counted:

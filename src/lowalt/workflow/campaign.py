@@ -23,11 +23,13 @@ from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.hardware import describe
-from lowalt.workflow.disturb import KINDS, MemoryGroup, disturb
+from lowalt.workflow.disturb import KINDS, MemoryGroup, disturb, one_worker
 from lowalt.workflow.trial import ROOT, Trial, copy_project, ended
 
 COLUMNS = ("trial", "kind", "moment_s", "running", "outcome", "said", "identical", "configuration", "hardware")
 SMALL_MB, LARGE_MB = 3, 60
+EARLY = 0.1
+"""Share of the disturbances whose moment counts from the command on, so that they also hit a run that starts."""
 
 
 def room_mb(written_mb: float, share: float) -> float:
@@ -44,14 +46,17 @@ def killed(trial: Trial, kinds: Iterator[str], length_s: float, left: int, choos
     """Disturb a run until it has finished or `left` disturbances are done; return a row for each."""
     rows = []
     while True:
-        main = trial.start()
-        moment = choose.uniform(0.5, length_s)
+        main, begun = trial.start(), time.monotonic()
+        early, wait_s = choose.random() < EARLY, choose.uniform(0.1, length_s)
         kind = next(kinds) if len(rows) < left else None
         if kind is not None:
+            # Most moments count from the first job on: a run that is started ten times would else mostly be starting.
+            if not early:
+                one_worker(main, choose)
             try:
-                main.wait(moment)
+                main.wait(wait_s)
             except psutil.TimeoutExpired:
-                now = disturb(kind, main, choose, trial.group)
+                now, moment = disturb(kind, main, choose, trial.group), time.monotonic() - begun
                 if now is not None:
                     outcome = ended(trial.finish(main))
                     row = {"kind": kind, "moment_s": f"{moment:.1f}", "running": now, "outcome": outcome}
@@ -147,7 +152,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--configfile", nargs="+", default=["config/tiny.yaml"], help="overlays (default: tiny)")
     options.add_argument("--targets", nargs="*", default=[], help="targets of the run (default: all)")
     options.add_argument("--kills", type=int, default=30, help="disturbances in all (default 30)")
-    options.add_argument("--kills-per-run", type=int, default=5, help="at most so many to one run (default 5)")
+    options.add_argument("--kills-per-run", type=int, default=10, help="at most so many to one run (default 10)")
     options.add_argument("--disks", type=int, default=5, help="full disks; needs root (default 5)")
     options.add_argument("--cores", type=int, default=2, help="cores of every run (default 2)")
     options.add_argument("--seed", type=int, default=1, help="seed of moments, kinds and sizes (default 1)")

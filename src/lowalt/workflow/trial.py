@@ -17,7 +17,10 @@ from lowalt.workflow.disturb import MemoryGroup
 
 ROOT = Path(__file__).parents[3]
 PARTS = ("Snakefile", "workflow", "config", "profiles", "src", "envs")
-TIMINGS = ("logs", "benchmarks", "report.html", "stages.csv", "seeds.csv", "run.json", "progress")
+TIMINGS = (
+    "logs", "benchmarks", "report.html", "stages.csv", "seeds.csv", "run.json", "progress",
+    "cost.csv", "cost_pixels.csv", "cost.png",
+)  # fmt: skip
 """Names of files and folders of a run that hold times, which no run repeats."""
 LOUD = ("Traceback (most recent call last)", "Directory cannot be locked")
 """Text that a disturbed run must not leave a person with."""
@@ -56,9 +59,10 @@ class Trial:
         """Start the run as a leader of its own process group and return its main process."""
         command = [sys.executable, "-m", "snakemake", "--cores", str(self.options.cores), "--configfile"]
         command += [*self.options.configfile, *(["--", *self.options.targets] if self.options.targets else [])]
-        # Bytecode stays out of the trial's own, perhaps small, disk.
         environment = os.environ | {"PYTHONPATH": str(self.folder / "src"), "LOWALT_SPACE": "off"}
-        environment["PYTHONDONTWRITEBYTECODE"] = "1"
+        # Bytecode stays out of the trial's own, perhaps small, disk, but is kept: each job would compile it anew.
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        environment["PYTHONPYCACHEPREFIX"] = str(self.folder.parent / "bytecode")
         descriptor, self.output = tempfile.mkstemp(prefix="lowalt-trial-")
         with open(descriptor, "wb") as output:  # noqa: PTH123
             return psutil.Popen(

@@ -1,0 +1,83 @@
+"""`python -m lowalt.workflow.kernels`: compile the machine code of data stages before their jobs ask for it.
+
+Machine code is compiled once a machine (`lowalt.common.jit`), which takes most of a minute of processor time. The first
+jobs of the echo and tiles stages would do it one stage after the other. Here two processes do it at the same time, from
+smallest inputs that go through the stages' own commands; a job that comes meanwhile waits for them.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common.command import run
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.common.network import masts_m, station_names
+
+CONFIGURATION = Path("config/default.yaml")
+STAGES = ("echo", "tiles")
+
+
+def echo(config: dict, folder: Path) -> None:
+    """Make the echoes of a motion model of each category, exactly and at the cost table's tolerances, in a folder."""
+    from lowalt.echo.__main__ import main as echoes
+    from lowalt.motion.__main__ import main as motion
+    from lowalt.targets.__main__ import main as cloud
+    from lowalt.targets.records import records_of
+
+    records = records_of(config["targets"])
+    first = {record["published"]["category"]: name for name, record in reversed(records.items())}
+    clouds = [str(folder / f"{number}.npz") for number in range(len(first))]
+    for name, path in zip(first.values(), clouds, strict=True):
+        cloud(["--settings", json.dumps({"seed": 0, "record": records[name]}), "--out", path])
+    published = {name: records[name]["published"] for name in first.values()}
+    block = {key: value for key, value in config["motion"].items() if not key.startswith("models")}
+    settings = {"seed": 0, "masts_m": masts_m(config["network"]), "motion": block, "published": published}
+    table = str(folder / "motion.csv")
+    span = ["--group", "seen", "--first", "0", "--count", "1"]
+    motion(["--settings", json.dumps(settings), "--clouds", *clouds, *span, "--out", table])
+    for tolerance in (None, *config["cost"]["tolerances"]):
+        settings = json.dumps({"network": config["network"], "tolerance": tolerance})
+        station, out = station_names(config["network"])[0], str(folder / "echo.npy")
+        try:
+            echoes(["--settings", settings, "--motion", table, "--clouds", *clouds, "--station", station, "--out", out])
+        except InputError:
+            # A tolerance below the floor of one of the samples: what it needs is compiled all the same.
+            continue
+
+
+def tiles(config: dict, folder: Path) -> None:
+    """Render and encode tiles of noise in a folder, reduced to the sizes of the configuration."""
+    from lowalt.tiles.__main__ import main as render
+
+    shape = (1, 2, len(config["network"]["stations"]), config["network"]["symbols"], 2)
+    signals = folder / "noisy.npy"
+    np.save(signals, np.random.default_rng(0).normal(size=shape).astype(np.float32).view(np.complex64)[..., 0])
+    settings = json.dumps({name: config[name] for name in ("network", "spectra", "images")})
+    reduced = [f"{size}={folder / str(size)}.npy" for size in config["tiles"]["reduced"]]
+    given = ["--signals", str(signals), "--reduced", *reduced, "--out", str(folder / "tiles.npz")]
+    render(["--settings", settings, *given])
+
+
+def main(arguments: list[str]) -> None:
+    """Compile for the stages named (none: all, a process each)."""
+    unknown = sorted(set(arguments) - set(STAGES))
+    if unknown:
+        raise InputError(f"lowalt.workflow.kernels: {unknown}, expected some of {STAGES}")
+    if len(arguments) != 1:
+        command = [sys.executable, "-m", "lowalt.workflow.kernels"]
+        started = [subprocess.Popen([*command, stage]) for stage in arguments or STAGES]
+        if any([process.wait() for process in started]):
+            raise InputError("lowalt.workflow.kernels: a stage failed, see above")
+        return
+    config = load_yaml(CONFIGURATION)
+    with tempfile.TemporaryDirectory() as folder:
+        {"echo": echo, "tiles": tiles}[arguments[0]](config, Path(folder))
+
+
+if __name__ == "__main__":
+    run(main)

@@ -1,0 +1,36 @@
+"""The step that compiles machine code ahead runs the stages' own commands, and fails loudly where they do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lowalt.common.config import load_yaml
+from lowalt.common.errors import InputError
+from lowalt.workflow import kernels
+
+ROOT = Path(__file__).parent.parent
+
+
+@pytest.fixture
+def config(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    return load_yaml(kernels.CONFIGURATION)
+
+
+def test_smallest_inputs_pass_the_commands_of_echo_and_tiles(config, tmp_path):
+    config["cost"]["tolerances"] = [1e-3, 1e-12]
+    kernels.echo(config, tmp_path)
+    kernels.tiles(config, tmp_path)
+    assert np.load(tmp_path / "echo.npy").shape == (4, 400)
+    assert len(list(tmp_path.glob("?.npz"))) == 4
+    # Two samples of nine images.
+    assert np.load(tmp_path / "24.npy").shape == (2, 9, 24, 24)
+
+
+def test_a_stage_that_fails_is_no_success(config, monkeypatch):
+    with pytest.raises(InputError, match="ech"):
+        kernels.main(["ech"])
+    monkeypatch.setattr(kernels.sys, "executable", "/bin/false")
+    with pytest.raises(InputError, match="failed"):
+        kernels.main([])
