@@ -189,7 +189,7 @@ NOTHING = {
     "transmit_leakage": {"isolation_db": None}, "cell_noise": {"snr_db": float("inf")},
     "detector": {"cfar": "none", "gate_cells": None},
     "companions": {"count": [0, 0]}, "line_of_sight": {"blocked_db": 0}, "walls": {"facades": []},
-    "reflected_aspect": {"follow": []},
+    "reflected_aspect": {"follow": []}, "background_channel": {"reference_points": 0},
     "direct_path": {"loss_db": None}, "link_offset": {"sigma_ppm": 0, "sigma_s": 0},
 }  # fmt: skip
 """Every effect that has a strength, without any."""

@@ -37,6 +37,7 @@ LISTED = (
     "channel/companions",
     "channel/direct_path",
     "channel/clutter",
+    "channel/background_channel",
     "receiver/receiver_noise",
     "receiver/cell_noise",
     "receiver/link_offset",

@@ -7,7 +7,7 @@ from lowalt.common.network import Network
 from lowalt.effects.catalogue import called, providing
 from lowalt.effects.interface import Checks
 
-STILL = ("clutter", "transmit_leakage", "direct_path")
+STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")
 """Effects that add something that stands still."""
 
 

@@ -40,9 +40,9 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     """Return a bound (N, P) of the cut's change of any range cell, relative to each part's peak amplitudes.
 
     Nothing changes for echoes within the prefix. For others the window's first samples are replaced by samples of the
-    same 2-norm at most, so a range cell changes by at most 2. Echoes of the land always reach beyond: no bound.
+    same 2-norm at most, so a range cell changes by at most 2. Echoes of the surroundings may always be later: no bound.
     """
-    if "clutter" in others:
+    if {"clutter", "background_channel"} & others:
         return np.full((1, 1), np.inf)
     farthest = np.linalg.norm(view.middles - np.asarray(view.station.position_m), axis=2) + view.radii
     return np.where(2 * farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)

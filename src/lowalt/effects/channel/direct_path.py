@@ -22,8 +22,8 @@ SOURCE = (
 DEFAULTS = {"loss_db": 0.0}
 
 MONOSTATIC = (
-    "cross_sections", "occlusion", "ground_reflection", "walls", "clutter", "cyclic_prefix", "line_of_sight",
-    "pointing_error", "transmit_leakage",
+    "cross_sections", "occlusion", "ground_reflection", "walls", "clutter", "background_channel", "cyclic_prefix",
+    "line_of_sight", "pointing_error", "transmit_leakage",
 )  # fmt: skip
 """Effects that are modelled for a station that hears itself only."""
 
