@@ -32,9 +32,10 @@ from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
+from lowalt.shards.record import npy
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
-from lowalt.shards.write import npy, write_shard
+from lowalt.shards.write import write_shard
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, encode, paint
 

@@ -15,7 +15,7 @@ from lowalt.effects.channel import occlusion
 from lowalt.effects.view import View
 from lowalt.motion.table import NUMBERS
 from lowalt.targets import occluders
-from lowalt.targets.builtin import MODULES
+from lowalt.targets.builtin_record import MODULES
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

@@ -6,7 +6,7 @@ import pytest
 import yaml
 
 from lowalt.common.errors import InputError
-from lowalt.targets import bird, builtin, document, record_schema, uav, vehicle
+from lowalt.targets import bird, builtin_record, document, record_schema, uav, vehicle
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import ALL_AXES, SIZES
 from lowalt.targets.records import SOURCES, load_table, merge
@@ -18,7 +18,7 @@ SCHEMA = record_schema.schema()
 
 def test_sections_are_the_sources_and_their_keys_those_of_the_code():
     assert set(SCHEMA["sources"]) == {record_schema.COMMON, *SOURCES}
-    assert set(record_schema.keys("builtin")) == {key for known in builtin._KEYS.values() for key in known}
+    assert set(record_schema.keys("builtin")) == {key for known in builtin_record._KEYS.values() for key in known}
     definitions = SCHEMA["$defs"]
     assert definitions["unit"]["anyOf"][0]["enum"] == list(UNITS_M)
     assert set(definitions["flap"]["properties"]) == set(bird.FLAP)

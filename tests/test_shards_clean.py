@@ -15,11 +15,12 @@ from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
 from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
+from lowalt.shards.record import npy
 from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.size import sample_bytes
 from lowalt.shards.table import map_samples
 from lowalt.shards.verify import faults
-from lowalt.shards.write import npy, write_shard
+from lowalt.shards.write import write_shard
 from pictures import NETWORK
 from test_shards_card import CONFIG
 

@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.targets.assemble import allot, turn
-from lowalt.targets.builtin import MODULES, builtin_cloud
+from lowalt.targets.builtin import builtin_cloud
+from lowalt.targets.builtin_record import MODULES
 from lowalt.targets.cloud import check, read, write
 from lowalt.targets.dimensions import rows as dimension_rows
 from lowalt.targets.gallery import main as gallery

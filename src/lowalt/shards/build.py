@@ -18,7 +18,8 @@ from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
-from lowalt.shards.write import npy, write_shard
+from lowalt.shards.record import npy
+from lowalt.shards.write import write_shard
 from lowalt.targets.cloud import write as write_cloud
 
 

@@ -152,17 +152,21 @@ def configs(shards: ShardSet) -> list[dict]:
     return result
 
 
-def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
-    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
-    first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
-    front = {
+def front(shards: ShardSet, name: str, license_name: str) -> dict:
+    """Return the metadata block at the head of the data card, as dataset hubs read it."""
+    return {
         "pretty_name": name, "license": license_name.lower(), "language": ["en"],
         "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
         "configs": configs(shards),
         "tags": TAGS,
     }  # fmt: skip
+
+
+def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
+    """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
+    first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
     return f"""---
-{yaml.safe_dump(front, sort_keys=False).strip()}
+{yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip()}
 ---
 # {name}
 

@@ -8,7 +8,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.common.network import Network
 from lowalt.noise.__main__ import load_echoes, load_powers
-from lowalt.shards.write import npy
+from lowalt.shards.record import npy
 from lowalt.tiles.files import Tiles
 from lowalt.tiles.signals import load_signals
 

@@ -22,9 +22,8 @@ from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.shards.maker import Maker
-from lowalt.shards.record import accompanied, record, sample_key
+from lowalt.shards.record import accompanied, npy, record, sample_key
 from lowalt.shards.remake import CloudFolder
-from lowalt.shards.write import npy
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import records_of
 

@@ -20,8 +20,8 @@ from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
+from lowalt.shards.record import npy
 from lowalt.shards.table import map_samples, table_path
-from lowalt.shards.write import npy
 from lowalt.spectra.catalogue import named
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split

@@ -1,4 +1,4 @@
-"""The record of a sample: its key, its place in the shuffled order, its JSON record.
+"""The bytes of a sample: its key, its place in the shuffled order, its JSON record, its signals as an .npy file.
 
 Every field has one type in all records, and no value is missing, so that tables with typed columns (Arrow) hold them.
 """
@@ -15,6 +15,7 @@ from lowalt.common.files import slug
 from lowalt.common.network import Network, Station
 from lowalt.common.portable import dot, norm
 from lowalt.common.streams import digest
+from lowalt.tiles.files import npy_header
 
 
 def snr_label(snr_db: float) -> str:
@@ -138,3 +139,12 @@ def row_of(entry: dict) -> tuple[dict, float]:
     names = ("subtype", "category", "group", "model")
     snr_db = entry["snr_db"] if entry["noise"] else math.inf
     return {**{name: entry[name] for name in names}, **entry["motion"]}, snr_db
+
+
+def npy(signals: np.ndarray) -> bytes:
+    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32 (stations, symbols, 2).
+
+    The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
+    """
+    parts = np.ascontiguousarray(signals, "<c8").view("<f4").reshape(*signals.shape, 2)
+    return npy_header("<f4", parts.shape) + parts.tobytes()

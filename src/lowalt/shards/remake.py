@@ -12,8 +12,7 @@ from lowalt.common.network import Network
 from lowalt.common.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
-from lowalt.shards.record import accompanied, record, row_of
-from lowalt.shards.write import npy
+from lowalt.shards.record import accompanied, npy, record, row_of
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.occluders import read_all
 

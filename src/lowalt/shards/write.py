@@ -15,16 +15,6 @@ from lowalt.shards.record import model_key, rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Span, Writer
-from lowalt.tiles.files import npy_header
-
-
-def npy(signals: np.ndarray) -> bytes:
-    """Return signals (stations, symbols) complex64 as the bytes of an .npy file of float32 (stations, symbols, 2).
-
-    The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
-    """
-    parts = np.ascontiguousarray(signals, "<c8").view("<f4").reshape(*signals.shape, 2)
-    return npy_header("<f4", parts.shape) + parts.tobytes()
 
 
 def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> list[tuple[int, int]]:
@@ -37,6 +27,12 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
     return [(number, level) for _, number, level in sorted(chosen)]
+
+
+def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tuple:
+    """Return a sample's row of the table (`table.SAMPLE`); number: its label."""
+    digest = np.frombuffer(span.sha256, np.uint8)
+    return key, number, model, snr_db, span.offset, span.size, *span.record, *span.data, digest
 
 
 def write_shard(
@@ -80,18 +76,7 @@ def write_shard(
                     span = tar.add(name, text, EXTENSIONS[kind], content(number, level))
                     if kind == "recipe":
                         spans[number] = span
-                digest = np.frombuffer(span.sha256, np.uint8)
-                table[place] = (
-                    key,
-                    label(classes, row),
-                    row["model"],
-                    snr_db,
-                    span.offset,
-                    span.size,
-                    *span.record,
-                    *span.data,
-                    digest,
-                )
+                table[place] = _entry(key, label(classes, row), row["model"], snr_db, span)
             checksum = tar.close()
         if len(np.unique(table["key"])) != len(table):
             raise InputError(f"{path}: a sample key stands twice")

@@ -78,73 +78,96 @@ class Cloud:
         return [index for index, name in enumerate(self.kinds) if name == kind]
 
 
+def _need(good: bool, what: str) -> None:
+    """Raise InputError with a fault's words."""
+    if not good:
+        raise InputError(what)
+
+
 def check(cloud: Cloud, where: str) -> Cloud:
     """Return the cloud if it keeps the contract.
 
     Raises: InputError naming `where`, the array and what was expected.
     """
+    try:
+        _check_points(cloud)
+        _check_parts(cloud)
+        _check_record(cloud)
+        if "node" in cloud.kinds:
+            _check_nodes(cloud)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    return cloud
 
-    def need(good: bool, what: str) -> None:
-        if not good:
-            raise InputError(f"{where}: {what}")
 
+def _check_points(cloud: Cloud) -> None:
+    """Raise InputError where an array has the wrong shape or a point's numbers are out of range."""
     count, parts = len(cloud.points), len(cloud.kinds)
-    need(count > 0, "points is empty, expected at least one point")
+    _need(count > 0, "points is empty, expected at least one point")
     for name, shape in {
         "points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
         "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3),
     }.items():  # fmt: skip
         found = np.shape(getattr(cloud, name))
-        need(found == shape, f"{name} has shape {found}, expected {shape}")
-    need(
+        _need(found == shape, f"{name} has shape {found}, expected {shape}")
+    _need(
         bool(np.isfinite(cloud.points).all()),
         "points has a NaN or infinite coordinate, expected finite metres",
     )
     good_rcs = np.isfinite(cloud.rcs_m2).all() and (cloud.rcs_m2 >= 0).all()
-    need(bool(good_rcs), "rcs_m2 has a negative or non-finite value, expected square metres >= 0")
-    need(
+    _need(bool(good_rcs), "rcs_m2 has a negative or non-finite value, expected square metres >= 0")
+    lengths = np.linalg.norm(cloud.normals, axis=1)
+    _need(
+        bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()),
+        "normals has a vector of length other than 1 or NaN",
+    )
+
+
+def _check_parts(cloud: Cloud) -> None:
+    """Raise InputError where a part's name, kind, parent, hinge or axis is wrong."""
+    parts = len(cloud.kinds)
+    _need(
         len(set(cloud.names)) == parts == len(cloud.names),
         f"names {cloud.names}, expected {parts} unique names",
     )
-    need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
-    need(cloud.part.min() >= 0 and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
+    _need(set(cloud.kinds) <= set(KINDS), f"kinds {sorted(set(cloud.kinds))}, expected only {KINDS}")
+    _need(cloud.part.min() >= 0 and cloud.part.max() < parts, f"part names a part outside 0..{parts - 1}")
     for index, kind in enumerate(cloud.kinds):
-        need(
+        _need(
             -1 <= cloud.parents[index] < index,
             f"parents[{index}] is {cloud.parents[index]}, expected an earlier part or -1",
         )
         if kind in ("rotor", "wing", "wheel"):
             length = np.linalg.norm(cloud.axes[index])
-            need(
+            _need(
                 abs(length - 1) < 1e-12,
                 f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1",
             )
-            need(
+            _need(
                 bool(np.isfinite(cloud.hinges[index]).all()),
                 f"hinges[{index}] ({cloud.names[index]}) is not finite",
             )
-    lengths = np.linalg.norm(cloud.normals, axis=1)
-    need(
-        bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()),
-        "normals has a vector of length other than 1 or NaN",
-    )
+
+
+def _check_record(cloud: Cloud) -> None:
+    """Raise InputError where the record lacks a fact or names an unknown class."""
     missing = {"subtype", "category", "source", "checksum"} - set(cloud.record)
-    need(not missing, f"record lacks {sorted(missing)}")
-    need(not (fault := _rate_fault(cloud)), f"rate_factors: {fault}")
-    try:
-        classes.like(cloud.record)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    if "node" in cloud.kinds:
-        need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
-             f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
-        need(bool(np.isfinite(cloud.track).all()), "track has a NaN or infinite coordinate")
-        need(
-            cloud.record.get("track_rate_hz", 0) > 0,
-            "record.track_rate_hz is missing, expected a positive rate",
-        )
-        need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
-    return cloud
+    _need(not missing, f"record lacks {sorted(missing)}")
+    _need(not (fault := _rate_fault(cloud)), f"rate_factors: {fault}")
+    classes.like(cloud.record)
+
+
+def _check_nodes(cloud: Cloud) -> None:
+    """Raise InputError where the track of a recording does not fit its nodes."""
+    count = len(cloud.points)
+    _need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
+         f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
+    _need(bool(np.isfinite(cloud.track).all()), "track has a NaN or infinite coordinate")
+    _need(
+        cloud.record.get("track_rate_hz", 0) > 0,
+        "record.track_rate_hz is missing, expected a positive rate",
+    )
+    _need(list(cloud.part) == list(range(count)), "part of a node cloud must be 0..L-1, one part a node")
 
 
 def _rate_fault(cloud: Cloud) -> str | None:

@@ -116,7 +116,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
     """
     source = record.get("source")
     if source == "builtin":
-        from lowalt.targets.builtin import MODULES
+        from lowalt.targets.builtin_record import MODULES
 
         parts = MODULES[like(record)].parts(record)[0]
         surfaces = [part_surface(part) for part in parts]
