@@ -1,9 +1,11 @@
 """Targets beyond the published forty: their records alone add them, and they move as their kind does."""
 
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from lowalt.common import portable
 from lowalt.common.config import load
@@ -11,6 +13,8 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw
+from lowalt.report.figures.motion_strip import motion_strip, view_of
+from lowalt.report.figures.target import target_animation
 from lowalt.targets import cyclist, quadruped
 from lowalt.targets.dimensions import estimates, own_cells, rows
 from lowalt.targets.gallery import bones
@@ -100,6 +104,14 @@ def test_a_tail_rotor_and_lift_propellers_turn_at_rates_of_their_own(clouds):
     lifting = [cloud.axes[cloud.names.index(f"lift {place}")][2] for place in
                ("front left", "front right", "rear left", "rear right")]  # fmt: skip
     assert lifting == [-1, 1, 1, -1]
+
+
+def test_strips_and_animations_show_every_class(clouds):
+    strip = motion_strip(list(clouds.values()), [drawn(cloud, name) | {"model": 0} for name, cloud in clouds.items()])
+    assert Image.open(io.BytesIO(strip)).size[1] > 1000
+    assert view_of(clouds["Cessna 172S"])[2] == "from behind" and view_of(clouds["MD 520N"])[2] == "from above"
+    frames = Image.open(io.BytesIO(target_animation(clouds["Agusta A109A"], count=3)))
+    assert frames.n_frames == 18
 
 
 def test_every_cell_and_figure_has_a_source_or_is_called_an_estimate():

@@ -10,6 +10,7 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
+from lowalt.common.errors import InputWarning
 from lowalt.report.figures.target import target_animation
 from lowalt.targets.cloud import read
 from lowalt.targets.draft import clusters
@@ -104,6 +105,78 @@ def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
 )  # fmt: skip
 def test_units_are_guessed_from_the_usual_sizes(size, category, unit):
     assert guessed_unit(size, category) == unit
+
+
+def bird(scale: float = 1.0) -> trimesh.Trimesh:
+    """A body, two thin wings from 4 cm out and a tail that spreads wider than that, front along y, widest along x."""
+    shapes = [box((0.08, 0.25, 0.08)), box((0.12, 0.08, 0.01), (0, -0.16, 0.03))]
+    shapes += [box((0.3, 0.1, 0.01), (side * 0.18, 0.02, 0.03)) for side in (-1, 1)]
+    whole = trimesh.util.concatenate([shape.subdivide().subdivide().subdivide() for shape in shapes])
+    whole.apply_scale(scale)
+    return whole
+
+
+def test_a_bird_s_wings_are_drafted_where_its_body_ends(tmp_path):
+    bird(100).export(tmp_path / "bird.ply")
+    found = inspect_mesh(tmp_path / "bird.ply", "Bird")
+    assert (found.unit, found.up, found.front) == ("cm", "z", "y") and found.shoulder_m == pytest.approx(0.04, abs=0.01)
+    assert "wings    may begin 0.0" in described(found)
+    out = tmp_path / "bird.yaml"
+    assert main(["target", "new", str(tmp_path / "bird.ply"), "--subtype", "Crow", "--inputs", str(tmp_path), "--out",
+                 str(out)]) == 0  # fmt: skip
+    assert out.read_text().count("kind: wing") == out.read_text().count("wing: {kind") == 2
+    row = load_table(ROOT / "config/targets.csv")["Crow"]
+    cloud = make(merge(row, read_records(out)["Crow"], "here"), tmp_path, 1)
+    sides = {name: np.sign(cloud.points[cloud.part == part, 0]) for part, name in enumerate(cloud.names)}
+    assert (sides["right wing"] == 1).all() and (sides["left wing"] == -1).all()
+    # The tail stays with the body.
+    factor = np.ptp(cloud.points[:, 0]) / 0.66
+    assert cloud.points[cloud.part > 0, 1].min() > (-0.05 - 0.005) * factor
+
+
+def test_inspection_leaves_a_picture(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    craft(False).export(tmp_path / "own {craft}.stl")
+    assert main(["target", "inspect", "own {craft}.stl"]) == 0
+    assert "picture  own {craft}-inspect.png" in capsys.readouterr().out
+    picture = Image.open(tmp_path / "own {craft}-inspect.png")
+    assert picture.size[0] > 1000 and len(picture.convert("RGB").getcolors(1 << 24)) > 20
+
+
+def test_a_car_without_wheels_is_made_and_shown_with_a_warning(tmp_path):
+    box((1.8, 4.5, 1.4), (0, 0, 0.7)).subdivide().export(tmp_path / "car.stl")
+    out, made = tmp_path / "car.yaml", tmp_path / "car.npz"
+    command = ["target", "new", str(tmp_path / "car.stl"), "--subtype", "AITO M9 2024", "--inputs", str(tmp_path)]
+    assert main([*command, "--out", str(out)]) == 0
+    with pytest.warns(InputWarning, match="0 wheels, expected at least 3"):
+        assert main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
+    assert made.with_suffix(".png").exists() and read(made).kinds == ("body",)
+
+
+def test_lengths_may_be_in_the_file_s_unit(tmp_path):
+    craft(False, 1000).export(tmp_path / "craft.stl")
+    row = load_table(ROOT / "config/targets.csv")["DJI Inspire 2"]
+    clouds = []
+    for lengths, factor in (("m", 0.001), ("file", 1.0)):
+        parts: dict = {"body": {"kind": "body", "meshes": [{"file": "craft.stl", "move": [0, 0, 10 * factor]}]}}
+        for index, (x, y) in enumerate(np.array(HUBS) * 1000):
+            corners = [
+                [factor * (x - 70), factor * (y - 10), factor * 55],
+                [factor * (x + 70), factor * (y + 10), None],
+            ]
+            parts[f"rotor {index}"] = {
+                "kind": "rotor", "region": {"box": corners, "whole": True},
+                "hinge": [float(factor * x), float(factor * y), 60 * factor], "axis": [0, 0, 1],
+            }  # fmt: skip
+        record = {"source": "mesh", "unit": "mm", "up": "z", "front": "x", "size_is": "motor diagonal", "parts": parts,
+                  "lengths": lengths}  # fmt: skip
+        merged = merge(row, record, "here")
+        assert merge(row, record | {"lengths": "m", "parts": merged["parts"]}, "here")["parts"] == merged["parts"]
+        clouds.append(make(merged, tmp_path, 1))
+    one, other = clouds
+    np.testing.assert_allclose(one.points, other.points, atol=1e-9)
+    np.testing.assert_allclose(one.hinges[1:], other.hinges[1:], atol=1e-9)
+    assert len(one.kinds) == 5
 
 
 def test_axes_are_guessed_from_the_extents():

@@ -35,10 +35,13 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `target` and its four commands to a parser's commands."""
     target = commands.add_parser("target", help="your own mesh or recording: look, draft a record, make its cloud")
     actions = target.add_subparsers(dest="action", required=True)
-    inspect = actions.add_parser("inspect", help="what a mesh file holds: unit, sizes, pieces, what may move")
+    inspect = actions.add_parser(
+        "inspect", help="what a mesh file holds: unit, sizes, pieces, what may move; and a picture"
+    )
     inspect.add_argument("file", type=Path)
     inspect.add_argument("--category", default="UAV", choices=("UAV", "Bird", "Vehicle"))
     inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
+    inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
     new = actions.add_parser("new", help="draft a record of a mesh file, with what must be confirmed marked")
     new.add_argument("file", type=Path)
     new.add_argument("--subtype", required=True, help="the published target whose place the mesh takes")
@@ -63,6 +66,16 @@ def _row(table: Path, subtype: str) -> dict:
     if subtype not in rows:
         raise InputError(f"--subtype is {subtype!r}, expected one of {list(rows)}")
     return rows[subtype]
+
+
+def _inspect(given: argparse.Namespace) -> str:
+    from lowalt.report.figures.inspection import inspection_picture
+
+    found = inspect_mesh(given.file, given.category, given.unit)
+    out = given.out or Path(f"{given.file.stem}-inspect.png")
+    with replacing(out) as temporary:
+        temporary.write_bytes(inspection_picture(found))
+    return f"{described(found)}\n\npicture  {out}"
 
 
 def _new(given: argparse.Namespace) -> str:
@@ -126,7 +139,7 @@ def run(given: argparse.Namespace) -> str:
     Raises: InputError naming the file, key or value that is wrong.
     """
     if given.action == "inspect":
-        return described(inspect_mesh(given.file, given.category, given.unit))
+        return _inspect(given)
     if given.action == "new":
         return _new(given)
     if given.action == "make":

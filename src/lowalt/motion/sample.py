@@ -65,7 +65,7 @@ def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dic
 
     Raises: InputError for more moving parts than the motion table has phases.
     """
-    if cloud.like == "Vehicle":
+    if cloud.parts_of("wheel"):
         row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
     elif cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
         row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])

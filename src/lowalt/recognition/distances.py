@@ -38,10 +38,10 @@ def still_row(row: dict) -> dict:
 
 
 def cycle_s(cloud: Cloud, row: dict) -> float:
-    """Return the time of one cycle (s): a turn, a beat, or the whole recording."""
+    """Return the time of one cycle (s): a turn, a beat, or the whole recording; a second where nothing turns."""
     if len(cloud.track):
         return len(cloud.track) / cloud.record["track_rate_hz"] / row["playback"]
-    return 1.0 / row["rate_hz"]
+    return 1.0 / row["rate_hz"] if row["rate_hz"] > 0 else 1.0
 
 
 def swept(cloud: Cloud, row: dict) -> np.ndarray:

@@ -55,11 +55,34 @@ def _place(group: list[Component], found: Inspection) -> str:
     return f"{'front' if centre[front] >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
 
 
+def _wings(found: Inspection) -> list[str]:
+    """Two wings without an elbow, cut where the body ends, their hinges there amid the wing's root."""
+    front, up = "xyz".index(found.front), "xyz".index(found.up)
+    right = 3 - front - up
+    sign = np.sign(np.cross(np.eye(3)[front], np.eye(3)[up])[right])
+    middle, lines = (found.low + found.high)[right] / 2, []
+    for name, side in (("left wing", -sign), ("right wing", sign)):
+        out = side * (found.points[:, right] - middle)
+        root = found.points[(out > found.shoulder_m) & (out < 1.3 * found.shoulder_m)]
+        hinge = np.median(root, axis=0) if len(root) else (found.low + found.high) / 2
+        hinge[right] = middle + side * found.shoulder_m
+        corners = [["null"] * 3, ["null"] * 3]
+        corners[0 if side > 0 else 1][right] = f"{hinge[right]:.5g}"
+        # Tail feathers may spread as wide as the wing's root, behind it.
+        along = found.points[out > 0.4 * out.max(), front]
+        slack = 0.25 * np.ptp(along)
+        corners[0][front], corners[1][front] = f"{along.min() - slack:.5g}", f"{along.max() + slack:.5g}"
+        box = ", ".join("[" + ", ".join(corner) + "]" for corner in corners)
+        lines.append(f"    {name}: {{kind: wing, region: {{box: [{box}]}}, hinge: {_numbers(hinge)}}}{CONFIRM}")
+    return lines
+
+
 def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
     """Return a record file's text for a subtype of the published table (`row`), from an inspected mesh.
 
     `file` is the mesh's path inside the folder of inputs. Lines that end in CONFIRM hold guesses. Moving parts are the
-    components that may be rotors or wheels, taken out of the body by boxes; a bird's wings are to be added by hand.
+    components that may be rotors or wheels, taken out of the body by boxes; a bird's wings are what lies beyond its
+    body.
     """
     category = like(row)
     kind = MOVING_KIND[category]
@@ -79,8 +102,12 @@ def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
         "  parts:",
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
     ]
-    if not groups:
-        lines.append(f"    # No {kind} was found. Add each as a part of kind {kind}: see mesh_record.py for its keys.")
+    if category == "Bird":
+        lines += _wings(found)
+    elif not groups:
+        lines.append(
+            f"    # No {kind} was found. Add each as a part of kind {kind}: see design/targets.md for its keys."
+        )
     names: dict[str, int] = {}
     for group in sorted(groups, key=lambda group: group[0].centre.tolist()):
         place = f"{_place(group, found)} {kind}"

@@ -22,6 +22,11 @@ FLAT = 0.35
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
 
+SLICES = 40
+"""Slices of a bird from its middle to a wing tip, of which each has a height."""
+MOST_POINTS = 20_000
+"""Most triangles whose middles are kept."""
+
 
 @dataclass(frozen=True)
 class Component:
@@ -52,7 +57,8 @@ class Inspection:
     """Result of an inspection of a file; lengths in metres along the file's axes.
 
     `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
-    `pieces` the names with triangles and extents (3,), `components` from the largest down.
+    `pieces` the names with triangles and extents (3,), `components` from the largest down; `points` (K, 3) m the
+    middles of some of the triangles, `owner` (K,) the number of each one's component.
     """
 
     path: Path
@@ -65,6 +71,21 @@ class Inspection:
     front: str
     pieces: list[tuple[str, int, np.ndarray]]
     components: list[Component] = field(default_factory=list)
+    category: str = "UAV"
+    points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+
+    @property
+    def shoulder_m(self) -> float:
+        """How far from the middle a bird's body ends and its wing begins (m): where it is less than half as high."""
+        right, up = 3 - "xyz".index(self.up) - "xyz".index(self.front), "xyz".index(self.up)
+        across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)
+        edges = np.linspace(0, across.max() * (1 + 1e-9), SLICES + 1)
+        high = np.zeros(SLICES)
+        for index in range(SLICES):
+            inside = self.points[(across >= edges[index]) & (across < edges[index + 1]), up]
+            high[index] = np.ptp(inside) if len(inside) else 0.0
+        return float(edges[np.flatnonzero(high > 0.5 * high.max()).max() + 1])
 
 
 def guessed_unit(size: float, category: str) -> str:
@@ -189,7 +210,12 @@ def inspect_mesh(path: str | Path, category: str, unit: str | float | None = Non
     guesses = candidates(parts, "xyz".index(up), high - low, category)
     parts = [Component(**{**vars(part), "guess": guesses.get(part.number, "")}) for part in parts]
     named = [(piece.instance, len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
-    return Inspection(path, unit, source, low, high, len(mesh.faces), up, front, named, parts)
+    some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
+    points = mesh.vertices[mesh.faces[some]].mean(axis=1)
+    return Inspection(
+        path, unit, source, low, high, len(mesh.faces), up, front, named, parts, category, points,
+        mesh.component[some],
+    )  # fmt: skip
 
 
 def _size(values: np.ndarray) -> str:
@@ -205,6 +231,11 @@ def described(found: Inspection, most: int = 30) -> str:
         f"{np.round(found.high, 4).tolist()}",
         f"up       {found.up} (guessed: the smallest extent; the sign is unknown)",
         f"front    {found.front} (guessed; the sign is unknown)",
+        *(
+            [f"wings    may begin {found.shoulder_m:.4g} m right and left of the middle"]
+            if found.category == "Bird"
+            else []
+        ),
         "",
         "named pieces (for `geometry:`)",
         *(f"  {name!r}: {count} triangles, {_size(extent)} m" for name, count, extent in found.pieces),

@@ -1,7 +1,8 @@
 """The keys and values of a mesh record, checked before any file is opened.
 
-All places are in metres along the axes of the mesh file (after `unit`, before scaling). The order of keys and parts
-means nothing. The keys stand in `records.schema.yaml`, with their meaning.
+All places are along the axes of the mesh file, before scaling, in metres or with `lengths: file` in the record's unit;
+a checked record has metres. The order of keys and parts means nothing. The keys stand in `records.schema.yaml`, with
+their meaning.
 """
 
 from lowalt.common.classes import like
@@ -9,6 +10,7 @@ from lowalt.common.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
 from lowalt.targets.input_files import check_file_name
+from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.record_schema import check
 
 SIZES = ("motor diagonal", "length", "width", "height", "largest extent")
@@ -68,6 +70,29 @@ def _part_fault(name: str, part: dict, parts: dict[str, dict], category: str) ->
     return None
 
 
+def in_metres(record: dict) -> dict:
+    """Return a record whose hinges, regions and moves are in metres, whatever its key `lengths` says they are in."""
+    if record.get("lengths", "m") == "m":
+        return record
+    unit = record["unit"]
+    factor = UNITS_M[unit] if isinstance(unit, str) else unit
+
+    def scaled(value: object) -> object:
+        if isinstance(value, dict):
+            return {key: item if key in ("axis", "whole") else scaled(item) for key, item in value.items()}
+        if isinstance(value, list):
+            return [scaled(item) for item in value]
+        return factor * value if isinstance(value, (int, float)) else value
+
+    def part_in_metres(part: dict) -> dict:
+        places = {key: scaled(part[key]) for key in ("region", "hinge") if key in part}
+        meshes = [mesh | {"move": scaled(mesh["move"])} if "move" in mesh else mesh for mesh in part.get("meshes", [])]
+        return part | places | ({"meshes": meshes} if meshes else {})
+
+    parts = {name: part_in_metres(part) for name, part in record["parts"].items()}
+    return record | {"parts": parts, "drop": scaled(record.get("drop", [])), "lengths": "m"}
+
+
 def check_record(merged: dict, extra: dict, where: str) -> dict:
     """Return the merged record of a mesh, checked, with its defaults.
 
@@ -96,6 +121,7 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
         raise InputError(f"{where}: size_is is {size!r}, expected one of {sizes} for a {category}")
     result = DEFAULTS | {"moving_share": MOVING_SHARE[category]} | merged | {"size_is": size}
     result["parts"] = ordered_parts(merged["parts"])
+    result = in_metres(result)
     if category == "Vehicle":
         result.setdefault("wheel_size", "published")
     for name in record_files(result):

@@ -81,11 +81,11 @@ def _wing_faults(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[st
     return found
 
 
-def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str]) -> list[str]:
+def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str) -> list[str]:
     """One sentence for each thing that is unusual but possible."""
     found = []
     wheels = [pool for name, pool in parts.items() if kinds[name] == "wheel"]
-    if wheels and len(wheels) < FEWEST_WHEELS:
+    if category == "Vehicle" and len(wheels) < FEWEST_WHEELS:
         found.append(f"{len(wheels)} wheels, expected at least {FEWEST_WHEELS}")
     for kind, roots in (
         ("wheel", wheels),
@@ -97,14 +97,17 @@ def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, st
     return found
 
 
-def refuse_implausible(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], where: str) -> None:
+def refuse_implausible(
+    parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, where: str
+) -> None:
     """Refuse parts that cannot be what they are called, and warn of what is unusual.
 
-    `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part that has one.
+    `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part that has one,
+    `category` the published class that the target is like.
     Raises: InputError naming `where`, the part, the measures and what was expected. Warns: InputWarning.
     """
     faults = _wheel_faults(parts, kinds) + _rotor_faults(parts, kinds) + _wing_faults(parts, kinds, parents)
     if faults:
         raise InputError(f"{where}: " + "; ".join(faults))
-    for doubt in _doubts(parts, kinds, parents):
+    for doubt in _doubts(parts, kinds, parents, category):
         warnings.warn(f"{where}: {doubt}", InputWarning, stacklevel=2)

@@ -12,6 +12,14 @@ VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle
          "Pedestrian": (1, 2, "from the side")}  # fmt: skip
 
 
+def view_of(cloud: Cloud) -> tuple[int, int, str]:
+    """Return the two axes to show and their name: along the axes of rotors where these point to the front or aside."""
+    rotors = [abs(cloud.axes[part]) for part in cloud.parts_of("rotor")]
+    if rotors and all(axis[1] > 0.9 for axis in rotors):
+        return 0, 2, "from behind"
+    return VIEWS[cloud.like]
+
+
 def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
     """Draw the first motion model of each class at `instants` equal steps of its cycle; returns PNG bytes."""
     named = {cloud.subtype: cloud for cloud in clouds}
@@ -21,7 +29,7 @@ def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> by
     figure, panels = plt.subplots(len(chosen), instants, figsize=(1.7 * instants, 1.8 * len(chosen)), squeeze=False)
     for line, row in zip(panels, chosen, strict=True):
         cloud = named[row["subtype"]]
-        across, up, view = VIEWS[cloud.like]
+        across, up, view = view_of(cloud)
         times = np.arange(instants) / instants * cycle_s(cloud, row)
         points = positions(cloud, still_row(row), times)
         low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))

@@ -1,0 +1,44 @@
+"""A picture of a mesh as its file has it: three views along its axes, with what may be rotors, wheels or wings."""
+
+import numpy as np
+from matplotlib import pyplot as plt
+
+from lowalt.report.figures.style import png
+from lowalt.targets.inspection import Inspection
+
+VIEWS = ((0, 1), (1, 2), (0, 2))
+
+
+def _colours(found: Inspection) -> np.ndarray:
+    """One colour a point (K, 4): grey, and one for each component that may move."""
+    table = plt.get_cmap("tab10")
+    moving = [part.number for part in found.components if part.guess]
+    result = np.tile([0.6, 0.6, 0.63, 1.0], (len(found.points), 1))
+    for index, number in enumerate(moving):
+        result[found.owner == number] = table(index % 10)
+    return result
+
+
+def inspection_picture(found: Inspection) -> bytes:
+    """Return a PNG of an inspected mesh, in metres along the file's axes, pieces that may move in colours."""
+    figure, panels = plt.subplots(1, 3, figsize=(14, 5))
+    colours, middle = _colours(found), (found.low + found.high) / 2
+    half = 0.58 * float((found.high - found.low).max())
+    front, up = "xyz".index(found.front), "xyz".index(found.up)
+    right = 3 - front - up
+    for panel, (across, high) in zip(panels, VIEWS, strict=True):
+        panel.scatter(found.points[:, across], found.points[:, high], s=4, c=colours, linewidths=0)
+        for part in found.components:
+            if part.guess:
+                panel.text(part.centre[across], part.centre[high], part.guess, fontsize=8, ha="center")
+        for side in (-1, 1) if found.category == "Bird" and right in (across, high) else ():
+            line = panel.axvline if across == right else panel.axhline
+            line(middle[right] + side * found.shoulder_m, color="tab:red", linewidth=0.8, linestyle="--")
+        limits = np.array([-half, half])
+        panel.set(xlim=middle[across] + limits, ylim=middle[high] + limits, aspect="equal")
+        panel.set(xlabel=f"the file's {'xyz'[across]} (m)", ylabel=f"the file's {'xyz'[high]} (m)")
+        panel.grid(alpha=0.25)
+    words = f"{found.path.name}: unit {found.unit} ({found.unit_from}); guessed: up {found.up}, front {found.front}"
+    figure.suptitle(words.replace("$", r"\$") + (", wings beyond the dashed lines" if found.category == "Bird" else ""))
+    figure.tight_layout()
+    return png(figure)
