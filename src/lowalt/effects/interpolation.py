@@ -14,6 +14,11 @@ def weights(count: int, at: np.ndarray) -> np.ndarray:
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
     order = np.arange(count)
+    return np.cos(order[:, None] * np.arccos(at)).T @ coefficients(count)
+
+
+def coefficients(count: int) -> np.ndarray:
+    """Return the matrix (count, count) from values at `points(count)` to the coefficients of Chebyshev polynomials."""
+    order = np.arange(count)
     angle = np.pi * (order + 0.5) / count
-    transform = np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count
-    return np.cos(order[:, None] * np.arccos(at)).T @ transform
+    return np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count

@@ -9,43 +9,52 @@ from lowalt.common.jit import kernel
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 STRIDE = 16
 """Subcarriers that share one short phase ramp."""
-QUARTERS = np.array([1, -1j, -1, 1j])
-"""(-j)^p by p modulo 4."""
+BLOCK = 4
+"""Orders that share a pass over the points."""
 
 
 @LOOPS
 def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, reach, result):
-    """Fill result (Q, N, P) with the sum over points of z T_p(u): z = times strength out back, u the two-way range.
+    """Fill result (N, 2, Q, P) with real and imaginary parts of (-j)^p times the sum over points of z T_p(u).
 
-    out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L); u counts from `middle` (N,), in cells as `reach`, and
-    runs from -1 to 1 over `reach`. Symbols without any strength stay zero.
+    z = times strength out back, u the two-way range. out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L);
+    u counts from `middle` (N,), in cells as `reach`, and runs from -1 to 1 over `reach`. P is a multiple of BLOCK.
+    Symbols without any strength are zero.
     """
     nodes, symbols, count = out.shape
-    x, before, last = np.empty(count), np.empty(count), np.empty(count)
-    real, imag = np.empty((nodes, count)), np.empty((nodes, count))
+    orders = result.shape[3]
+    powers, real, imag = np.empty((orders, count)), np.empty(count), np.empty(count)
     for n in range(symbols):
         row = n % strength.shape[0]
-        result[:, n] = 0.0
+        result[n] = 0.0
         if not strength[row].any():
             continue
         for i in range(count):
-            x[i] = (half_cells * (excess_a[n, i] + excess_b[n, i]) - middle[n]) / reach
-            before[i], last[i] = x[i], 1.0
+            powers[0, i] = 1.0
+            powers[1, i] = (half_cells * (excess_a[n, i] + excess_b[n, i]) - middle[n]) / reach
+        for p in range(2, orders):
+            for i in range(count):
+                powers[p, i] = 2.0 * powers[1, i] * powers[p - 1, i] - powers[p - 2, i]
         for q in range(nodes):
             for i in range(count):
                 z = times * strength[row, i] * (out[q, n, i] * back[q, n, i])
-                real[q, i], imag[q, i] = z.real, z.imag
-        for p in range(result.shape[2]):
-            for q in range(nodes):
-                re, im = 0.0, 0.0
+                real[i], imag[i] = z.real, z.imag
+            # Four orders a pass over the points.
+            for p in range(0, orders, BLOCK):
+                a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
                 for i in range(count):
-                    re += last[i] * real[q, i]
-                    im += last[i] * imag[q, i]
-                result[q, n, p] = complex(re, im)
-            for i in range(count):
-                t = last[i]
-                last[i] = 2.0 * x[i] * t - before[i] if p else x[i]
-                before[i] = t
+                    a += powers[p, i] * real[i]
+                    b += powers[p, i] * imag[i]
+                    c += powers[p + 1, i] * real[i]
+                    d += powers[p + 1, i] * imag[i]
+                    e += powers[p + 2, i] * real[i]
+                    f += powers[p + 2, i] * imag[i]
+                    g += powers[p + 3, i] * real[i]
+                    h += powers[p + 3, i] * imag[i]
+                result[n, 0, q, p], result[n, 1, q, p] = a, b
+                result[n, 0, q, p + 1], result[n, 1, q, p + 1] = d, -c
+                result[n, 0, q, p + 2], result[n, 1, q, p + 2] = -e, -f
+                result[n, 0, q, p + 3], result[n, 1, q, p + 3] = -h, g
 
 
 @LOOPS
@@ -60,33 +69,14 @@ def turned(whole, cells, half_steps, total):
 
 
 @LOOPS
-def spread(sums, own, whole, cells, table, weights, result):
-    """Add own[n] sum_q weights[q, m] sum_p (-j)^p sums[q, n, p] table[p, m], delayed, to result (N, M).
+def delayed(planes, own, whole, cells, result):
+    """Add own[n] (planes[n, 0] + j planes[n, 1]), delayed, to result (N, M).
 
-    sums: (Q, N, P); table: (P, M) real; weights: (Q, M); the delay about the middle subcarrier is `whole` (N,) int64
-    plus `cells` (N,) range cells.
+    planes: (N, 2, M); the delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells.
     """
-    nodes, symbols, orders = sums.shape
-    total = table.shape[1]
-    re, im, node_re, node_im = np.empty(total), np.empty(total), np.empty(total), np.empty(total)
+    symbols, total = result.shape
     ramp_re, ramp_im = np.empty(STRIDE), np.empty(STRIDE)
     for n in range(symbols):
-        if not sums[:, n].any():
-            continue
-        re[:] = 0.0
-        im[:] = 0.0
-        for q in range(nodes):
-            node_re[:] = 0.0
-            node_im[:] = 0.0
-            for p in range(orders):
-                value = sums[q, n, p] * QUARTERS[p % 4]
-                a, b = value.real, value.imag
-                for m in range(total):
-                    node_re[m] += a * table[p, m]
-                    node_im[m] += b * table[p, m]
-            for m in range(total):
-                re[m] += node_re[m] * weights[q, m]
-                im[m] += node_im[m] * weights[q, m]
         step, wide = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
         phase = 1.0 + 0.0j
         for k in range(STRIDE):
@@ -96,7 +86,7 @@ def spread(sums, own, whole, cells, table, weights, result):
         for first in range(0, total, STRIDE):
             a, b = phase.real, phase.imag
             for k in range(min(STRIDE, total - first)):
-                x, y = re[first + k], im[first + k]
+                x, y = planes[n, 0, first + k], planes[n, 1, first + k]
                 c, d = a * x - b * y, a * y + b * x
                 result[n, first + k] += complex(c * ramp_re[k] - d * ramp_im[k], c * ramp_im[k] + d * ramp_re[k])
             phase *= wide

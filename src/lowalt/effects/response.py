@@ -81,7 +81,7 @@ class Rays:
             self.refs = _one_way(network, station, places[:, 0]) + _one_way(network, station.transmitter, places[:, 0])
         # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
         # tables. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
-        kappas, self.weights = _frequencies(network, radio, squint, error / 2)
+        self.nodes = kappas = _frequencies(network, radio, squint, error / 2)
         self.rest = 10.0 ** np.floor(np.log10(error / 10))
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
@@ -106,16 +106,21 @@ class Rays:
             # Each pair's ranges are measured from their own middle, so that few orders of its moments matter.
             middle = 0.5 * radio.cells * (there.middle + home.middle)
             reach = _round_up(0.5 * radio.cells * (there.reach + home.reach))
-            table = _table(reach, radio.subcarriers, self.rest)
-            sums = np.empty((len(self.weights), len(refs), len(table)), np.complex128)
+            bessel = _table(reach, radio.subcarriers, self.rest)
+            orders = np.empty((len(refs), 2, len(self.nodes), len(bessel)))
             paired = strength
             if own_routes:
                 paired = strength[a] if a == b else np.sqrt(strength[a] * strength[b])
             moment_loops.moments(
                 paired, there.factors, home.factors, times, there.excess, home.excess, middle, 0.5 * radio.cells,
-                reach, sums,
+                reach, orders,
             )  # fmt: skip
-            moment_loops.spread(sums, own, whole, refs[:, 6] + middle, table, self.weights, result)
+            planes, table = orders.reshape(2 * len(refs), -1), bessel
+            if len(self.nodes) > 1:
+                mix, table = _joined(reach, len(self.nodes), radio.subcarriers, self.rest)
+                planes = planes @ mix
+            planes = (planes @ table).reshape(len(refs), 2, -1)
+            moment_loops.delayed(planes, own, whole, refs[:, 6] + middle, result)
         return result
 
 
@@ -216,31 +221,67 @@ def _round_up(value: float) -> float:
 
 @lru_cache(maxsize=64)
 def _table(reach: float, count: int, error: float) -> np.ndarray:
-    """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), the terms left out sum to less than `error`."""
+    """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), the terms left out sum to less than `error`.
+
+    P is a multiple of moment_loops.BLOCK.
+    """
+    return _bessel(_orders(reach, error), 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count)
+
+
+def _orders(reach: float, error: float) -> int:
+    """Number of orders of the expansion over `reach` cells, rounded up to a whole block."""
     band = np.pi * reach
     order = int(band) + 1
     # From this order on, J_p falls by more than a factor of two from order to order.
     while 4.0 * abs(jv(order + 1, band)) > error:
         order += 1
-    p = np.arange(order + 1)
-    x = 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count
+    return _whole_blocks(order + 1)
+
+
+def _whole_blocks(count: int) -> int:
+    return -(-count // moment_loops.BLOCK) * moment_loops.BLOCK
+
+
+def _bessel(orders: int, x: np.ndarray) -> np.ndarray:
+    """Matrix (orders, len(x)): eps_p J_p(x)."""
+    p = np.arange(orders)
     return np.where(p == 0, 1.0, 2.0)[:, None] * jv(p[:, None], x)
 
 
-def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (Q,) over the carrier at which the arrays are evaluated, and their Lagrange weights (Q, M).
+@lru_cache(maxsize=64)
+def _joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
+    """Matrix (nodes x P, K) from moments at `nodes` frequencies to Chebyshev orders over the band, and these orders'
+    values (K, M) at the subcarriers.
+
+    An entry of the moments is at most the sum of amplitudes, so the orders left out change a response by at most the
+    sum of their coefficients, which is below `error`.
+    """
+    band = np.pi * reach * (count - 1) / count
+    orders = _orders(reach, error)
+    # The products are entire functions: four times as many points as orders leave nothing to fold.
+    fine = 4 * (nodes + orders)
+    x = interpolation.points(fine)
+    weights, bessel = interpolation.weights(nodes, x), _bessel(orders, band * x)
+    values = (weights.T[:, None] * bessel).reshape(nodes * orders, fine)
+    mix = values @ interpolation.coefficients(fine).T
+    kept = 1 + int(np.flatnonzero(abs(mix).sum(axis=0)[::-1].cumsum()[::-1] > error)[-1])
+    place = np.arccos(np.linspace(-1.0, 1.0, count))
+    return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
+
+
+def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> np.ndarray:
+    """Frequencies (Q,) over the carrier at which the arrays are evaluated: Chebyshev points of the band.
 
     The phase of an array's middle counts as range. Only the elements' paths relative to the middle's remain, so they
     alone decide how many frequencies are needed.
     """
     count = radio.subcarriers
     if not squint or count == 1:
-        return np.array([radio.kappa]), np.ones((1, count))
+        return np.array([radio.kappa])
     half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     band = np.pi * half * (_half_diagonal(network.transmit) + _half_diagonal(network.receive))
     # Interpolation of exp(j B x) errs by at most 4 sum over p >= nodes of |J_p(B)|; each J_p is below half the last.
     nodes = int(band) + 2
     while 8.0 * abs(jv(nodes, band)) > error:
         nodes += 1
-    x, weights = interpolation.points(nodes), interpolation.weights(nodes, np.linspace(-1.0, 1.0, count))
-    return radio.kappa + half + half * x, np.ascontiguousarray(weights.T)
+    return radio.kappa + half + half * interpolation.points(nodes)

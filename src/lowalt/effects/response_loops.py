@@ -86,6 +86,7 @@ def one_way(
     middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
     fixed = 0.5 * beam * (middle_h * aims[0] + middle_v * aims[1])
     wave = half_turns if squint else 0.5 * kappas[0] / spacing
+    each = min(1, coefficient.shape[1] - 1)
     for n in range(places.shape[0]):
         rx, ry, rz, r_ref = refs[n, 0], refs[n, 1], refs[n, 2], refs[n, 3]
         ox, oy, oz = origin[n, 0], origin[n, 1], origin[n, 2]
@@ -111,9 +112,8 @@ def one_way(
         horner(square, WAVE, SINE, DEGREE, st, count)
         row = n % coefficient.shape[0]
         for i in range(count):
-            out[0, n, i] = coefficient[row, i % coefficient.shape[1]] * complex(
-                weight[i] * ct[i], weight[i] * (st[i] * turn[i])
-            )
+            own = coefficient[row, i * each]
+            out[0, n, i] = own * complex(weight[i] * ct[i], weight[i] * (st[i] * turn[i]))
         # Go through the frequencies in reverse: entry 0 holds the factor that all others need.
         for q in range(len(kappas) - 1, -1, -1):
             if spherical:
