@@ -54,6 +54,13 @@ def test_a_target_has_the_mean_cross_section_of_its_class_and_size(builtin):
     assert mean_cross_section.mean_dbsm("UAV", 1.6) == pytest.approx(-5.85)
 
 
+def test_a_body_of_one_point_has_no_size_and_is_refused():
+    cloud, _ = target(np.random.default_rng(3), points=2)
+    with pytest.raises(InputError, match="one point, which has no size"):
+        mean_cross_section.cross_sections(mean_cross_section.DEFAULTS, cloud)
+    assert mean_cross_section.cross_sections({"dbsm": {"Thing": 0.0}, "blades_db": -3.0}, cloud).sum() == 1.0
+
+
 @pytest.mark.parametrize("blades_db", [-10.0, -20.0])
 def test_blades_lie_below_the_body_and_points_keep_their_ratios(builtin, blades_db):
     cloud = builtin["DJI Mini 2"]

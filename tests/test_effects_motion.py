@@ -313,3 +313,10 @@ def test_one_symbol_is_enough_and_draws_repeat(effect):
     assert all(abs(angle).max() == 0 for angle in alone.angle_rad.values())
     first, second = (effect.perturb(effect.DEFAULTS, craft(), ROW, TIMES, np.random.default_rng(3)) for _ in range(2))
     assert str(first) == str(second)
+
+
+def test_the_wind_asks_for_a_size():
+    cloud, row = target(QUAD)
+    point = replace(cloud, points=np.zeros_like(cloud.points), record=cloud.record | {"published": {}})
+    with pytest.raises(InputError, match="expected size_m"):
+        gusts.perturb(gusts.DEFAULTS, point, row, TIMES, np.random.default_rng(1))

@@ -7,6 +7,7 @@ ratios. Adding the points without their phases gives the target's mean.
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.effects.channel.target_classes import (
     HUMAN_DBSM,
     LARGE_UAV_DBSM,
@@ -47,9 +48,16 @@ def mean_dbsm(category: str, size: float) -> float:
 def cross_sections(settings: dict, cloud: Cloud) -> np.ndarray:
     """Return each point's cross section (L,) m2; their sum is the target's mean.
 
+    Raises: InputError for a flying target whose size is not known.
     settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together against the rest.
     """
-    total = 10 ** (settings["dbsm"].get(cloud.subtype, mean_dbsm(cloud.like, size_m(cloud))) / 10)
+    size, given = size_m(cloud), settings["dbsm"].get(cloud.subtype)
+    if given is None and size == 0 and cloud.like in ("UAV", "Bird"):
+        raise InputError(
+            f"effects.mean_cross_section: the body of {cloud.subtype} is one point, which has no size, expected its "
+            "mean in dbsm"
+        )
+    total = 10 ** ((mean_dbsm(cloud.like, size) if given is None else given) / 10)
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
     weight = np.asarray(cloud.rcs_m2, float)
     groups, shares = (~blades, blades), (1.0, 10 ** (settings["blades_db"] / 10))

@@ -2,6 +2,7 @@
 
 import math
 
+from lowalt.common.errors import InputError
 from lowalt.effects.channel.target_classes import size_m
 from lowalt.targets.cloud import Cloud
 
@@ -28,8 +29,17 @@ ATTITUDE_S, ATTITUDE_M = 0.1, 0.4
 
 
 def length_m(cloud: Cloud) -> float:
-    """Return a flying target's length (m): the published one, or that of its body."""
-    return float(cloud.record.get("published", {}).get("size_m") or size_m(cloud))
+    """Return a flying target's length (m): the published one, or that of its body.
+
+    Raises: InputError where neither is known.
+    """
+    length = float(cloud.record.get("published", {}).get("size_m") or size_m(cloud))
+    if length == 0:
+        raise InputError(
+            f"{cloud.subtype}: its body is one point and has no size, by which it answers the wind, expected size_m in "
+            "the table of targets"
+        )
+    return length
 
 
 def mass_kg(cloud: Cloud) -> float:
