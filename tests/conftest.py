@@ -40,3 +40,22 @@ def quad(tmp_path):
 def bird(tmp_path):
     """A folder with the meshes of a made bird."""
     return write_bird(tmp_path)
+
+
+@pytest.fixture(scope="session")
+def views(tmp_path_factory):
+    """A file of samples that a few steps of training tell apart. No test writes to it."""
+    # torch is imported only by the tests that train.
+    from trainings import write_views
+
+    return write_views(tmp_path_factory.mktemp("views") / "views.npz")
+
+
+@pytest.fixture(scope="session")
+def trained(views, tmp_path_factory):
+    """The folder of a finished training on `views`. No test writes to it."""
+    from trainings import train, with_training
+
+    folder = tmp_path_factory.mktemp("model")
+    train(views, folder, with_training(steps=150, validate_every=50))
+    return folder

@@ -16,7 +16,7 @@ from lowalt.recognition import runs
 from lowalt.report.figures.sample import axes_of
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
-from test_recognition_training import train, with_training, write_views
+from trainings import train, with_training, write_views
 
 CONFIG = load_yaml("config/default.yaml")
 

@@ -28,7 +28,7 @@ from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import Products
 from lowalt.workflow.run import Run
-from test_recognition_training import SETTINGS, TRAINING
+from trainings import SETTINGS, TRAINING
 
 CONFIG = load_yaml("config/default.yaml")
 SCHEMA = "workflow/schemas/config.schema.yaml"

@@ -10,7 +10,7 @@ from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.recognition import choose, predictions, protocols, recipe, samples
 from lowalt.recognition.trial import main as trial_main
-from test_recognition_training import SETTINGS, TRAINING
+from trainings import SETTINGS, TRAINING
 
 SUBTYPES = [(f"{name} {number}", label) for label, name in enumerate("UBVP") for number in range(5)]
 

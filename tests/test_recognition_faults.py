@@ -12,7 +12,7 @@ from lowalt.common.streams import stream
 from lowalt.recognition import augment, checkpoint, inference, predictions, recipe, runs, statistics, tables
 from lowalt.recognition import training as loop
 from test_recognition_data import facts, read_rows, run_files
-from test_recognition_training import SCHEME, SETTINGS, sources, with_training, write_views
+from trainings import SCHEME, SETTINGS, sources, with_training, write_views
 
 MACHINE = inference.Machine(torch.device("cpu"), "fp32")
 

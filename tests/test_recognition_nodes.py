@@ -10,10 +10,9 @@ import pytest
 
 from lowalt.recognition import schemes
 from lowalt.workflow.run import Run
-from test_recognition_training import views, with_training
+from trainings import with_training
 
 pytestmark = pytest.mark.slow
-__all__ = ["views"]
 
 
 def launched(arguments, nodes, processes):

@@ -1,0 +1,61 @@
+"""Small trainings that a few steps finish: their settings, their samples, and how a test runs one."""
+
+import numpy as np
+import torch
+
+from lowalt.common.streams import stream
+from lowalt.recognition import checkpoint, runs, samples, schemes
+
+TRAINING = {
+    "steps": 24, "batch": 8, "snrs_per_model": 1, "rate": 3e-3, "backbone_rate": 1.0, "weight_decay": 0.05,
+    "warmup": 0.1, "clip": 5.0, "label_smoothing": 0.0, "alone": 0.5, "ema": 0.99, "precision": "fp32",
+    "channels_last": True, "compile": False, "validate_every": 8, "patience": 0, "checkpoint_s": 1e9,
+    "threads": 1, "workers": 0,
+}  # fmt: skip
+SETTINGS = {
+    "seed": 3, "size": 32, "colour_map": "gray",
+    "network": {"backbone": "test_vit2", "weights": "none", "intra_depth": 1, "inter_depth": 1, "heads": 4,
+                "feed_forward": 1, "dropout": 0.1, "hidden": 8},
+    "training": TRAINING,
+    "classes": ["UAV", "Bird", "Vehicle", "Pedestrian"],
+    "augmentation": {"mirror": 0.5, "shift_doppler": 0.1, "shift_time": 0.2, "contrast": 0.0, "mask_doppler": 0.1,
+                     "mask_time": 0.1, "drop_view": 0.1},
+}  # fmt: skip
+SCHEME = schemes.Scheme("AB:VRP+VT", (0, 1), (0, 2))
+
+
+def with_training(**changes):
+    return {**SETTINGS, "training": {**TRAINING, **changes}}
+
+
+def write_views(path, models=20):
+    """Four classes that differ in brightness, which no augmentation here touches: a few steps must learn them."""
+    rng = stream(8, "brightness")
+    rows, views = [], []
+    for label in range(4):
+        for model in range(models):
+            fold = ("val", "test", "train", "train", "train")[model % 5]
+            for snr in (3.0, np.inf):
+                image = rng.integers(60 * label, 60 * label + 60, (9, 32, 32), dtype=np.uint8)
+                views.append(image)
+                rows.append((f"s{label}-{model}-{snr:g}", f"s{label}", model, snr, "seen", fold, label))
+    columns = [np.array(column) for column in zip(*rows, strict=True)]
+    nan = np.full((len(rows), 3), np.nan)
+    samples.write(path, np.stack(views), samples.Facts(*columns, nan, nan))
+    return path
+
+
+def sources(path):
+    return {
+        part: samples.ViewSamples([path], SCHEME.columns, {("seen", fold)})
+        for part, fold in (("train", "train"), ("validation", "val"))
+    }
+
+
+def train(path, folder, settings=SETTINGS):
+    runs.train(sources(path), SCHEME, "seen", settings, folder)
+    return checkpoint.load(folder / "model.pt")[1]["weights"], (folder / "history.csv").read_text()
+
+
+def equal(one, other):
+    return one.keys() == other.keys() and all(torch.equal(value, other[key]) for key, value in one.items())

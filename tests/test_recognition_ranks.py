@@ -1,0 +1,108 @@
+"""Several ranks: they train and evaluate as one."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+import torch
+
+from lowalt.common.config import load_yaml
+from lowalt.recognition import checkpoint, predictions, schemes
+from lowalt.recognition.__main__ import main
+from trainings import SETTINGS, with_training
+
+
+def run_ranks(arguments, ranks):
+    if ranks == 1:
+        main(arguments)
+        return
+    port = str(20000 + os.getpid() % 20000)
+    launch = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port]
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
+    command = [sys.executable, *launch, "-m", "lowalt.recognition", *arguments]
+    subprocess.run(command, check=True, capture_output=True, env=environment)
+
+
+def predict_all(trained, views, out, ranks):
+    settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32", "mirror": False})
+    run_ranks(["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
+               "--out", str(out)], ranks)  # fmt: skip
+    return predictions.read(out)
+
+
+def test_two_ranks_evaluate_to_the_same_bytes_as_one(trained, views, tmp_path):
+    found = predict_all(trained, views, tmp_path / "one.csv", 1)
+    predict_all(trained, views, tmp_path / "two.csv", 2)
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+    assert set(found.fold) == {"val", "test"}
+    assert found.correct.mean() > 0.9
+
+
+def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
+    """Gradients are means over the ranks' equal shares, so a step is that of one rank with the whole batch."""
+    table = tmp_path / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    weights, losses = {}, {}
+    for name, ranks, batch in (("one", 1, 8), ("two", 2, 8), ("half", 1, 4)):
+        settings = with_training(steps=12, validate_every=6, batch=batch)
+        settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
+        # The shipped backbone, whose batch norm needs the statistics of the whole batch.
+        shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
+        settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
+        line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen"]
+        run_ranks(
+            [
+                *line,
+                "--scheme",
+                "AB:VRP+VT",
+                "--stations",
+                "A",
+                "B",
+                "C",
+                "--schemes",
+                str(table),
+                "--out",
+                str(tmp_path / name),
+            ],
+            ranks,
+        )
+        found = checkpoint.load(tmp_path / name / "model.pt")[1]["weights"]
+        assert any("running_var" in key for key in found)
+        weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
+        with (tmp_path / name / "history.csv").open(newline="") as file:
+            losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
+        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == ranks
+    apart = {name: float((weights[name] - weights["one"]).norm() / weights["one"].norm()) for name in ("two", "half")}
+    # Sums in another order, which Adam magnifies where a gradient is zero but for rounding.
+    assert apart["two"] < 1e-4 < 1e-3 < apart["half"]
+    assert losses["two"] == pytest.approx(losses["one"], rel=1e-4)
+    assert losses["half"] != pytest.approx(losses["one"], rel=1e-3)
+
+
+def test_batch_norm_over_one_rank_is_that_of_torch_and_keeps_names_and_activations(tmp_path):
+    """In a process group of one rank the sums of all ranks are this rank's own."""
+    from timm.layers import BatchNormAct2d
+    from torch import distributed, nn
+
+    from lowalt.recognition.batch_norm import over_ranks
+
+    def network():
+        torch.manual_seed(5)
+        return nn.Sequential(nn.Conv2d(3, 4, 3), nn.BatchNorm2d(4), nn.Sequential(BatchNormAct2d(4)))
+
+    distributed.init_process_group("gloo", init_method=f"file://{tmp_path}/group", rank=0, world_size=1)
+    try:
+        images = 3 + torch.randn(6, 3, 9, 9, generator=torch.Generator().manual_seed(1))
+        plain, shared = network(), over_ranks(network())
+        assert plain.state_dict().keys() == shared.state_dict().keys()
+        for model in (plain, shared):
+            (model(images) ** 3).sum().backward()
+        for (name, one), other in zip(plain.named_parameters(), shared.parameters(), strict=True):
+            torch.testing.assert_close(other.grad, one.grad, rtol=2e-4, atol=2e-3, msg=name)
+        torch.testing.assert_close(shared.state_dict(), plain.state_dict(), rtol=1e-5, atol=1e-6)
+        torch.testing.assert_close(shared.eval()(images), plain.eval()(images), rtol=1e-5, atol=1e-6)
+    finally:
+        distributed.destroy_process_group()

@@ -1,0 +1,147 @@
+"""A stopped training: it resumes exactly, and refuses foreign and damaged checkpoints by name."""
+
+import dataclasses
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import torch
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.recognition import checkpoint, recipe, runs, schemes
+from lowalt.recognition.__main__ import main
+from trainings import SCHEME, TRAINING, equal, sources, train, with_training
+
+
+class Killed(Exception):
+    pass
+
+
+def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp_path, monkeypatch):
+    """Stops at 20 random moments of one run, each time just after a checkpoint or up to 5 steps later."""
+    whole = train(views, tmp_path / "whole")
+    moments = iter(sorted(stream(1, "kill").integers(1, TRAINING["steps"], 20).tolist()))
+    settings = with_training(checkpoint_s=0)
+    at, step = [next(moments)], runs.Trainer._step
+
+    def breaking(self, *batch):
+        if self.at.steps >= at[0]:
+            at[0] = next(moments, 10**9)
+            raise Killed
+        step(self, *batch)
+
+    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    for _ in range(21):
+        try:
+            parts = train(views, tmp_path / "parts", settings)
+            break
+        except Killed:
+            continue
+    assert at[0] == 10**9
+    assert equal(whole[0], parts[0]) and whole[1] == parts[1]
+
+
+def killed_at(moments, views, folder, settings):
+    """Kill one training at each of the moments, s after its first new checkpoint; what is left of it, as a command."""
+    table = folder / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
+            "--stations", "A", "B", "C",
+            "--scheme", "AB:VRP+VT", "--schemes", str(table), "--out", str(folder / "killed")]  # fmt: skip
+    kept = folder / "killed" / "checkpoint.pt"
+    for moment in moments:
+        before = kept.stat().st_mtime_ns if kept.exists() else None
+        process = subprocess.Popen([sys.executable, "-m", "lowalt.recognition", *line], stderr=subprocess.DEVNULL)
+        while process.poll() is None and (not kept.exists() or kept.stat().st_mtime_ns == before):
+            time.sleep(0.01)
+        time.sleep(moment)
+        process.send_signal(signal.SIGKILL)
+        assert process.wait() == -signal.SIGKILL
+    return line
+
+
+@pytest.mark.parametrize(
+    ("kills", "steps"), [(1, 60), pytest.param(20, 600, marks=pytest.mark.slow)], ids=["once", "twenty times"]
+)
+def test_a_killed_process_resumes_from_the_command_line(views, tmp_path, capsys, kills, steps):
+    settings = with_training(steps=steps, validate_every=10, checkpoint_s=0)
+    line = killed_at(stream(2, "kill").uniform(0, 0.3, kills), views, tmp_path, settings)
+    main(line)
+    assert "resumed at step" in capsys.readouterr().err
+    name, state = checkpoint.load(tmp_path / "killed" / "model.pt")
+    weights, history = train(views, tmp_path / "whole", with_training(steps=steps, validate_every=10))
+    assert equal(state["weights"], weights)
+    assert (tmp_path / "killed" / "history.csv").read_text() == history
+    assert json.loads(name)["protocol"] == "seen"
+
+
+def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trained, tmp_path):
+    name, state = checkpoint.load(trained / "model.pt")
+    other = tmp_path / "other"
+    checkpoint.save(other / "checkpoint.pt", name, {})
+    with pytest.raises(InputError, match="another run, its settings differ"):
+        train(views, other)
+    with pytest.raises(InputError, match=r"model\.pt"):
+        runs.load(tmp_path / "model.pt")
+    raw = (trained / "model.pt").read_bytes()
+    (tmp_path / "cut.pt").write_bytes(raw[: len(raw) // 2])
+    with pytest.raises(InputError, match=r"cut\.pt"):
+        runs.load(tmp_path / "cut.pt")
+    state["weights"] = {key: value + 1 if value.ndim == 2 else value for key, value in state["weights"].items()}
+    content = torch.load(trained / "model.pt", weights_only=True)
+    torch.save({**content, "state": state}, tmp_path / "changed.pt")
+    with pytest.raises(InputError, match=r"changed\.pt: checkpoint is damaged"):
+        runs.load(tmp_path / "changed.pt")
+    checkpoint.save(tmp_path / "empty.pt", name, {"weights": {}})
+    with pytest.raises(InputError, match=r"empty\.pt: not a trained model"):
+        runs.load(tmp_path / "empty.pt")
+
+
+def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path, monkeypatch):
+    """Inverted images, the same keys and labels: another run, though every count is the same."""
+    step = runs.Trainer._step
+
+    def breaking(self, *batch):
+        if self.at.steps == 5:
+            raise Killed
+        step(self, *batch)
+
+    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    settings = with_training(checkpoint_s=0)
+    with pytest.raises(Killed):
+        train(views, tmp_path, settings)
+    monkeypatch.setattr(runs.Trainer, "_step", step)
+    inverted, relabelled = sources(views), sources(views)
+    inverted["train"].images = 255 - inverted["train"].images
+    facts = relabelled["validation"].facts
+    relabelled["validation"].facts = dataclasses.replace(facts, label=(facts.label + 1) % 4)
+    for found in (inverted, relabelled):
+        with pytest.raises(InputError, match="another run, its samples differ"):
+            runs.train(found, SCHEME, "seen", settings, tmp_path)
+    train(views, tmp_path, settings)
+
+
+def test_a_gpu_s_generator_is_saved_and_taken_up_with_the_processor_s():
+    class Gpu:
+        state = torch.arange(4, dtype=torch.uint8)
+
+        @classmethod
+        def get_rng_state(cls, device):
+            return cls.state.clone()
+
+        @classmethod
+        def set_rng_state(cls, state, device):
+            cls.state = state
+
+    device = torch.device("cuda:1")
+    states = recipe.random_state(device, Gpu)
+    drawn, Gpu.state = torch.rand(3), torch.zeros(4, dtype=torch.uint8)
+    recipe.set_random_state(device, states, Gpu)
+    assert torch.equal(torch.rand(3), drawn) and Gpu.state.tolist() == [0, 1, 2, 3]
+    assert set(recipe.random_state(torch.device("cpu"))) == {"cpu"}
+    with pytest.raises(InputError, match="this training runs on cpu"):
+        recipe.set_random_state(torch.device("cpu"), states)
