@@ -87,10 +87,11 @@ test-slow: $(TESTING)  ## the slow checks
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
-lint: $(TESTING)  ## ruff, snakefmt, snakemake --lint
+lint: $(TESTING)  ## ruff, snakefmt, mypy, snakemake --lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/python -m mypy
 	$(BIN)/snakemake --lint
 
 format: $(TESTING)

@@ -65,6 +65,11 @@ def test_bad_input_is_refused(signal, snr_db):
         add_noise(np.array(signal), snr_db, np.random.default_rng(1))
 
 
+def test_noise_without_a_generator_is_refused():
+    with pytest.raises(InputError, match=r"no generator for an SNR of 3 dB"):
+        add_noise(np.ones(4), 3, None)
+
+
 def test_streams_do_not_depend_on_what_else_is_there():
     rows = [{"subtype": "crow", "model": 4}, {"subtype": "owl", "model": 9}]
     echoes = np.exp(1j * np.arange(3 * 2 * 40)).reshape(3, 2, 40).astype(np.complex64)

@@ -27,7 +27,7 @@ def _explained(given: argparse.Namespace) -> str:
 
     inputs = os.environ.get("LOWALT_INPUTS")
     return explain_scene(
-        [given.base, *given.scene], given.schema, inputs and Path(inputs), given.sample, given.station,
+        [given.base, *given.scene], given.schema, Path(inputs) if inputs else None, given.sample, given.station,
         not given.no_cost,
     )  # fmt: skip
 

@@ -60,7 +60,7 @@ def _expected(error: jsonschema.ValidationError) -> str:
         "uniqueItems": "every item once",
         "pattern": f"text like {wanted}",
     }
-    return words.get(rule, error.message)
+    return words.get(str(rule), error.message)
 
 
 def faults(config: dict, schema: dict) -> list[str]:

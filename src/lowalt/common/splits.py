@@ -33,7 +33,7 @@ def fold(split: dict, seed: int, subtype: str, model: int, snr_db: float | None 
     if any(not isinstance(share, int) or share < 0 for share in shares) or shares[0] < 1:
         raise InputError(f"split: shares {dict(zip(FOLDS, shares, strict=True))}, expected whole numbers, train >= 1")
     if split["by"] == "motion":
-        keys = (subtype,)
+        keys: tuple[str, ...] = (subtype,)
     elif split["by"] == "sample":
         if snr_db is None:
             raise InputError("split: by 'sample' needs the SNR of the sample")

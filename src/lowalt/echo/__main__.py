@@ -31,7 +31,7 @@ def main(arguments: list[str]) -> None:
     clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
     notes: list[str] | None = [] if given.explain else None
     result = clean_signals(network, given.station, clouds, read_table(given.motion), tolerance, notes)
-    if given.explain:
+    if notes is not None:
         with replacing(given.explain) as temporary:
             temporary.write_text("\n".join(notes))
     for path, found in zip(given.out, result, strict=True):

@@ -1,5 +1,7 @@
 """Clean signals of a chunk: its motion table and clouds seen from several stations."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from lowalt.common.network import Network
@@ -13,7 +15,7 @@ from lowalt.targets.cloud import Cloud, cloud_of
 def clean_signals(
     network: Network,
     names: list[str],
-    clouds: dict[str, Cloud],
+    clouds: Mapping[str, Cloud],
     rows: list[dict],
     tolerance: float | None,
     notes: list[str] | None = None,

@@ -143,7 +143,7 @@ class _Sample:
             return
         quick = subset(self.scene, ~slow.mask)
         rest = quick, layout(quick, self.peak)
-        exact = self.approximation(self.plan(0.0))._replace(cells=self.cells(chosen))
+        exact = self.approximation(self.plan(0.0))._replace(cells=self._kernels(chosen))
         for block in np.array_split(symbols, -(-len(symbols) // pose_series.BLOCK)):
             part = slice(block[0], block[-1] + 1)
             there = self.scene._replace(rotation=self.scene.rotation[part], translation=self.scene.translation[part])
@@ -159,7 +159,7 @@ class _Sample:
 
     def approximation(self, chosen: EchoPlan) -> Approximation:
         """Return everything that stands for a function in the plan chosen."""
-        return Approximation(chosen, array_gains(self.radar), self.cells(chosen), folding())
+        return Approximation(chosen, array_gains(self.radar), self._kernels(chosen), folding())
 
     def compute(
         self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found, points=None, slow=NO_SLOW_POINTS
@@ -184,6 +184,12 @@ class _Sample:
     def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
         """Return the cell kernels as the plan needs them; None where the target is too deep for them."""
         return cell_polynomials(self.radar.subcarriers, round_up(self.size_m * self.radar.cells, 6), chosen.fit)
+
+    def _kernels(self, chosen: EchoPlan) -> CellPolynomials:
+        """The cell kernels of a plan that computes by them: none is chosen for a target that is too deep."""
+        found = self.cells(chosen)
+        assert found is not None
+        return found
 
     def method(self, error: float | None, chosen: EchoPlan, cheap: int, exact: int, general: int) -> Method:
         """Return the record of how the sample was computed."""

@@ -80,7 +80,7 @@ def target(motion: Rigid | np.ndarray, rcs_m2: np.ndarray | float, sample: str =
     and for a negative cross section.
     """
     where = f"{sample}: " if sample else ""
-    if hasattr(motion, "rotation"):
+    if isinstance(motion, Rigid):
         rotation, still = _rotation(motion.rotation, where)
         symbols, parts = rotation.shape[:2]
         translation = _float("motion.translation", motion.translation, (symbols, parts, 3), where)

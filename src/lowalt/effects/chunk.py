@@ -1,5 +1,7 @@
 """Signals of a chunk in a scene with effects: its motion table and clouds seen from one station."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from lowalt.common.progress import reported
@@ -8,7 +10,7 @@ from lowalt.targets.cloud import Cloud, cloud_of
 
 
 def scene_signals(
-    scene: Scene, name: str, clouds: dict[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None,
+    scene: Scene, name: str, clouds: Mapping[str, Cloud], rows: list[dict], occluders: dict[str, dict] | None = None,
     snrs: list[float] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return signals (models, N) complex64 at the station `name` and reference powers (models,) W of the motion table.

@@ -119,7 +119,8 @@ def draw(
     row["pitch_rad"] = row["roll_rad"] = 0.0
     speed = 0.0
     if cloud.like in AIRBORNE:
-        row["z_m"] = rng.uniform(*heights(settings, cloud.subtype, cloud.category, cloud.like))
+        low, high = heights(settings, cloud.subtype, cloud.category, cloud.like)
+        row["z_m"] = rng.uniform(low, high)
         tilt = math.radians(settings["tilt_deg"])
         row["pitch_rad"], row["roll_rad"] = rng.uniform(-tilt, tilt), rng.uniform(-tilt, tilt)
         for axis in "xyz":
@@ -133,7 +134,8 @@ def draw(
     draw_rates(rng, cloud, published, row, speed, settings["cadence"])
     sizes = settings.get("sizes_m", {})
     if cloud.category in sizes:
-        _resize(rng, cloud, *sizes[cloud.category], row)
+        low_m, high_m = sizes[cloud.category]
+        _resize(rng, cloud, low_m, high_m, row)
     elif sizes:
         row[SCALE] = 1.0  # every row of a table has the column
     return {"subtype": cloud.subtype, "category": cloud.category, **row}

@@ -18,7 +18,8 @@ def add_noise(
     The noise power is `power` / 10^(snr_db / 10), by default of mean |signal|^2; give the target's own where the signal
     holds more than its echo. At an SNR of +inf nothing is drawn and the signal comes
     back as it is; a signal of zeros has no power to set noise against and stays zeros.
-    Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, or a negative power.
+    Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative power, or no generator
+    where noise is to be drawn.
     Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.
     """
     signal = np.asarray(signal, dtype=np.complex128)
@@ -33,6 +34,8 @@ def add_noise(
     scale = rms(signal) if power is None else math.sqrt(power)
     if scale == 0:
         return signal.copy()
+    if rng is None:
+        raise InputError(f"noise: no generator for an SNR of {snr_db} dB, expected one below +inf")
     # Half the noise's power is in each part: sqrt(1/2) 10^(-SNR / 20).
     share = math.sqrt(0.5) * float(portable.exp(-snr_db * (portable.LN_10 / 20)))
     real, imaginary = circular(rng.bit_generator.random_raw(2 * signal.size), scale * share)

@@ -57,23 +57,34 @@ def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
 
 
+def _slug(key: str) -> str:
+    """The subtype's file name at the start of a sample's key, {subtype}-{model, six digits}-{SNR}.
+
+    Raises: InputError naming a key of another form.
+    """
+    found = SLUG.match(key)
+    if found is None:
+        raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
+    return found[1]
+
+
 def _subtypes(shards: ShardSet) -> tuple[np.ndarray, list[dict]]:
     """For every sample the number of its subtype, and of each subtype one record."""
-    # A key is {subtype}-{model, six digits}-{SNR}; what stands before the model is the subtype's file name.
-    slugs = [SLUG.match(key.decode())[1] for key in shards.keys.tolist()]
+    slugs = [_slug(key.decode()) for key in shards.keys.tolist()]
     _, first, numbers = np.unique(slugs, return_index=True, return_inverse=True)
     return numbers, [shards.record(int(place)) for place in first]
 
 
 def _counts(shards: ShardSet) -> str:
     """Counts by group and fold, by subtype, and by SNR; sizes of the shards."""
-    places = Counter()
+    places: Counter = Counter()
     for entry in shards.shards:
         places[entry["group"], entry["fold"]] += entry["samples"]
     parts = [_table(("subtypes", "fold", "samples"), [(*place, number) for place, number in sorted(places.items())])]
     numbers, records = _subtypes(shards)
-    rows = zip(records, np.bincount(numbers, minlength=len(records)), strict=True)
-    rows = [(record["category"], record["subtype"], record["group"], count) for record, count in rows]
+    counts = np.bincount(numbers, minlength=len(records))
+    rows = [(record["category"], record["subtype"], record["group"], count)
+            for record, count in zip(records, counts, strict=True)]  # fmt: skip
     parts.append(_table(("category", "subtype", "group", "samples"), sorted(rows)))
     snrs = sorted(Counter(shards.snrs_db.tolist()).items())
     parts.append(_table(("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in snrs]))
@@ -97,7 +108,7 @@ def write_samples(shards: ShardSet, path: Path) -> None:
             row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
             yield (*row, model, f"{snr_db:g}", entry["name"])
 
-    write_csv(path, FIELDS, rows())
+    write_csv(path, tuple(FIELDS), rows())
 
 
 def description(shards: ShardSet) -> str:
@@ -134,7 +145,7 @@ def configs(shards: ShardSet) -> list[dict]:
     """
     present = {(entry["group"], entry["fold"]) for entry in shards.shards}
     hub = {"train": "train", "val": "validation", "test": "test"}
-    result = []
+    result: list[dict] = []
     for protocol in ("seen", "unseen"):
         files: dict[str, list[str]] = {}
         for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):

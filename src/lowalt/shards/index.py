@@ -6,6 +6,7 @@ SHA-256 stay in its shard's table, whose SHA-256 stands in the index: one checks
 
 import hashlib
 import json
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
 from lowalt.common.classes import CATEGORIES
@@ -19,7 +20,7 @@ READABLE = ("lowalt-shards-1", FORMAT)
 
 
 def build(
-    shards: list[str | Path], render: dict, out: str | Path, echo: dict | None = None,
+    shards: Sequence[str | Path], render: dict, out: str | Path, echo: dict | None = None,
     classes: tuple[str, ...] = CATEGORIES,
 ) -> dict:  # fmt: skip
     """Write the index of these shards to `out` and return it.

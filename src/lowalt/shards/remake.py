@@ -22,7 +22,8 @@ class CloudFolder(Mapping):
 
     def __init__(self, folder: str | Path) -> None:
         """Name the folder; nothing is read yet."""
-        self.folder, self._found = Path(folder), {}
+        self.folder = Path(folder)
+        self._found: dict[str, Cloud] = {}
 
     def __getitem__(self, subtype: str) -> Cloud:
         if subtype not in self._found:

@@ -54,7 +54,8 @@ class Writer:
         """Append the members {key}.json and {key}.{extension}, in alphabetical order; return where they stand."""
         if "." in key or "/" in key:
             raise InputError(f"sample key {key!r}: expected no dot and no slash")
-        offset, places, parts = self.size, {}, []
+        offset, places = self.size, {}
+        parts: list[bytes] = []
         for name, content in sorted({"json": record, extension: data}.items()):
             start = offset + sum(map(len, parts)) + BLOCK
             places[name] = (start, len(content))

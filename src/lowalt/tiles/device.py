@@ -5,6 +5,8 @@ compiled kernels, and eager PyTorch rounds after each. Compiling this would let 
 changes the last digit, so it must run eagerly. This is the only module of the stage that needs PyTorch.
 """
 
+import functools
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -73,8 +75,8 @@ class DeviceRenderer:
             return kind.on_device(re, im, settings, self._tables[name], starts)
         values = np.empty((*re.shape[:2], kind.rows(settings), starts), np.float32)
         for number, station in np.ndindex(*re.shape[:2]):
-            parts = (np.ascontiguousarray(part[number, station].cpu().numpy()) for part in (re, im))
-            kind.fill(*parts, settings, self.renderer.tables(name)[station], values[number, station])
+            first, second = (np.ascontiguousarray(part[number, station].cpu().numpy()) for part in (re, im))
+            kind.fill(first, second, settings, self.renderer.tables(name)[station], values[number, station])
         return self._put(values)
 
     def _resampled(self, values: Tensor, name: str) -> Tensor:
@@ -94,11 +96,9 @@ class DeviceRenderer:
 
     @staticmethod
     def _along(values: Tensor, columns: Tensor, shares: Tensor) -> Tensor:
-        result = None
-        for tap in range(0, columns.shape[0], 2):
-            pair = shares[tap] * values[..., columns[tap]] + shares[tap + 1] * values[..., columns[tap + 1]]
-            result = pair if result is None else result + pair
-        return result
+        pairs = (shares[tap] * values[..., columns[tap]] + shares[tap + 1] * values[..., columns[tap + 1]]
+                 for tap in range(0, columns.shape[0], 2))  # fmt: skip
+        return functools.reduce(torch.add, pairs)
 
     def _index(self, values: Tensor, name: str) -> Tensor:
         largest = values.abs().amax(dim=(-2, -1), keepdim=True)

@@ -47,6 +47,7 @@ def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
         # changes in it does not depend on the data.
         header = npy_header("|u1", (offsets[-1],))
         info.CRC ^= _crc_behind(blank, offsets[-1]) ^ _crc_behind(header, offsets[-1])
+        assert archive.fp is not None  # open until the block ends
         archive.fp.seek(info.header_offset)
         archive.fp.write(info.FileHeader(zip64=True) + header)
         table = np.array(offsets, "<i8")

@@ -27,7 +27,7 @@ class Symbols(NamedTuple):
     """The symbols to compute: index (B,) of each in the sample, and the rows of its tables: reference ranges (B, 7),
     extents (B, 5), and the segments (S, 6) that B symbols fall into."""
 
-    index: np.ndarray
+    index: np.ndarray  # type: ignore[assignment]  # a tuple's own method of this name is not used
     refs: np.ndarray
     extents: np.ndarray
     segments: np.ndarray

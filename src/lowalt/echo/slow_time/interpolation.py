@@ -64,7 +64,7 @@ def interpolated(
     amplitude of a point of 1 m2 at 1 m at the arrays' peak gain.
     """
     table = exact.cells
-    count, points = len(refs), np.count_nonzero(slow.mask)
+    count, points = len(refs), int(np.count_nonzero(slow.mask))
     top = count - -(-pose_series.INTERPOLATION_COST // points)
     if top < 4:
         return None
