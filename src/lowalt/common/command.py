@@ -9,7 +9,7 @@ import json
 import resource
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from lowalt.common.errors import InputError, InputWarning
@@ -62,7 +62,7 @@ def pick(block: dict, *keys: str) -> list:
     return [block[key] for key in keys]
 
 
-def dispatch(module: str, commands: dict[str, Callable[[list[str]], None]], arguments: list[str]) -> None:
+def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], arguments: list[str]) -> None:
     """Run the command that the first argument names, on the other arguments.
 
     Raises: InputError naming the module's commands where the first argument is none of them.

@@ -4,7 +4,6 @@ Rigid parts are the better form: no array of symbols x points ever exists, and s
 """
 
 import math
-from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
@@ -39,8 +38,16 @@ class Target(NamedTuple):
     rcs_m2: np.ndarray
 
 
-EchoScene = namedtuple("EchoScene", [*Target._fields, "aim"])
-"""Checked input of the kernels: a `Target`'s fields, and where the beams point, (3,) m."""
+class EchoScene(NamedTuple):
+    """Checked input of the kernels: a `Target`'s fields, written out for type checkers, and where the beams point."""
+
+    rotation: np.ndarray
+    translation: np.ndarray
+    points: np.ndarray
+    part: np.ndarray
+    root_rcs: np.ndarray
+    rcs_m2: np.ndarray
+    aim: np.ndarray
 
 
 def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.ndarray:
