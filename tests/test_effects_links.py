@@ -12,13 +12,15 @@ from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, Station, masts_m
 from lowalt.echo import echo_signal
+from lowalt.echo.pointwise.reference_range import reference
+from lowalt.echo.radar import radar
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import direct_path
 from lowalt.effects.checks import check
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.receiver import link_offset
-from lowalt.effects.response import response
+from lowalt.effects.response import _range_sum, response
 from lowalt.shards.record import geometry
 from test_effects import network, target
 
@@ -65,13 +67,25 @@ def test_a_links_response_is_the_product_of_both_ways_summed_over_points(squint,
     assert abs(found - truth).max() < 1e-11 * abs(truth).max()
 
 
-def test_a_link_back_to_its_own_place_is_the_station_itself():
+@pytest.mark.parametrize("squint, wavefront", [(False, False), (True, True)])
+@pytest.mark.parametrize("receive", [(4, 2), (3, 1)])
+def test_a_link_back_to_its_own_place_is_the_station_itself_to_the_last_bit(receive, squint, wavefront):
     rng = np.random.default_rng(2)
-    radio = linked(transmit=(4, 2), receive=(4, 2), symbols=5)
+    radio = linked(transmit=(4, 2), receive=receive, symbols=5)
     aim = np.array([50.0, 40.0, 20.0])
     places = aim + rng.normal(size=(5, 7, 3))
-    own = response(radio, A, places, np.ones(7), aim)
-    assert abs(response(radio, link(A, A), places, np.ones(7), aim) - own).max() < 1e-13 * abs(own).max()
+    own, back = (
+        response(radio, end, places, np.ones(7), aim, squint=squint, wavefront=wavefront) for end in (A, link(A, A))
+    )
+    assert (own == back).all()
+
+
+def test_a_links_range_sum_is_carried_and_off_by_rounding_alone():
+    rng = np.random.default_rng(5)
+    origin = np.array([50.0, 40.0, 20.0]) + 10 ** rng.uniform(0, 4, (5000, 1)) * rng.normal(size=(5000, 3))
+    whole, found = reference(origin, radar(linked(), A)), _range_sum(linked(), link(A, A), origin)
+    assert (found[:, 5] == whole[:, 5]).all() and abs(found[:, [4, 6]]).max() <= 0.5
+    assert abs(found[:, [4, 6]] - whole[:, [4, 6]]).max() <= 2.0**-53
 
 
 def test_both_directions_of_a_link_are_alike_at_one_frequency():

@@ -14,7 +14,7 @@ from scipy.special import factorial, jv
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo.pointwise.reference_range import reference
+from lowalt.echo.pointwise.reference_range import CELL, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
 from lowalt.effects import interpolation, moment_loops, response_loops
@@ -78,7 +78,8 @@ class Rays:
         sending = chosen
         if station.transmitter is not None:
             sending, _ = _end(network, station.transmitter, seen, aim_m)
-            self.refs = _one_way(network, station, places[:, 0]) + _one_way(network, station.transmitter, places[:, 0])
+            if station.transmitter.position_m != station.position_m:
+                self.refs = _range_sum(network, station, places[:, 0])
         # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
         # tables. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
         self.nodes = kappas = _frequencies(network, radio, squint, error / 2)
@@ -140,6 +141,19 @@ def _end(network: Network, station: Station, paths: Sequence[ImagePath], aim_m: 
     refs = reference(origin, radio)
     aims = aim_cosines(np.asarray(aim_m, np.float64), radio.station, radio.sine, radio.cosine)
     return [_PathFactors(network, station.name, radio, refs, origin, aims, path) for path in paths], refs
+
+
+def _range_sum(network: Network, station: Station, origin: np.ndarray) -> np.ndarray:
+    """Reference ranges of a link: both ways added, whole turns and range cells carried.
+
+    Each way's fraction is rounded before the sum, which is off by at most 2^-53 of a turn.
+    """
+    table = _one_way(network, station, origin) + _one_way(network, station.transmitter, origin)
+    carried = np.rint(table[:, REST])
+    table[:, TURN] -= np.rint(table[:, TURN])
+    table[:, CELL] += carried
+    table[:, REST] -= carried
+    return table
 
 
 def _one_way(network: Network, station: Station, origin: np.ndarray) -> np.ndarray:
