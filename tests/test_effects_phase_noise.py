@@ -53,7 +53,7 @@ def test_the_default_spectrum_is_that_of_the_3gpp_model():
 def test_covariance_inside_a_symbol_is_the_integral_of_the_spectrum(points, delay_s):
     """Structure function D(t) = 2 int S (1 - cos 2 pi f t): the sum of the split's two parts."""
     at = _oscillator.grid(*LOOK)
-    lags = _oscillator.covariance(points, at, delay_s)
+    lags = _oscillator.covariance(points, LOOK, delay_s)
     slow = _oscillator.density(points, at.slow_hz) * at.slow_weight
     if delay_s is not None:
         slow = slow * 4 * np.sin(np.pi * at.slow_hz * delay_s) ** 2
@@ -172,7 +172,7 @@ def test_no_spectrum_breaks_the_synthesis(pairs, delay_s):
 )
 def test_odd_looks_have_the_right_variance(look):
     at = _oscillator.grid(*look)
-    total = _oscillator.covariance(FLAT, at, None)[0] + 2 * np.sum(
+    total = _oscillator.covariance(FLAT, look, None)[0] + 2 * np.sum(
         _oscillator.density(FLAT, at.slow_hz) * at.slow_weight
     )
     # White to half the sample rate, except for the missing line at zero.

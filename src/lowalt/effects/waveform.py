@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from lowalt.common.network import Network, Station
+from lowalt.effects.phasors import phasors
 
 QPSK = np.exp(1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
 """The four data symbols, of unit modulus."""
@@ -53,10 +54,10 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 
 
 def turned(angle_rad: np.ndarray) -> np.ndarray:
-    """Return exp(j angle), in about half the time of the complex exponential."""
-    result = np.empty(np.shape(angle_rad), np.complex128)
-    np.cos(angle_rad, out=result.real)
-    np.sin(angle_rad, out=result.imag)
+    """Return exp(j angle) to rounding, angles of any shape, in about a tenth of the complex exponential's time."""
+    angle = np.ascontiguousarray(angle_rad, np.float64)
+    result = np.empty(angle.shape, np.complex128)
+    phasors(angle.reshape(-1), result.reshape(-1))
     return result
 
 

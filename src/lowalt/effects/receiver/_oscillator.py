@@ -104,13 +104,21 @@ def correlated(frequency_hz: np.ndarray, width_hz: np.ndarray | float, delay_s: 
     return plain * share + 2 * (1 - share)
 
 
-def covariance(points: tuple, at: Grid, delay_s: float | None) -> np.ndarray:
-    """Return the covariance (M,) in rad^2 of the fast part at lags 0 .. M - 1 samples."""
-    subcarriers = at.low_cosine.shape[1]
-    low = density(points, at.low_hz) * correlated(at.low_hz, at.low_width, delay_s) * at.low_weight
-    high = density(points, at.high_hz) * correlated(at.high_hz, at.high_hz[0], delay_s) * at.high_weight
+@lru_cache(maxsize=4)
+def _weighted(points: tuple, at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
+    """The density at the fast part's nodes, low and high, times their weights."""
+    at = grid(*at_key)
+    return density(points, at.low_hz) * at.low_weight, density(points, at.high_hz) * at.high_weight
+
+
+def covariance(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
+    """Return the covariance (M,) in rad^2 of the fast part at lags 0 .. M - 1 samples; `at_key` as in `slow_phase`."""
+    at = grid(*at_key)
+    low, high = _weighted(points, at_key)
+    low = low * correlated(at.low_hz, at.low_width, delay_s)
+    high = high * correlated(at.high_hz, at.high_hz[0], delay_s)
     period = 2 * len(high)
-    return low @ at.low_cosine + period * np.fft.irfft(np.append(0.0, high), period)[:subcarriers]
+    return low @ at.low_cosine + period * np.fft.irfft(np.append(0.0, high), period)[: at.low_cosine.shape[1]]
 
 
 @lru_cache(maxsize=2)
@@ -129,7 +137,7 @@ def _twist(at_key: tuple) -> np.ndarray:
 @lru_cache(maxsize=4)
 def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | None:
     """Lower Cholesky root (M, M) of the fast part's covariance, None where there is no fast part."""
-    lags = covariance(points, grid(*at_key), delay_s)
+    lags = covariance(points, at_key, delay_s)
     if lags[0] <= 0:
         return None
     index = np.arange(len(lags))

@@ -4,7 +4,6 @@ Sample instants shrink within a symbol, and the window slips from symbol to symb
 """
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
@@ -21,6 +20,9 @@ DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
 
 MOST_SUBCARRIERS = 100_000
 """The largest number of subcarriers the configuration allows."""
+
+ROUNDING = 1e-16
+"""Largest share of a sample that the series of the stretch leaves out."""
 
 
 def idle(settings: dict) -> bool:
@@ -72,10 +74,29 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     rate = fast(settings, frame, rng)
     early = -rate / (1 + rate)
-    tones = np.fft.fft(samples, axis=1) / samples.shape[1]
-    baseband = np.fft.ifftshift(frame.baseband_hz)
-    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones))
-    return tones @ (_roots(len(baseband)) * _turns(early * frame.sample_s * baseband, len(baseband)).T)
+    count, baseband = samples.shape[1], np.fft.ifftshift(frame.baseband_hz)
+    tones = np.fft.fft(samples, axis=1)
+    middle = count // 2
+    at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
+    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones)) * at_middle
+    return _stretched(tones, 2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle)
+
+
+def _stretched(tones: np.ndarray, rates: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The inverse transform of tones (N, M) times exp(j rates[m] places[i]) at sample i, by the exponential's series.
+
+    The terms left out are below rounding; each term is an inverse transform of its own.
+    """
+    reach = float(abs(rates).max() * abs(places).max())
+    result, order, term = np.fft.ifft(tones, axis=1), 1, reach
+    column = np.ones(len(places), np.complex128)
+    while term * math.exp(reach) > ROUNDING:
+        tones *= rates
+        column = column * (1j * places / order)
+        result += np.fft.ifft(tones, axis=1) * column
+        order += 1
+        term *= reach / order
+    return result
 
 
 def _turns(turns: np.ndarray, count: int) -> np.ndarray:
@@ -84,10 +105,3 @@ def _turns(turns: np.ndarray, count: int) -> np.ndarray:
     fine = turned(2 * np.pi * np.outer(np.arange(step), turns))
     coarse = turned(2 * np.pi * np.outer(np.arange(0, count, step), turns))
     return (coarse[:, None] * fine).reshape(-1, len(turns))[:count]
-
-
-@lru_cache(maxsize=4)
-def _roots(count: int) -> np.ndarray:
-    """The inverse transform's roots of unity (M, M): the part of every instant that no clock error moves."""
-    index = np.arange(count)
-    return turned(2 * np.pi / count * (np.outer(index, index) % count))

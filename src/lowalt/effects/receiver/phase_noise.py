@@ -3,6 +3,7 @@
 The slow part turns whole symbols (common phase error, seen in Doppler); the fast part leaks between subcarriers.
 """
 
+from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -58,13 +59,19 @@ def disciplined(settings: dict) -> tuple[tuple[float, float], ...]:
     that slow wander is the reference's. Free-running (loop_hz 0), the given points alone. Source: Gardner 2005.
     """
     own = tuple((float(offset), float(level) + settings["level_db"]) for offset, level in settings["points"])
-    if settings["loop_hz"] == 0:
-        return own
     reference = tuple((float(offset), float(level)) for offset, level in settings["reference"])
+    return _locked(own, reference, float(settings["loop_hz"]))
+
+
+@lru_cache(maxsize=8)
+def _locked(own: tuple, reference: tuple, loop_hz: float) -> tuple[tuple[float, float], ...]:
+    """The spectrum of the oscillator `own` locked to `reference` by a loop, the same for all samples of a scene."""
+    if loop_hz == 0:
+        return own
     ends = [offset for offset, _ in own + reference]
-    between = np.geomspace(min(ends), 100.0 * settings["loop_hz"], 240)
+    between = np.geomspace(min(ends), 100.0 * loop_hz, 240)
     offsets = np.unique([*(offset for offset, _ in own), *between[between < max(*ends, between[0])]])
-    follows = 1.0 / (1.0 + (offsets / settings["loop_hz"]) ** 4)
+    follows = 1.0 / (1.0 + (offsets / loop_hz) ** 4)
     total = follows * _oscillator.density(reference, offsets) + (1.0 - follows) * _oscillator.density(own, offsets)
     return tuple(zip(offsets.tolist(), (10 * np.log10(total)).tolist(), strict=True))
 
