@@ -107,6 +107,7 @@ format: $(TESTING)
 bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(SNAKEMAKE) -- data
 	$(BIN)/python benchmarks/echo.py --clouds results/default/clouds/*.npz
+	$(BIN)/python benchmarks/rounding.py --out results/benchmarks/rounding.csv
 	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
 	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
 	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv

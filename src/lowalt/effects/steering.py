@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lowalt.echo.pointwise.terms import aim_cosines
-from lowalt.echo.radar import radar
+from lowalt.echo.radar import constants, radar
 from lowalt.effects.response import ImagePath, Rays
 from lowalt.effects.view import View
 
@@ -58,5 +58,6 @@ def _kept_phase(view: View, aim_m: np.ndarray) -> complex:
     (h0, v0), (h1, v1) = (
         aim_cosines(np.asarray(aim, np.float64), radio.station, radio.sine, radio.cosine) for aim in (view.aim_m, aim_m)
     )
-    turns = radio.exact.phase_h[0] * (h1 - h0) + radio.exact.phase_v[0] * (v1 - v0)
+    exact = constants(radio.exact)
+    turns = exact.phase_h[0] * (h1 - h0) + exact.phase_v[0] * (v1 - v0)
     return np.exp(2j * np.pi * turns)

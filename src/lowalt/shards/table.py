@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.archives import write_arrays
 from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing
@@ -44,7 +45,7 @@ def table_path(shard: str | Path) -> Path:
 def write(path: str | Path, header: dict, samples: np.ndarray) -> None:
     """Write header and rows; equal content, equal bytes."""
     with replacing(path) as temporary:
-        np.savez(temporary, header=np.array(json.dumps(header, sort_keys=True)), samples=samples)
+        write_arrays(temporary, {"header": np.array(json.dumps(header, sort_keys=True)), "samples": samples})
 
 
 def read_header(path: str | Path) -> dict:

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common import classes
+from lowalt.common.archives import write_arrays
 from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
@@ -212,13 +213,12 @@ def write(path: str | Path, cloud: Cloud) -> None:
     """
     check(cloud, str(path))
     with replacing(path) as temporary:
-        np.savez(
-            temporary,
+        write_arrays(temporary, dict(
             points=cloud.points, normals=cloud.normals, rcs_m2=cloud.rcs_m2, part=cloud.part.astype(np.int64),
             kinds=np.array(cloud.kinds), names=np.array(cloud.names), parents=cloud.parents.astype(np.int64),
             hinges=cloud.hinges, axes=cloud.axes, track=cloud.track,
             record=np.array(json.dumps(cloud.record, sort_keys=True)),
-        )  # fmt: skip
+        ))  # fmt: skip
 
 
 def read(path: str | Path) -> Cloud:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.archives import write_arrays
 from lowalt.common.array_files import UNREADABLE
 from lowalt.common.classes import like
 from lowalt.common.command import parser, pick, run
@@ -139,7 +140,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
 def write(path: str | Path, arrays: dict[str, np.ndarray], subtype: str) -> None:
     """Write the arrays and the subtype they belong to; equal arrays give equal bytes."""
     with replacing(path) as temporary:
-        np.savez(temporary, **{name: arrays[name] for name in ARRAYS}, subtype=np.array(json.dumps(subtype)))
+        write_arrays(temporary, {**{name: arrays[name] for name in ARRAYS}, "subtype": np.array(json.dumps(subtype))})
 
 
 def read(path: str | Path) -> dict:

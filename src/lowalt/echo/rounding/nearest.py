@@ -14,6 +14,7 @@ from lowalt.echo.fast.layout import Layout
 from lowalt.echo.fast.workspace import Found
 from lowalt.echo.pointwise import sums as pointwise
 from lowalt.echo.radar import Radar
+from lowalt.echo.rounding import double
 from lowalt.echo.rounding.sums import ROWS, cell_value
 from lowalt.echo.scene import EchoScene
 
@@ -30,17 +31,19 @@ def same_single(x, error):
 
 @LEAN
 def doubtful(values, bounds, totals, gaps, out):
-    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds leave open; returns how many.
+    """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds leave open.
 
-    A symbol all of whose amplitudes are zero is zero exactly.
+    Returns how many these are, and how many of them lack a proved strongest cell. A symbol all of whose amplitudes are
+    zero is zero exactly.
     """
-    count = 0
+    count, unproved = 0, 0
     for n in range(len(values)):
         decided = same_single(values[n].real, bounds[n]) and same_single(values[n].imag, bounds[n])
         if totals[n] > 0.0 and not (decided and gaps[n] > 0.0):
             out[count] = n
             count += 1
-    return count
+            unproved += not gaps[n] > 0.0
+    return count, unproved
 
 
 @INLINED
@@ -60,18 +63,25 @@ def to_odd(high, low, bits):
 
 @LEAN
 def compute_again(scene, lay, radar, symbols, found, work, bits):
-    """Replace the values of `symbols` (K,) in their strongest cells by those of double-double sums.
+    """Replace the values of `symbols` (K,) in their strongest cells by closer ones.
 
-    work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns in how many the error of these
-    sums still leaves the nearest complex64 open.
+    First sums in double of phases in double-double, and where their bound leaves the nearest complex64 open, all in
+    double-double. work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns how many asked for the second, and
+    in how many its error still leaves the nearest complex64 open.
     """
-    still = 0
+    twice, still = 0, 0
+    share = double.share(len(lay.root))
     for n in symbols:
+        x, y = double.cell_value(scene, lay, radar, n, found.cells[n], work)
+        if same_single(x, share * found.totals[n]) and same_single(y, share * found.totals[n]):
+            found.values[n] = complex(x, y)
+            continue
+        twice += 1
         real, imag = cell_value(scene, lay, radar, n, found.cells[n], work)
         error = ERROR * found.totals[n]
         still += not (same_double(real, error) and same_double(imag, error))
         found.values[n] = complex(to_odd(real[0], real[1], bits), to_odd(imag[0], imag[1], bits))
-    return still
+    return twice, still
 
 
 @INLINED
@@ -83,18 +93,20 @@ def same_double(x, error):
 def correct(
     scene: EchoScene, lay: Layout, radar: Radar, refs: np.ndarray,
     aims: tuple[float, float], found: Found, pointwise_bound: tuple[float, float],
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int, int]:  # fmt: skip
     """Make every value of `found` round to the complex64 nearest to the true value, in the truly strongest cell.
 
-    Returns how many symbols were computed again, and how many of them double-double leaves open. Cells whose strengths
+    Returns how many symbols were computed again, how many of them in double-double throughout, and how many that leaves
+    open. Cells whose strengths
     differ by less than its error count as equal: the lowest index wins.
     """
     open_ones = np.empty(len(refs), np.int64)
-    open_ones = open_ones[: doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)]
-    if not len(open_ones):
-        return 0, 0
+    count, unproved = doubtful(found.values, found.bounds, found.totals, found.gaps, open_ones)
+    if not count:
+        return 0, 0, 0
+    open_ones = open_ones[:count]
     work, bits = np.empty((ROWS, len(lay.root) + 4)), np.empty(1, np.int64)
-    for n in open_ones[found.gaps[open_ones] <= 0.0]:
+    for n in open_ones[found.gaps[open_ones] <= 0.0] if unproved else ():
         cells = _contenders(scene, radar, refs, aims, found, int(n), pointwise_bound)
         if len(cells) > 1:
             pairs = [cell_value(scene, lay, radar, n, cell, work) for cell in cells]
@@ -102,7 +114,7 @@ def correct(
             least = max(strengths) - 4 * Fraction(ERROR * found.totals[n]) * Fraction(abs(found.values[n]))
             cells = [cell for cell, strength in zip(cells, strengths, strict=True) if strength >= least]
         found.cells[n] = min(cells)
-    return len(open_ones), compute_again(scene, lay, radar, open_ones, found, work, bits)
+    return len(open_ones), *compute_again(scene, lay, radar, open_ones, found, work, bits)
 
 
 def _contenders(scene, radar, refs, aims, found: Found, n: int, pointwise_bound) -> list[int]:

@@ -9,6 +9,9 @@ import numpy as np
 from lowalt.common.exact.arithmetic import add, divide, multiply, product, root, subtract, two_sum
 from lowalt.common.exact.sines import dirichlet, sine_cosine
 from lowalt.common.jit import INLINED, LEAN
+from lowalt.echo.radar import constants
+
+constants_of = INLINED(constants)
 
 X, Y, Z, SIDE, UP, TURN, CELL, AMPLITUDE = range(0, 16, 2)
 """Rows of the work array (16, points), the low half in the row that follows: vector from the station (m), half turns of
@@ -90,6 +93,23 @@ def wave(work, points):
         work[12, i], work[13, i] = multiply(a, s)
 
 
+@INLINED
+def phase_of(cell, count):
+    """Return sine and cosine of a cell's own phase, exp(j pi (M - 1) m / M), reduced in whole numbers."""
+    return sine_cosine(divide((float((count - 1) * cell % (2 * count)), 0.0), (2.0 * count, 0.0)))
+
+
+@LEAN
+def seen(scene, lay, radar, n, cell, work):
+    """Fill rows X to AMPLITUDE with how the station sees all points at symbol n; cell: the range cell's index."""
+    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
+    z = two_sum(scene.aim[2], -radar.station[2])
+    exact = constants_of(radar.exact)
+    _, _, psi0, omega0 = cosines(x, y, z, exact)
+    place(scene, lay, radar.station, n, work)
+    geometry(work, lay.root, lay.rcs, exact, (psi0, omega0), float(cell), float(radar.subcarriers))
+
+
 @LEAN
 def cell_value(scene, lay, radar, n, cell, work):
     """Return the real and imaginary part, double-doubles, of range cell `cell` at symbol n.
@@ -97,13 +117,8 @@ def cell_value(scene, lay, radar, n, cell, work):
     radar: `radar.Radar`, of which whole numbers, the station's position and the double-doubles are used; work (ROWS,
     padded L + 4): work array. No point may stand in the station.
     """
-    constants = radar.exact
     points, count = len(lay.root), float(radar.subcarriers)
-    x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])
-    z = two_sum(scene.aim[2], -radar.station[2])
-    _, _, psi0, omega0 = cosines(x, y, z, constants)
-    place(scene, lay, radar.station, n, work)
-    geometry(work, lay.root, lay.rcs, constants, (psi0, omega0), float(cell), count)
+    seen(scene, lay, radar, n, cell, work)
     for row, transmit, receive in (
         (6, radar.transmit_h, radar.receive_h),
         (8, radar.transmit_v, radar.receive_v),
@@ -116,9 +131,7 @@ def cell_value(scene, lay, radar, n, cell, work):
     real, imag = (0.0, 0.0), (0.0, 0.0)
     for i in range(points):
         real, imag = add(real, (work[10, i], work[11, i])), add(imag, (work[12, i], work[13, i]))
-    factor = divide(constants.scale, (count, 0.0))
+    factor = divide(constants_of(radar.exact).scale, (count, 0.0))
     real, imag = multiply(real, factor), multiply(imag, factor)
-    # The cell's own phase, exp(j pi (M - 1) m / M), reduced in whole numbers.
-    whole = (radar.subcarriers - 1) * cell % (2 * radar.subcarriers)
-    s, c = sine_cosine(divide((float(whole), 0.0), (2.0 * count, 0.0)))
+    s, c = phase_of(cell, radar.subcarriers)
     return subtract(multiply(real, c), multiply(imag, s)), add(multiply(real, s), multiply(imag, c))
