@@ -19,7 +19,7 @@ from lowalt.echo import echo_signal, method_text
 from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
-from lowalt.effects.levels import dbm, levels, table
+from lowalt.effects.levels import levels, table
 from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
 from lowalt.effects.view import View
 from lowalt.motion.sample import draw, region_polygon
@@ -125,11 +125,13 @@ def link_lines(scene: Scene, view: View, sample: Sample) -> list[str]:
     out, back = (float(np.linalg.norm(one)) for one in ends)
     angle = math.acos(float(np.clip(ends[0] @ ends[1] / (out * back), -1.0, 1.0)))
     power = received_signal(scene, station, sample.cloud, sample.row, sample.occluders).power
+    named = {effect.name: effect for effect in scene.effects}
     return [
         f"{sample.row['subtype']}, model {sample.row['model']}, link {station.name}: {out:.0f} m and {back:.0f} m",
         f"  bistatic angle {math.degrees(angle):.0f} degrees: Doppler is {math.cos(angle / 2):.2f} of 2 v / lambda "
         "along the bisector; all physics named is computed",
-        f"  echo of this sample, mean |Y_bin|^2: {dbm(power):.1f} dBm",
+        f"  {prefix_line(scene, 0.5 * (out + back))}",
+        *(f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, power)))),
     ]
 
 

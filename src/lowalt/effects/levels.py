@@ -38,21 +38,25 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     Source: radar equation, spec: alpha and a0; Skolnik, Introduction to Radar Systems, 3rd ed. 2001, ch. 1.
     """
     network, station = view.network, view.station
-    range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
+    sender = station.transmitter or station
+    out, back = (float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in (sender, station))
+    range_m = 0.5 * (out + back)
     wavelength = SPEED_OF_LIGHT / network.carrier_hz
     sent = dbm(network.power)
     arrays = [10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive)]
-    element = 0.0 if view.element is None else 10 * math.log10(float(antenna.gain(view.element, station, view.aim_m)))
-    path = 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * range_m**4))
+    path = 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * out**2 * back**2))
     section = 10 * math.log10(float(view.cloud.rcs_m2.sum()))
-    expected = sent + sum(arrays) + 2 * element + path + section
+    elements = _elements(view)
+    both = 2 * elements[0].value if len(elements) == 1 else sum(level.value for level in elements)
+    expected = sent + sum(arrays) + both + path + section
+    ways = f"path out and back, {out:.1f} m, 1 m2" if sender is station else f"path, {out:.1f} m and {back:.1f} m, 1 m2"
     result = [
         Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm"),
         Level("transmit power, one subcarrier", sent, "dBm"),
         Level("transmit array", arrays[0], "dB"),
         Level("receive array", arrays[1], "dB"),
-        Level("element toward the target, each way", element, "dBi"),
-        Level(f"path out and back, {range_m:.1f} m, 1 m2", path, "dB"),
+        *elements,
+        Level(ways, path, "dB"),
         Level("mean cross section", section, "dBsm"),
         Level("expected echo", expected, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
@@ -65,6 +69,9 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
         result.append(Level("loss beyond the cyclic prefix", kept, "dB"))
     if "clutter" in effects:
         result += _clutter(view, effects["clutter"], range_m)
+    if sender is not station and "direct_path" in effects:
+        direct = effects["direct_path"].module.scatter(effects["direct_path"].settings, view, None)
+        result.append(Level("direct path, one subcarrier", dbm(float(np.mean(abs(direct) ** 2))), "dBm"))
     if "transmit_leakage" in effects:
         leaked = sent - effects["transmit_leakage"].settings["isolation_db"]
         result.append(Level("transmit leakage, one subcarrier", leaked, "dBm"))
@@ -77,6 +84,18 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
             Level("noise, one range cell", cell, "dBm"),
             Level("expected echo over noise, in a range cell", expected - cell, "dB"),
         ]
+    return result
+
+
+def _elements(view: View) -> list[Level]:
+    """The elements' gain toward the target: of a station, or of both ends of a link."""
+    ends = {"toward the target, each way": view.station}
+    if view.station.transmitter is not None:
+        ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
+    result = []
+    for name, end in ends.items():
+        gain = 1.0 if view.element is None else float(antenna.gain(view.element, end, view.aim_m))
+        result.append(Level(f"element {name}", 10 * math.log10(gain), "dBi"))
     return result
 
 

@@ -1,0 +1,74 @@
+"""Every shipped scene's levels: the kept table is the code's and follows by hand; explain says the cyclic prefix."""
+
+import csv
+import sys
+from math import log10, pi
+from pathlib import Path
+
+import pytest
+
+from lowalt.effects.explain import explain_scene
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import scene_levels  # noqa: E402
+
+SCENES = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml"))
+
+QUICK = "links", "rural"
+"""Scenes that `explain` is asked about in every run of the tests."""
+
+
+def kept(scene: str) -> dict[str, float]:
+    """The kept table's levels of a scene."""
+    with (ROOT / "results/benchmarks/scene_levels.csv").open() as file:
+        return {row["level"]: float(row["value"]) for row in csv.DictReader(file) if row["scene"] == scene}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_kept_levels_of_a_scene_are_the_codes(name):
+    _, found = scene_levels.scene_levels(ROOT, name)
+    table = kept(name)
+    assert list(table) == [level.name for level in found]
+    for level in found:
+        assert table[level.name] == pytest.approx(level.value, abs=0.051), level.name
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_kept_levels_of_a_scene_follow_by_hand(name):
+    table, link = kept(name), name == "links"
+    out, back = (415.6, 407.1) if link else (415.6, 415.6)
+    noise_figure = 9.0 if name == "worst" else 7.0
+    path = next(value for level, value in table.items() if level.startswith("path"))
+    element = sum(value for level, value in table.items() if level.startswith("element")) * (1 if link else 2)
+    # The wave is 299792458 / 4.9e9 = 0.0611821 m long; arrays are of 16 x 4 elements; 1 W a subcarrier.
+    assert path == pytest.approx(20 * log10(0.0611821) - 30 * log10(4 * pi) - 20 * log10(out * back), abs=0.06)
+    assert table["transmit power, 256 subcarriers"] == pytest.approx(30.0 + 24.08, abs=0.06)
+    assert table["transmit array"] == table["receive array"] == pytest.approx(10 * log10(64), abs=0.06)
+    section = 10 * log10(400) if name in ("paper", "detection") else -12.81 + 11.56 * log10(0.311 / 0.4)
+    assert table["mean cross section"] == pytest.approx(section, abs=0.06)
+    assert table["expected echo"] == pytest.approx(30.0 + 2 * 18.06 + element + path + section, abs=0.2)
+    if "noise, one subcarrier" in table:
+        noise = -228.6 + 10 * log10(290) + 30 + 10 * log10(120e3) + noise_figure
+        assert table["noise, one subcarrier"] == pytest.approx(noise, abs=0.06)
+        assert table["noise, one range cell"] == pytest.approx(noise - 24.08, abs=0.06)
+    if "transmit leakage, one subcarrier" in table:
+        assert table["transmit leakage, one subcarrier"] == 30.0 - 100.0
+    if "loss beyond the cyclic prefix" in table:
+        lost = 2 * 415.6 / 299.792458 - 0.586
+        assert table["loss beyond the cyclic prefix"] == pytest.approx(20 * log10(1 - lost * 0.12), abs=0.06)
+
+
+@pytest.mark.parametrize(
+    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
+)
+def test_explain_says_the_cyclic_prefix_and_the_levels_of_every_scene(name, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    paths = [ROOT / "config/default.yaml", ROOT / f"config/scenes/{name}.yaml"]
+    station = "A-B" if name == "links" else "A"
+    text = explain_scene(
+        paths, ROOT / "workflow/schemas/config.schema.yaml", None, [scene_levels.SAMPLE], station, False
+    )
+    assert "cyclic prefix 0.586 us, covers 88 m: this echo loses 26% of its window" in text
+    assert ("(computed)" if name == "worst" else "not modelled") in text
+    assert "levels of one subcarrier:" in text and "expected echo" in text
