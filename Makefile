@@ -138,7 +138,7 @@ accuracy-cost: $(SETUP)  ## what recognition accuracy costs in time: results/def
 	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
 	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost
 
-# The paper's scene first: its model is what the other scenes' samples are tried on, beside a model of their own.
+# The paper's scene first: its model is what the other scenes' samples are tried on, in addition to a model of their own.
 scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained without effects, and of their own
 	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- models results/scene-paper/accuracy.csv
 	for scene in urban worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \

@@ -1,4 +1,4 @@
-"""Cost of an image sample: signal -> spectra -> tile -> PNG -> tar, ours beside the usual ways, on the same samples.
+"""Cost of an image sample: signal -> spectra -> tile -> PNG -> tar, ours next to the usual ways, on the same samples.
 
     python benchmarks/images.py --run results/default --samples 300 --out results/benchmarks/images.csv
 

@@ -6,7 +6,7 @@ The same samples in all ways, in one run: image, signal and recipe shards, and `
 and made here: a chunk of ten motion models of eight subtypes at the six SNRs of the default. Times are processor times
 of one thread in random order, the least of three passes; reading includes the check of the sample's SHA-256. `new`:
 every sample of another motion model, so that its echoes are computed; otherwise the clean echoes are there, as in a
-training from its second epoch on. Then networks are trained for some steps on made samples, with a worker beside the
+training from its second epoch on. Then networks are trained for some steps on made samples, with a worker next to the
 training; their waiting share is wall time.
 """
 
@@ -87,7 +87,7 @@ def kinds(config: dict, folder: Path, samples: int) -> list[tuple]:
 
 
 def waits(config: dict, folder: Path, steps: int) -> list[tuple]:
-    """Rows of WAITS: trainings on made samples, one worker beside them."""
+    """Rows of WAITS: trainings on made samples, each with one worker next to it."""
     rows, batch = [], 16
     for backbone, size in NETWORKS:
         scheme = Scheme("ABC:VRP+TRP+VT", (0, 1, 2), (0, 1, 2))
@@ -116,7 +116,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--samples", type=int, default=60, help="samples timed in each way (default 60)")
     options.add_argument("--steps", type=int, default=20, help="steps of each training (default 20; 0: no training)")
-    options.add_argument("--out", type=Path, required=True, help="table of the kinds; that of waiting is put beside it")
+    options.add_argument("--out", type=Path, required=True, help="table of the kinds; that of waiting goes next to it")
     given = options.parse_args()
     config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
     config["noise"] = yaml.safe_load(Path("config/default.yaml").read_text())["noise"]

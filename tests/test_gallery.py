@@ -56,5 +56,5 @@ def test_two_runs_on_the_page_differ_as_the_command_says(tmp_path):
     assert rows["seen A:VT"] == ["81", "82", "+1"] and rows["echo"] == ["5", "2.50", "-2.50"]
     assert rows["seed"] == ["1", "2", ""] and rows["bytes"] == ["-", "2500000", ""]
     assert rows["noise.snr_db"] == ["[3.0, Infinity]", "-", ""]
-    # A run beside itself differs in nothing; what is measured stands there twice.
+    # A run compared with itself differs in nothing; what is measured stands there twice.
     assert {row[0] for row in same} == {"seen A:VT", "echo", "samples", "bytes"}

@@ -175,7 +175,7 @@ def run_of(overlay):
 def test_sizes_and_extra_runs_that_cannot_be_meant_are_refused_by_name(tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"motion.sizes_m: Bird from 2.0 to 1.0 m"):
         run_of({"motion": {"sizes_m": {"Bird": [2.0, 1.0]}}})
-    with pytest.raises(InputError, match=r"motion.sizes_m: given beside effects \['adc'\]"):
+    with pytest.raises(InputError, match=r"motion.sizes_m: given together with effects \['adc'\]"):
         run_of({"motion": {"sizes_m": SIZES}, "effects": {"adc": {}}})
     with pytest.raises(InputError, match=r"recognition.extra: 'nowhere', expected another, finished run"):
         run_of({"recognition": {"extra": ["nowhere"]}})

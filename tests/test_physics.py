@@ -50,7 +50,7 @@ def fold(frequency_hz: float, rate_hz: float = 400.0) -> float:
 @pytest.mark.parametrize(("rate_hz", "seen_hz"), [(40, 80), (60, 120), (160, -80), (256, 112), (660, 120)])
 def test_a_two_blade_rotor_shows_twice_its_rate_folded(rate_hz, seen_hz):
     assert fold(2 * rate_hz) == seen_hz
-    # 4 mm keeps the modulation index under one, so the first pair of lines is the strongest beside the body's.
+    # 4 mm keeps the modulation index under one, so the first pair of lines is the strongest after the body's.
     found = signal(spinning("rotor", "UAV", 0.004, 2), x_m=200.0, y_m=120.0, z_m=60.0, rate_hz=float(rate_hz))
     spectrum = vrp(found[None])[0].mean(axis=1)
     axis = (np.arange(256) - 128) * 400 / 256

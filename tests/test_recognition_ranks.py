@@ -76,7 +76,7 @@ def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
             losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
         assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == ranks
     apart = {name: float((weights[name] - weights["one"]).norm() / weights["one"].norm()) for name in ("two", "half")}
-    # Sums in another order, which Adam magnifies where a gradient is zero but for rounding.
+    # Sums in another order, which Adam magnifies where a gradient is zero except for rounding.
     assert apart["two"] < 1e-4 < 1e-3 < apart["half"]
     assert losses["two"] == pytest.approx(losses["one"], rel=1e-4)
     assert losses["half"] != pytest.approx(losses["one"], rel=1e-3)

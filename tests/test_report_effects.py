@@ -68,7 +68,7 @@ def test_calls_are_none_then_every_effect_alone_then_the_scenes(config, tmp_path
     assert list(found) == ["none", *PLACES, "windy"]
     assert found["none"] == {"effects": {}, "tolerance": None, "snr_db": [13.0, INFINITY]}
     assert found["adc"]["effects"] == {"adc": {}}
-    # A link budget allows no set SNR beside it.
+    # A link budget and a set SNR exclude each other.
     assert found["receiver_noise"]["snr_db"] == found["windy"]["snr_db"] == [INFINITY]
     assert found["windy"]["effects"]["gusts"] == {"wind_mps": 9.0}
 

@@ -17,7 +17,7 @@ TABLE = """<table><caption>Sizes</caption><thead><tr><th scope="col">name</th><t
 
 @pytest.fixture(scope="module")
 def kept():
-    """A run without tables of its own, beside the kept reference."""
+    """A run without tables of its own, next to the kept reference."""
     files = dict.fromkeys(FILES, "none.csv") | {"clouds": [], "benchmarks": []}
     reference = {f"kept_{name}": f"results/reference/{file}" for name, file in KEPT.items()}
     return SimpleNamespace(inputs=Inputs(files | reference))

@@ -196,7 +196,7 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
     )  # fmt: skip
     before, after = parts()[2], parts(overlay)[2]
     assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
-    # The whole configuration stands beside the results and in the report.
+    # The whole configuration stands next to the results and in the report.
     assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
 
 

@@ -53,13 +53,13 @@ def test_needs_are_sums_by_hand_and_what_is_there_is_not_counted():
     fresh = space.need([space.Job("noise", CHUNK)] * 3, FIGURES, PLAN, CONFIG, 2)
     assert (fresh.disk, fresh.jobs, fresh.unknown) == (3 * whole, 3, ())
     assert fresh.memory == 2 * fresh.largest_job == 2 * (50e6 + 10 * values)
-    # Made again in place: nothing is added but the one file that stands beside the one it replaces.
+    # Made again in place: nothing is added except one new file next to the file that it replaces.
     again = space.need([space.Job("noise", CHUNK, existing=whole)] * 3, FIGURES, PLAN, CONFIG, 2)
     assert again.disk == whole
     # Temporary files: two for each core, however many there are in the run.
     many = space.need([space.Job("tiles", CHUNK)] * 50, FIGURES, PLAN, CONFIG, 2)
     assert many.disk == 4 * 0.5 * 50 * 2 * 6 * 768**2
-    # A job that takes both cores runs alone; the smaller ones of one thread are not beside it.
+    # A job that takes both cores runs alone; the smaller jobs of one thread do not run meanwhile.
     wide = space.need([space.Job("train", {}, threads=2), space.Job("noise", CHUNK)], FIGURES, PLAN, CONFIG, 2)
     assert wide.memory == wide.largest_job == 900e6 and wide.largest_rule == "train"
     assert space.need([space.Job("gallery", {})], FIGURES, PLAN, CONFIG, 1).unknown == ("gallery",)

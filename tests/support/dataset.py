@@ -53,7 +53,7 @@ def write_options(folder, group, kind):
 def build(folder, kind, inputs=True):
     """A data set of both groups and all folds: 12 models, two SNRs, one chunk a group.
 
-    inputs: whether motion tables, signals and tiles stay beside the shards.
+    inputs: whether motion tables, signals and tiles stay next to the shards.
     """
     folder.mkdir(exist_ok=True)
     shards = []

@@ -16,7 +16,7 @@ rule speed:
         "results/{run}/benchmarks/speed/{scheme}.jsonl"
     conda:
         "../../envs/environment.yaml"
-    # All cores, so that nothing else runs beside what is timed.
+    # All cores, so that nothing else runs while this is timed.
     threads: workflow.cores or 1
     params:
         settings=settings.training,

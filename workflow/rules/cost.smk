@@ -1,5 +1,5 @@
 # Cost: what the echo's accuracy costs in time, and how many pixels change at each tolerance; one cloud a category.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing of this workflow runs beside it)
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of this workflow runs meanwhile)
 # OUTPUTS: results/{run}/cost.csv, results/{run}/cost_pixels.csv, results/{run}/cost.png
 
 

@@ -1,7 +1,7 @@
-# Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples beside it, and one index.
+# Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to it, and one index.
 # REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals, or its clean echoes
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json,
-#          and beside them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
+#          and next to them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
 #          SHA256SUMS
 
 

@@ -2,7 +2,7 @@
 
 The classes stand in the order in which the table names them first, and a class's place in that order is its label. The
 order travels with the data: in the settings of the stages, in the index of the shards, in a trained model and in the
-record beside a prediction file. Where one of these says nothing of classes, it has the published four.
+record next to a prediction file. Where one of these says nothing of classes, it has the published four.
 
 The first class is the one that a detector looks for; false alarms are samples of the other classes that are given its
 name.

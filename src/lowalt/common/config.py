@@ -114,7 +114,7 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
 
 
 def main(arguments: list[str]) -> None:
-    """Write the merged configuration beside a run's results."""
+    """Write the merged configuration next to a run's results."""
     options = parser("lowalt.common.config", "Write the merged configuration as YAML.")
     options.add_argument("--out", required=True)
     given = options.parse_args(arguments)

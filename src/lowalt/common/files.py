@@ -20,7 +20,7 @@ NEARLY_FULL_BYTES = 1 << 20
 
 @contextlib.contextmanager
 def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
-    """Yield a temporary path beside `path` that takes its place only if the block ends without an error.
+    """Yield a temporary path next to `path` that takes its place only if the block ends without an error.
 
     size: bytes that the file has at least, where they are known before it is written.
     Raises: SpaceError naming the file, what it needs and what is free where the disk is too small or becomes full.

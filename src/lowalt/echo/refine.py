@@ -37,7 +37,7 @@ SAVED_SINGLE, SAVED = 0.4, 0.1
 
 
 class Method(NamedTuple):
-    """How a sample was computed, and by which bounds.
+    """How a sample was computed, and which bounds allowed it.
 
     error: the error that the cheap plan had to keep, relative to the sum of amplitudes (None: exact mode only); single:
     float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials,
@@ -65,7 +65,7 @@ class Method(NamedTuple):
 def compute(
     scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], tolerance: float | None
 ) -> tuple[Found, np.ndarray, Method, Layout]:
-    """Return (found, symbols left for the pointwise kernel, method, layout): cheap first, exact where bounds ask.
+    """Return (found, symbols left for the pointwise kernel, method, layout): the cheap plan, then the exact one.
 
     A symbol is computed again where its bound exceeds the tolerance times the largest value, where its strongest cell
     is not certain to that bound, and where far cells could not be excluded.
@@ -98,7 +98,7 @@ def compute(
 
 
 def _least_largest(found: Found) -> float:
-    """Return a lower bound of the largest |value|, whatever the errors."""
+    """Return a lower bound of the largest |value| that holds for all errors within their bounds."""
     done = found.state == CERTAIN
     return float((abs(found.values) - found.bounds)[done].max()) if done.any() else 0.0
 
@@ -158,7 +158,7 @@ class _Sample:
                 self.compute(block, chosen, False, found, rest, carried[0])
 
     def approximation(self, chosen: EchoPlan) -> Approximation:
-        """Return everything that stands for a function in the plan chosen."""
+        """Return everything that replaces a function in the chosen plan."""
         return Approximation(chosen, array_gains(self.radar), self._kernels(chosen), folding())
 
     def compute(
@@ -166,7 +166,7 @@ class _Sample:
     ) -> None:  # fmt: skip
         """Compute `symbols` into `found` by the plan chosen; `final`: leads that are not proved are accepted.
 
-        points: (scene, layout) of the points to compute (None: all); slow: what the others add at these symbols.
+        points: (scene, layout) of the points to compute (None: all); slow: the others' share at these symbols.
         """
         scene, lay = points or (self.scene, self.lay)
         refs, extents = self.refs, self.extents
@@ -182,7 +182,7 @@ class _Sample:
         )  # fmt: skip
 
     def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
-        """Return the cell kernels as the plan needs them; None where the target is too deep for them."""
+        """Return the cell kernels that the plan needs; None where the target is too deep for them."""
         return cell_polynomials(self.radar.subcarriers, round_up(self.size_m * self.radar.cells, 6), chosen.fit)
 
     def _kernels(self, chosen: EchoPlan) -> CellPolynomials:

@@ -62,7 +62,7 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not fits:
         expected = str(shape).replace("'", "")
         raise InputError(f"{sample}{name} has shape {array.shape}, expected {expected}")
-    # A sum is finite unless a term is not, or it overflows: only then is the place searched for.
+    # The sum of finite numbers is finite unless it overflows: only where it is not are all numbers tested.
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")

@@ -186,7 +186,7 @@ class AddsEchoes(Protocol):
 
 @runtime_checkable
 class AddsTargets(Protocol):
-    """Channel: an effect that puts other targets beside the primary one; all stations see the same."""
+    """Channel: an effect that puts other targets next to the primary one; all stations see the same."""
 
     def companions(
         self, settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator

@@ -153,7 +153,7 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
 
 
 def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud]) -> list[Chain]:
-    """Return a chain for every other target beside that of `chain`, under the same beams at the same instants."""
+    """Return a chain for every target other than that of `chain`, under the same beams at the same instants."""
     view = chain.view
     mine = [one for one in chain.channel if not isinstance(one.module, (AddsTargets, AddsEchoes))]
     result = []

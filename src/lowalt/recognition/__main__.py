@@ -134,8 +134,10 @@ def _tables(arguments: list[str]) -> None:
     from lowalt.recognition.orderings import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
-    line.add_argument("--predictions", nargs="+", required=True, help="prediction files (.csv), records beside them")
-    line.add_argument("--published", help="the paper's accuracies (.csv), where there are any to stand beside")
+    line.add_argument(
+        "--predictions", nargs="+", required=True, help="prediction files (.csv), their records next to them"
+    )
+    line.add_argument("--published", help="the paper's accuracies (.csv), if there are any to compare with")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="folder for the tables")
     given = line.parse_args(arguments)

@@ -32,7 +32,7 @@ CLEAN_BYTES = 2**30
 
 
 def opened(config: str | Path) -> Dataset:
-    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand beside it.
+    """Return the data set of a run by its config.yaml, with the clouds and surfaces that stand next to it.
 
     Raises: InputError naming what is missing or wrong.
     """

@@ -59,7 +59,7 @@ class Run:
     """One trained and evaluated scheme: its predictions and what is known of the run."""
 
     def __init__(self, path: str | Path) -> None:
-        """path: the prediction file; the JSON file beside it holds protocol, scheme, seed and hardware.
+        """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and hardware.
 
         Raises: InputError where either is missing or the test part is empty.
         """

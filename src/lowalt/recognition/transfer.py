@@ -1,4 +1,4 @@
-"""Models of other runs on this run's test samples, beside this run's own: what training on other data costs or gives.
+"""Models of other runs on this run's test samples, next to this run's own: how training on other data changes accuracy.
 
 Samples are compared pairwise: the same test samples, once as this run's model sees them and once as the other's does.
 

@@ -67,7 +67,7 @@ def received(
 ) -> np.ndarray:
     """Return the receiver's samples (N,) of a complex echo (N,): float64 where the channel is real, else complex128.
 
-    target: False leaves the echo out, and all else as it would be with it, but for clipping.
+    target: False leaves the echo out; everything else stays as with the echo, except clipping.
     """
     count = len(echo)
     # A slow target's echo stays in the coupling capacitors; what counts is what passes them.

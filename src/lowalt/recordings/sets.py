@@ -1,7 +1,7 @@
 """The measured sets: which files belong to them, which half each is in, and their intervals that hold a target.
 
 The file of sets holds records whose `file` is a pattern inside the set's folder, the file of the split the two halves
-by file name. Files that came later are in neither half's list: they are test files. A record of its own beside a file
+by file name. Files that came later are in neither half's list: they are test files. A record of its own next to a file
 (any .yaml in the set's folder) goes before the set's pattern, so a file of any name, rate and channel can be added.
 """
 

@@ -3,7 +3,7 @@
     python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
 
 replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes` (accuracy of every scheme
-beside the paper's, and which orderings hold) or `cost` (accuracy and its times).
+next to the paper's, and which orderings hold) or `cost` (accuracy and its times).
 """
 
 from pathlib import Path

@@ -33,16 +33,16 @@ def write(arguments: list[str]) -> None:
         "--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station; recipe shards"
     )
     options.add_argument("--fold", required=True, help="train, val or test")
-    options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz beside it")
+    options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz next to it")
     given = options.parse_args(arguments)
     classes = _classes(given.settings)
     canceller = given.settings.pop("canceller", None)
-    beside = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
+    added = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
     (kind,) = pick(shards, "kind")
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
-    rows = [accompanied(row, beside, seed) for row in read_table(given.motion)]
+    rows = [accompanied(row, added, seed) for row in read_table(given.motion)]
     snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
     if kind == "recipe":
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
@@ -65,7 +65,7 @@ def index(arguments: list[str]) -> None:
     the classes in the order of their labels where they are not the published ones.
     """
     options = parser("lowalt.shards index", "List shards with counts and checksums.")
-    options.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables beside them")
+    options.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables next to them")
     options.add_argument("--out", required=True, help="index to write (.json)")
     given = options.parse_args(arguments)
     echo = given.settings.pop("echo", None)

@@ -1,4 +1,4 @@
-"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS beside the index; the folder can be published.
+"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index; the folder can be published.
 
 A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
 """
@@ -245,7 +245,7 @@ def zenodo(shards: ShardSet, name: str, license_name: str) -> dict:
 
 
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv, croissant.json and .zenodo.json beside an index, and the checksums of all of it.
+    """Write README.md, samples.csv, croissant.json and .zenodo.json next to an index, and the checksums of all of it.
 
     facts: what Croissant should say besides, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
@@ -272,7 +272,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
 
 
 def main(arguments: list[str]) -> None:
-    """Write the data card, the table of samples and the Croissant description beside the index."""
+    """Write the data card, the table of samples and the Croissant description next to the index."""
     options = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
     options.add_argument("--index", required=True, help="the data set's index")
     options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")

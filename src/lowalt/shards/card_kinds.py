@@ -1,7 +1,7 @@
 """Sentences of the data card about each kind of shards."""
 
 MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
-"""Extension of the member beside the record."""
+"""Extension of the member next to the record."""
 
 WHAT = {
     "image": "3 x 3 tiles of time-frequency images",

@@ -32,7 +32,7 @@ def refuse(effects: dict) -> None:
     """
     if in_all_cells(effects):
         raise InputError(
-            "shards.kind: 'recipe' beside the effect 'cell_noise', whose echoes hold noise; expected signal or image"
+            "shards.kind: 'recipe' with the effect 'cell_noise', whose echoes hold noise; expected signal or image"
         )
 
 

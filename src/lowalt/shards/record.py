@@ -97,13 +97,13 @@ def record(
     """
     names = ("subtype", "category", "group", "model")
     motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
-    beside = {"companions": list(row["companions"])} if "companions" in row else {}
+    added = {"companions": list(row["companions"])} if "companions" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
     content = {
         "key": sample_key(row["subtype"], row["model"], snr_db),
         "label": label(classes, row),
         **{name: row[name] for name in names},
-        **beside,
+        **added,
         "fold": fold,
         "snr_db": NO_NOISE_DB if math.isinf(snr_db) else float(snr_db),
         "noise": not math.isinf(snr_db),
@@ -119,7 +119,7 @@ def record(
 
 
 def accompanied(row: dict, effects: dict, seed: int) -> dict:
-    """Return the row and the subtypes that the scene's effects put beside its target; alone as it is."""
+    """Return the row and the subtypes that the scene's effects put next to its target, or the row alone."""
     if "companions" not in effects:
         return row
     # Most runs have no companions and must not pay for the module.

@@ -31,7 +31,7 @@ def _text(sums: dict[str, str]) -> str:
 
 
 def write(index_path: str | Path, index: dict) -> None:
-    """Write SHA256SUMS beside an index whose data card is complete.
+    """Write SHA256SUMS next to an index whose data card is complete.
 
     The shards are not read again: their checksums are those of the index.
     """

@@ -40,7 +40,7 @@ def write_shard(
     kind: str, content: Callable[[int, int], bytes], classes: tuple[str, ...] = CATEGORIES,
     powers: np.ndarray | None = None, canceller: dict | None = None,
 ) -> dict:  # fmt: skip
-    """Write `path` (.tar) and its table beside it; return the table's header.
+    """Write `path` (.tar) and its table next to it; return the table's header.
 
     rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
     sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); classes: in

@@ -51,16 +51,16 @@ class Products:
         return self._of_group("clouds", wildcards)
 
     def scene_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a group's subtypes, and of the subtypes that the scene puts beside them.
+        """Clouds of a group's subtypes, and of the subtypes that the scene adds to them.
 
         Raises: InputError for a companion that the run does not have.
         """
-        beside = (self._config["effects"].get("companions") or {}).get("subtypes", [])
-        unknown = sorted(set(beside) - set(self._run.records))
+        companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
+        unknown = sorted(set(companions) - set(self._run.records))
         if unknown:
             raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
         own = self.group_clouds(wildcards)
-        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(beside)]
+        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
         return [*own, *(path for path in more if path not in own)]
 
     def group_occluders(self, wildcards: Any) -> list[str]:
@@ -242,7 +242,7 @@ class Products:
     def prepared(self, wildcards: Any) -> list[str]:
         """What the run makes without torch before its first training; nothing where its data are another run's.
 
-        The echo's cost is left out: a download beside it would falsify its times.
+        The echo's cost is left out: a download at the same time would falsify its times.
         """
         run, base = self._run, f"results/{self._run.name}"
         if run.data != run.name:

@@ -169,7 +169,7 @@ class Run:
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]
 
     def images_of_job(self, wildcards: Any) -> int:
-        """Images of one sample that the scheme of a job sees: how long its training takes, beside other trainings."""
+        """Images of one sample that the scheme of a job sees: its training takes time in proportion."""
         return len(self.schemes_by_slug[wildcards.scheme].columns)
 
     def pixels(self, scheme: Scheme) -> int:
@@ -178,22 +178,24 @@ class Run:
 
 
 def _check_sizes(config: dict) -> None:
-    """Refuse sizes of motion models that are no ranges, or that stand beside effects, which know the clouds' own."""
+    """Refuse sizes of motion models that are no ranges, or that come with effects, which use the clouds' own sizes."""
     sizes = config["motion"].get("sizes_m", {})
     for category, (low, high) in sizes.items():
         if low > high:
             raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
     if sizes and config["effects"]:
-        raise InputError(f"motion.sizes_m: given beside effects {sorted(config['effects'])}, expected one or the other")
+        raise InputError(
+            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one or the other"
+        )
 
 
 def _check_input(config: dict) -> None:
-    """Refuse samples made on the spot beside a cache of the shards' images, and clean echoes of a scene without any."""
+    """Refuse samples made on the spot with a cache of the shards' images, and clean echoes of a scene without any."""
     if config["shards"]["kind"] == "recipe":
         refuse(config["effects"])
     block = config["recognition"]
     if block.get("input") == "dataset" and block["cache"]:
-        raise InputError("recognition.input: 'dataset' beside recognition.cache true, expected cache: false")
+        raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
 
 
 def _check_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:

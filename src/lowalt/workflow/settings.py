@@ -84,13 +84,13 @@ class Settings:
         return self._text("index", **blocks, echo=echo, classes=self._run.classes)
 
     def shard(self, wildcards: Any) -> str:
-        """The fold of each sample, its name and its form, and whom its record names beside it."""
+        """The fold of each sample, its name and its form, and the companions that its record names."""
         snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
-        beside = {"companions": effects["companions"] or {}} if "companions" in effects else {}
+        added = {"companions": effects["companions"] or {}} if "companions" in effects else {}
         if self._config["shards"]["kind"] == "recipe" and "canceller" in effects:
-            beside["canceller"] = effects["canceller"] or {}
+            added["canceller"] = effects["canceller"] or {}
         blocks = self._blocks("seed", "network", "split", "shards")
-        return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **beside)
+        return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **added)
 
     def cost_table(self, wildcards: Any) -> str:
         """Settings with which the echo is timed, and the rows of the table of targets."""

@@ -112,7 +112,7 @@ def need(jobs: Iterable[Job], figures: dict[str, Figures], plan: Plan, config: d
     """Return what these jobs need on a machine with so many cores.
 
     Outputs that are there already are written over, so only their growth counts, plus one output at a time that stands
-    beside the one it replaces. Temporary outputs are counted as two for each core. Rules without figures are named.
+    next to the one it replaces. Temporary outputs are counted as two for each core. Rules without figures are named.
     """
     added, replaced, temporary, memory, unknown, count = 0.0, 0.0, [], [], set(), 0
     for job in jobs:

@@ -1,1 +1,1 @@
-"""The fast kernel: short polynomials in place of functions, a proved strongest cell, errors bounded beforehand."""
+"""The fast kernel: short polynomials replace functions, the strongest cell is proved, errors are bounded beforehand."""

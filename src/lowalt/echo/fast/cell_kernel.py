@@ -40,7 +40,7 @@ def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials |
     half = deep + 0.5 / PLACES
     band = math.pi * half
     degree = degree_for(band, error)
-    # Moments come four at a time, so the degree may as well be one less than a multiple of four.
+    # Moments are computed four at a time, so a degree of one less than a multiple of four costs nothing more.
     degree |= 3
     if degree > TOP or SIDE + 0.5 + half > CELL_REACH or count < 2 * SIDE + 3:
         return None
@@ -64,7 +64,7 @@ def _expand(weights, rates, phase: float, centres, half: float, degree: int) -> 
     `polynomials.economised`."""
     orders = np.arange(degree + EXTRA + 1)
     angle = np.asarray(centres)[..., None] * rates + phase
-    # The p-th derivative of a cosine is the cosine p quarters of a turn on.
+    # The p-th derivative of a cosine is the cosine p quarters of a turn later.
     waves = np.stack([np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle)])
     factorial = np.cumprod(np.concatenate([[1.0], orders[1:]]))
     powers = weights[:, None] * (rates[:, None] * half) ** orders / factorial

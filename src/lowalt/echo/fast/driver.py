@@ -102,7 +102,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
 
     q: part (or point, without rotations) whose translation is the reference; symbols, approximation, slow, work,
     found: the bundles of `workspace`, slow being rows of `symbols` or empty; final: a lead that is not proved is
-    accepted, since no finer plan exists.
+    accepted, because no finer plan exists.
     """
     plan, table = approximation.plan, approximation.cells
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
@@ -165,7 +165,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
 
 @INLINED
 def add_slow(slow, turn, away, scale, moments):
-    """Add a symbol's interpolated moments slow (2, orders): turned by the reference's phase, about a place `away` less.
+    """Add a symbol's interpolated moments slow (2, orders), turned by the reference's phase and shifted by `away`.
 
     Sums of z (v + a)^k are binomial sums of those of z v^k, here by differences as in Pascal's triangle. slow is
     overwritten.

@@ -1,4 +1,4 @@
-"""Which precision and which polynomials a sample gets: a bound of the error first, then the cheapest that keeps it."""
+"""Which precision and which polynomials a sample gets: the cheapest whose proved error bound is allowed."""
 
 import math
 from functools import lru_cache
@@ -16,7 +16,7 @@ FINEST = 1e-15
 
 
 class Functions(NamedTuple):
-    """Coefficients of the polynomials in place of functions: relative range difference over eps and r_ref / r in
+    """Coefficients of the polynomials that replace functions: relative range difference over eps and r_ref / r in
     float64; cosine and sine in the type of the sums (see `polynomials.smooth`)."""
 
     excess: np.ndarray
@@ -53,9 +53,10 @@ class ArrayGains(NamedTuple):
 COSINE_DEGREES = (5, 7, 10)
 """Degrees in t^2 of cosine and sine that `vector_loops` has loops for."""
 SINGLE_BLOCK = 128
-"""Most float32 numbers added before a double takes over: more would round away what a tolerance of 1e-4 leaves."""
+"""Most float32 numbers added before a double takes over: longer sums round by more than a tolerance of 1e-4
+allows."""
 SINGLE_ERROR = 400 * 2.0**-24
-"""Bound of the error of float32 after the phase: it is not tried where less is asked for."""
+"""Bound of the error of float32 after the phase; float32 is not tried where a smaller error is asked for."""
 
 
 def array_gains(radar: Radar) -> ArrayGains:
@@ -67,7 +68,7 @@ def array_gains(radar: Radar) -> ArrayGains:
 
 
 def round_up(value: float, steps: int = 2) -> float:
-    """Return the next larger of `steps` values an octave, so that few polynomials serve all samples."""
+    """Return `value` rounded up to one of `steps` values an octave, so that few polynomials serve all samples."""
     return 2.0 ** (math.ceil(steps * math.log2(max(value, 1e-9))) / steps)
 
 

@@ -1,4 +1,4 @@
-"""Short polynomials in place of functions, each with a bound of its error proved before it is used.
+"""Short polynomials that replace functions, each with a bound of its error that is proved before it is used.
 
 Array gains and the range-cell kernel are finite sums of cosines, so over a short stretch their Chebyshev
 coefficients are Bessel functions, |2 J_p(B)| <= 2 (B/2)^p / p!; B is the band times half the stretch.
@@ -140,8 +140,8 @@ def array_rule(transmit: int, receive: int, kappa: float) -> tuple[np.ndarray, n
 def _nodes() -> tuple[np.ndarray, np.ndarray]:
     """Return the 96 Chebyshev nodes on [-1, 1] and the matrix (96, 96) from values there to Chebyshev coefficients.
 
-    Computed in extended precision where the machine has it: else the transform's own rounding would look like
-    coefficients.
+    Computed in extended precision where the machine has it. In double precision the transform's own rounding would
+    look like coefficients.
     """
     count = 96
     angle = 4 * np.arctan(np.longdouble(1)) * (np.arange(count) + np.longdouble(0.5)) / count

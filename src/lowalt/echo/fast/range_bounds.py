@@ -1,4 +1,4 @@
-"""Where every symbol's points can lie, before any is computed: bounds from the parts' poses alone."""
+"""Bounds of where every symbol's points lie, from the poses of the parts alone, before any point is computed."""
 
 import math
 
@@ -13,7 +13,7 @@ reference, over the range and in metres, and a bound of its mean weighted with t
 START, END, PSI_CENTRE, PSI_HALF, OMEGA_CENTRE, OMEGA_HALF = range(6)
 """Columns of the table of segments: first symbol, end, centre and half-width of the points' direction cosines."""
 DRIFT = 1.0
-"""Radians of gain phase by which a segment may be wider than what the target itself spans."""
+"""Radians of gain phase by which a segment may be wider than the target itself."""
 
 
 @LEAN
@@ -91,7 +91,7 @@ def cut_segments(extents, rate_h, rate_v, longest, out):
             l0, l1 = min(low_h, a - turn), min(low_v, b - turn)
             h0, h1 = max(high_h, a + turn), max(high_v, b + turn)
             if end == n:
-                # Room for drift: long segments of common polynomials against polynomials of low degree.
+                # A wider segment shares its polynomials among more symbols, but they need a higher degree.
                 room_h = 1.2 * (h0 - l0) * rate_h + DRIFT
                 room_v = 1.2 * (h1 - l1) * rate_v + DRIFT
             elif (h0 - l0) * rate_h > room_h or (h1 - l1) * rate_v > room_v:

@@ -1,4 +1,4 @@
-"""What a symbol is computed with: its segment's gain polynomials, its own constants, and its points a tile at a time.
+"""The inputs of one symbol: its segment's gain polynomials, its own constants, and its points, a tile at a time.
 
 A segment is a number of successive symbols over which the array gains are short polynomials (`range_bounds`).
 """

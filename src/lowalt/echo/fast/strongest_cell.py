@@ -1,4 +1,4 @@
-"""Which cell is the strongest, for certain: cells from the points' moments, the others excluded by a bound."""
+"""The strongest cell with a proof: near cells are computed from the points' moments, a bound excludes the others."""
 
 import math
 
@@ -26,7 +26,7 @@ def cell_sums(kernels, place, moments, first, last, sums):
 
 @VECTOR
 def _product(sines, place, moments, shift):
-    """Return |sum of z sin(pi u) v^shift|, as far as the moments reach."""
+    """Return |sum of z sin(pi u) v^shift|, the sine's series cut after the last moment there is."""
     re, im = 0.0, 0.0
     place, shift = np.uint64(place), np.uint64(shift)
     for i in range(np.uint64(sines.shape[1]) - shift):
@@ -70,7 +70,7 @@ def far_limit(far, distance, half, count):
 def certify(table, place, centre, moments, size, totals, error, bound, count, sums, far):
     """Return (state, row in `sums`, near-tie, lead) of one symbol's strongest cell.
 
-    First the cells about the target are computed, then all 2 SIDE + 1 if the bound of the others asks for it. table:
+    The cells about the target are computed first. All 2 SIDE + 1 follow if the bound cannot exclude the others. table:
     `cell_kernel.CellPolynomials`; place: row of its tables; centre: that place in cells from the nearest whole cell;
     size: largest distance of a point from the reference (cells); totals: sums of |z| and of |z| v^2; error: relative to
     them, of the sums in `far_moments`; bound: of the error of any cell's sum; sums, far: work arrays.

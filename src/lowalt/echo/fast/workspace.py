@@ -1,6 +1,6 @@
-"""What the fast kernel's driver works with: bundles of its inputs and of its work arrays.
+"""Bundles of the inputs and of the work arrays of the fast kernel's driver.
 
-The driver is compiled without counted references, so it cannot allocate; all arrays come in from here.
+The driver is compiled without counted references, so it cannot allocate; all its arrays are made here.
 """
 
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from lowalt.echo.fast.vector_loops import TILE_ROOM, Offsets, Tile
 
 
 class Approximation(NamedTuple):
-    """Everything that stands for a function: the plan's polynomials, the array gains as sums of cosines, the cell
+    """Everything that replaces a function: the plan's polynomials, the array gains as sums of cosines, the cell
     kernels, and the weights of `polynomials.folding`."""
 
     plan: EchoPlan
@@ -34,7 +34,7 @@ class Symbols(NamedTuple):
 
 
 class SlowMoments(NamedTuple):
-    """What slow points add at each of B symbols, times r^2 and without the reference's phase: moments about the
+    """The share of slow points at each of B symbols, times r^2 and without the reference's phase: moments about the
     reference's range (B, 2, orders), bounds of the sums of |z| and |z| v^2 (B, 2), bounds of the error (B,)."""
 
     moments: np.ndarray
@@ -43,7 +43,7 @@ class SlowMoments(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What is known of every symbol, each (N,): the strongest cell's value and index; `strongest_cell`'s state; sum of
+    """The results of every symbol, each (N,): the strongest cell's value and index; `strongest_cell`'s state; sum of
     |amplitudes|; bound of the value's error; whether there is a near-tie; certified lead over every other cell."""
 
     values: np.ndarray
@@ -82,8 +82,8 @@ class Workspace(NamedTuple):
 def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     """Return work arrays for an approximation and the points' amplitudes (padded L,).
 
-    The tile's arrays are separate and of odd length: as rows of one array a whole 4096 bytes apart, loads would wait
-    for unrelated stores.
+    The tile's arrays are separate and of odd length. Rows of one array would lie a whole 4096 bytes apart, and
+    loads would then wait for unrelated stores.
     """
     kind = np.float32 if approximation.plan.single else np.float64
     gains = approximation.gains

@@ -1,6 +1,6 @@
 """The choice of the strongest range cell among computed sums, as both kernels make it.
 
-Each kernel bounds the cells that it did not compute by its own means.
+Each kernel has its own bound for the cells that it did not compute.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Range of one reference point a symbol in double-double arithmetic.
+"""Range of one reference point for each symbol, in double-double arithmetic.
 
 Every other point's range is this one plus a difference that a double holds to its last digit, so phase errors do not
 grow with range. The functions are compiled without fast-math flags, which would simplify the corrections away.

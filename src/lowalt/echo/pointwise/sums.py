@@ -1,4 +1,4 @@
-"""What the pointwise kernel returns for a whole sample: the strongest cell's signal, all cells, or the subcarriers.
+"""Results of the pointwise kernel for a whole sample: the strongest cell's signal, all cells, or the subcarriers.
 
 The strongest cell is the arg max over all M cells: cells that are not computed are excluded by a bound.
 """
@@ -91,7 +91,7 @@ def symbol(scene, radar, ref, n, aims, paths, e, z, u, risk):
     path_count = paths.delays.shape[0]
     if fault or path_count == 0:
         return fault
-    # Backwards, since the first L entries hold the direct path that the others are made from.
+    # The paths go in reverse: the first L entries hold the direct path, from which the others are made.
     for k in range(path_count - 1, -1, -1):
         for l in range(count):  # noqa: E741
             delay = paths.delays[k, n % paths.delays.shape[1], l % paths.delays.shape[2]]
@@ -138,7 +138,7 @@ def matrix(scene, radar, refs, aims, paths, cells, out):
                 out[n, (base + j) % total] = cell_sum(z, u, j, total) * cell_phase(base + j, total)
             continue
         for m in range(total):
-            # Phase of subcarrier m against the effective carrier; the whole cells' share is reduced in integers.
+            # Phase of subcarrier m relative to the effective carrier; the share of whole cells is reduced in integers.
             whole = (((2 * m - (total - 1)) * (base % (2 * total))) % (2 * total)) / (2.0 * total)
             value = 0.0j
             for l in range(size):  # noqa: E741

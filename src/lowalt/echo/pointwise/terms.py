@@ -60,7 +60,7 @@ def offsets(scene, n, place, e):
 
 @PLAIN
 def terms(scene, radar, ref, n, aims, e, z, u, risk):
-    """Fill z, u and risk (L,) with what each point adds at symbol n.
+    """Fill z, u and risk (L,) with the share of each point at symbol n.
 
     z: complex amplitude without the cell's own phase; u: range in cells from the reference's cell; risk: peak amplitude
     times (r_ref + |e|) / r, which grows with the rounding of the point's direction. ref: the symbol's row of

@@ -1,8 +1,8 @@
-"""Values whose nearest complex64 their bound leaves open are computed again in double-double (Ziv's strategy).
+"""Where an error bound does not decide the nearest complex64, the value is computed again (Ziv's strategy).
 
-After that the conversion of a signal to complex64 rounds the true values correctly, and so does not depend on the
-processor, nor on the kernel that computed them. Source: Ziv 1991, "Fast evaluation of elementary mathematical functions
-with correctly rounded last bit", ACM TOMS 17.
+The second computation is in double-double. After it the conversion of a signal to complex64 rounds the true values
+correctly, and so does not depend on the processor, nor on the kernel that computed them. Source: Ziv 1991, "Fast
+evaluation of elementary mathematical functions with correctly rounded last bit", ACM TOMS 17.
 """
 
 from fractions import Fraction
@@ -33,8 +33,8 @@ def same_single(x, error):
 def doubtful(values, bounds, totals, gaps, out):
     """Fill `out` with the symbols whose nearest complex64 or strongest cell the bounds leave open.
 
-    Returns how many these are, and how many of them lack a proved strongest cell. A symbol all of whose amplitudes are
-    zero is zero exactly.
+    Returns how many these are, and how many of them lack a proved strongest cell. A symbol is exactly zero where all
+    its amplitudes are zero.
     """
     count, unproved = 0, 0
     for n in range(len(values)):
@@ -48,7 +48,7 @@ def doubtful(values, bounds, totals, gaps, out):
 
 @INLINED
 def to_odd(high, low, bits):
-    """Return the double that rounds to float32 as the double-double does: high, unless it hides on which side low is.
+    """Return a double that rounds to the same float32 as the double-double (high, low).
 
     A sum that is not a double is replaced by the neighbour whose last bit is one (rounding to odd); more than one bit
     lies between the two formats, so the second rounding cannot go wrong. bits (1,) int64: work array.
@@ -65,9 +65,9 @@ def to_odd(high, low, bits):
 def compute_again(scene, lay, radar, symbols, found, work, bits):
     """Replace the values of `symbols` (K,) in their strongest cells by closer ones.
 
-    First sums in double of phases in double-double, and where their bound leaves the nearest complex64 open, all in
-    double-double. work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns how many asked for the second, and
-    in how many its error still leaves the nearest complex64 open.
+    First: sums in double of phases in double-double. Where their bound leaves the nearest complex64 open, everything
+    is computed in double-double. work (ROWS, padded L + 4), bits (1,) int64: work arrays. Returns the number of symbols
+    that needed the second, and the number for which its error still leaves the nearest complex64 open.
     """
     twice, still = 0, 0
     share = double.share(len(lay.root))
@@ -118,7 +118,7 @@ def correct(
 
 
 def _contenders(scene, radar, refs, aims, found: Found, n: int, pointwise_bound) -> list[int]:
-    """Return the cells of symbol n that may be the strongest for all that float64 can tell."""
+    """Return the cells of symbol n that may be the strongest by the error bounds of float64."""
     part = slice(n, n + 1)
     here = scene._replace(translation=scene.translation[part], rotation=scene.rotation[part])
     direct = pointwise.Paths(np.empty((0, 1, 1)), np.empty((0, 1, 1), np.complex128))

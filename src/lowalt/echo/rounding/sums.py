@@ -1,7 +1,7 @@
 """One range cell of one symbol in double-double: the sum of the paper over all points, to 2^-64 of its terms.
 
-Points are worked on in short loops without fast-math flags: vector instructions may do them, in any width, since no
-loop adds over points but the last, which keeps the points' order.
+Points are worked on in short loops without fast-math flags: vector instructions of any width may do them, since
+only the last loop adds over points, and it keeps their order.
 """
 
 import numpy as np
@@ -38,7 +38,7 @@ def place(scene, lay, station, n, work):
             a, b, c = scene.rotation[n, p, axis, 0], scene.rotation[n, p, axis, 1], scene.rotation[n, p, axis, 2]
             origin = two_sum(scene.translation[n, p, axis], -station[axis])
             row, below = np.uint64(2 * axis), np.uint64(2 * axis + 1)
-            # Whole vectors of four: the next group overwrites what is too much, and the padding has no weight.
+            # Whole vectors of four are written: the next group overwrites the surplus, and the padding has no weight.
             for i in range(low, low + (high - low + np.uint64(3)) // np.uint64(4) * np.uint64(4)):
                 at = add(add(product(a, lay.x[i]), product(b, lay.y[i])), product(c, lay.z[i]))
                 work[row, i], work[below, i] = add(at, origin)

@@ -1,4 +1,4 @@
-"""A block's slow points at nodes in time, and their moments interpolated to every symbol with a bound of the error."""
+"""Moments of a block's slow points: computed at nodes in time, interpolated to every symbol, their error bounded."""
 
 from typing import NamedTuple
 
@@ -56,7 +56,7 @@ def interpolated(
     scene: EchoScene, radar: Radar, refs: np.ndarray, aims: tuple[float, float], slow: SlowParts, exact: Approximation,
     size: tuple[float, float], allowed: float, peak: float,
 ) -> tuple[SlowMoments, int] | None:  # fmt: skip
-    """Return what the slow points add at the symbols of `refs` (B, 7), and the number of nodes used.
+    """Return the moments of the slow points at the symbols of `refs` (B, 7), and the number of nodes used.
 
     None where no bound allows interpolation, or where it would save no time. scene: poses at these symbols; exact: the
     exact plan with the cell kernels to use; size: largest radius over range and radius (m) that the plan was made for;
@@ -78,7 +78,7 @@ def interpolated(
     polynomial, linear, values = pose_series.weights(count, nodes.degree)
     there, lay, node_refs, extents = _at_nodes(scene, radar, slow, poses, values, peak)
     spread = float(extents[:, SPREAD].max())
-    # Between symbols a target may come a little nearer than at any; the plan's bounds leave room for half a percent.
+    # Between symbols a target may be a little nearer than at any symbol; the plan's bounds leave half a percent.
     if not (spread <= 1.004 * size[0] and extents[:, SIZE].max() <= 1.004 * size[1]):
         return None
     segments = np.empty((len(extents), 6))

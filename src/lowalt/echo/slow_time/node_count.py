@@ -1,4 +1,4 @@
-"""How many nodes in time are enough: bounds of a slow part's echo on ellipses about the time axis.
+"""The number of nodes in time that is enough: bounds of a slow part's echo on ellipses about the time axis.
 
 A part's moments, the reference's phase left out, are an analytic function of time. On the ellipse with foci at a
 block's ends and semi-axes that sum to rho they are at most M, so the polynomial through d + 1 Chebyshev points is off

@@ -1,4 +1,4 @@
-"""Slowly moving rigid parts: which parts they are, their poses as short series in time, and interpolation weights.
+"""Slowly moving rigid parts: their choice, their poses as short series in time, and interpolation weights.
 
 The difference between a pose and its series is measured at every symbol and counted as error. `node_count` says how
 many nodes are needed.
@@ -20,7 +20,7 @@ DEGREE = 8
 INTERPOLATION_COST = 40_000
 """Cost of fitting and interpolating, in points x symbols of the exact plan."""
 SWING = 150.0
-"""Largest phase (rad) that a part's edge may sweep, by its first step, to be considered: a guess that saves time."""
+"""Largest phase (rad) that a part's edge may sweep, by its first step, to be considered; a mere guess to save time."""
 
 
 @lru_cache(maxsize=64)

@@ -1,4 +1,4 @@
-"""Other targets in the beam: a flock, a bird beside a drone, a car under it. The label stays the primary target's.
+"""Other targets in the beam: a flock, a bird next to a drone, a car under it. The label stays the primary target's.
 
 Companions stand around the target at the first symbol and move on. Each is a target of its own: points, moving parts,
 cross sections, motion effects and paths as the scene gives them. Their complex echoes add to the target's before the

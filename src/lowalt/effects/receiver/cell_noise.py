@@ -34,7 +34,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
     if settings["snr_db"] is not None and scene.snr_db != (math.inf,):
         raise InputError(
             f"effects.cell_noise: snr_db is {settings['snr_db']} and noise.snr_db {list(scene.snr_db)}, expected "
-            "noise.snr_db [.inf] beside a number, or snr_db null for those of noise.snr_db"
+            "noise.snr_db [.inf] together with a number, or snr_db null for those of noise.snr_db"
         )
 
 

@@ -1,4 +1,4 @@
-"""Measured beside simulated: pictures of the same stretch on the same axes and scale, measured above.
+"""Measured next to simulated: pictures of the same stretch on the same axes and scale, measured above.
 
 Here is only drawing: what is drawn comes as files `pair-NAME.npz` of `python -m lowalt.recordings pairs`.
 """
