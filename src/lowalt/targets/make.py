@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.targets.cloud import Cloud
+from lowalt.targets.cloud import Cloud, check
 
 
 def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
@@ -11,6 +11,10 @@ def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
 
     Raises: InputError where the record or an input is wrong, or a folder is needed and none is given.
     """
+    return check(_made(record, inputs, seed), record["subtype"])
+
+
+def _made(record: dict, inputs: Path | None, seed: int) -> Cloud:
     # Imports wait for the source: a built-in cloud must not pay for pymeshlab.
     source = record.get("source")
     if source == "builtin":

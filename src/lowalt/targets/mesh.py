@@ -124,7 +124,8 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
             pool = pool_of(_surface(part, record, inputs_dir), dense // 4, rng)
         if not len(pool.points):
             low, high = (
-                np.round(limit, 4).tolist() for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
+                [float(f"{value:.3g}") for value in limit]
+                for limit in (mesh.vertices.min(axis=0), mesh.vertices.max(axis=0))
             )
             raise InputError(
                 f"{where}: parts.{name}.region holds nothing of the body, expected a part of its surface, which "
