@@ -20,6 +20,7 @@ from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
 from lowalt.spectra import Spectra, spectrum
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.gallery import bones
 
 VIEWS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
 AXES = ("right x (m)", "front y (m)", "up z (m)")
@@ -47,6 +48,9 @@ def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
 def _view(panel, cloud: Cloud, points: np.ndarray, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
     title, across, up = view
     panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
+    for bone in bones(cloud.names):
+        x, y = points[list(bone)][:, [across, up]].T
+        panel.plot(x, y, color="0.6", linewidth=0.8, zorder=0)
     panel.set(xlim=middle[across] + np.array([-half, half]), ylim=middle[up] + np.array([-half, half]), aspect="equal")
     panel.set(title=title, xlabel=AXES[across], ylabel=AXES[up])
     panel.grid(alpha=0.25)

@@ -29,6 +29,7 @@ def values(run: Run) -> dict:
     ours = by_scheme(measured)
     paper = by_scheme(read_csv(run.inputs.path("published"), *COLUMNS)) if "published" in run.inputs else {}
     return {
+        "classes": len(run.shards.classes),
         "ours": ours, "published": paper, "spreads": spreads(measured), "snrs": run.snr_labels,
         "network": network_words(run.config["recognition"]),
         "picture": embedded(accuracy_over_snr(ours, paper)) if ours else "",
