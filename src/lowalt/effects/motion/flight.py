@@ -3,6 +3,7 @@
 import math
 
 from lowalt.common.errors import InputError
+from lowalt.common.portable import log, power
 from lowalt.effects.channel.target_classes import size_m
 from lowalt.targets.cloud import Cloud
 
@@ -45,9 +46,10 @@ def length_m(cloud: Cloud) -> float:
 def mass_kg(cloud: Cloud) -> float:
     """Return the mass (kg) of a multirotor by its length, of a bird by its wing span."""
     if cloud.like == "Bird":
-        return (float(cloud.record.get("wing_span_m") or 2 * length_m(cloud)) / 1.17) ** (1 / 0.39)
-    slope = math.log(LARGE_UAV[1] / SMALL_UAV[1]) / math.log(LARGE_UAV[0] / SMALL_UAV[0])
-    return SMALL_UAV[1] * (length_m(cloud) / SMALL_UAV[0]) ** slope
+        span = float(cloud.record.get("wing_span_m") or 2 * length_m(cloud))
+        return float(power(span / 1.17, 1 / 0.39))
+    slope = float(log(LARGE_UAV[1] / SMALL_UAV[1]) / log(LARGE_UAV[0] / SMALL_UAV[0]))
+    return SMALL_UAV[1] * float(power(length_m(cloud) / SMALL_UAV[0], slope))
 
 
 def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
@@ -58,7 +60,7 @@ def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
     """
     mass = mass_kg(cloud)
     if cloud.like == "Bird":
-        area = 0.16 * mass**0.72
+        area = 0.16 * float(power(mass, 0.72))
         up = AIR_KG_M3 * area * airspeed_mps * LIFT_SLOPE / (2 * mass)
         return LIFT_TO_DRAG * airspeed_mps / (2 * GRAVITY_MPS2), 1 / up
     length = length_m(cloud)

@@ -8,6 +8,7 @@ Turbulence, velocity, place and thrust are one linear process, discretised exact
 
 import numpy as np
 
+from lowalt.common import portable
 from lowalt.effects.motion import flight
 from lowalt.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
 from lowalt.motion.poses import Perturbation, attitude
@@ -47,14 +48,14 @@ def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray
     feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
     ratio = 0.177 + 0.000823 * feet
     up = 0.1 * wind_mps
-    along = feet * FOOT_M / ratio**1.2
-    return np.array([along, along, feet * FOOT_M]), np.array([up / ratio**0.4, up / ratio**0.4, up])
+    along = feet * FOOT_M / portable.power(ratio, 1.2)
+    return np.array([along, along, feet * FOOT_M]), np.array([up / portable.power(ratio, 0.4)] * 2 + [up])
 
 
 def mean_wind_mps(height_m: float, wind_mps: float) -> float:
     """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C, section 3.7."""
     feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
-    return wind_mps * np.log(feet / ROUGHNESS_FT) / np.log(20.0 / ROUGHNESS_FT)
+    return float(wind_mps * portable.log(feet / ROUGHNESS_FT) / portable.log(20.0 / ROUGHNESS_FT))
 
 
 def process(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[np.ndarray, ...]:
@@ -102,11 +103,11 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
     heading = rng.uniform(0.0, 2 * np.pi)
     first = rng.standard_normal((3, 5))
     normal = rng.standard_normal((3, len(times_s) - 1, 5))
-    forward = np.array([np.cos(heading), np.sin(heading), 0.0])
+    forward = np.array([portable.cos(heading), portable.sin(heading), 0.0])
     velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
     scales, intensities = turbulence(row["z_m"], settings["wind_mps"])
     through = velocity - mean_wind_mps(row["z_m"], settings["wind_mps"]) * forward
-    airspeed = max(float(np.linalg.norm(through)), SLOWEST_MPS)
+    airspeed = max(float(portable.norm(through)), SLOWEST_MPS)
     step = step_s(times_s)
     level, up = (settings["response_s"],) * 2 if settings["response_s"] else flight.response_s(cloud, airspeed)
     lag = settings["attitude_s"] or flight.attitude_s(cloud)
@@ -114,14 +115,14 @@ def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: n
         axis(scale / airspeed / step, number == 0, response / step, lag / step)
         for number, (scale, response) in enumerate(zip(scales, (level, level, up), strict=True))
     ]
-    start = np.stack([root @ one for (_, root, _), one in zip(axes, first, strict=True)])
+    start = np.stack([portable.applied(root, one) for (_, root, _), one in zip(axes, first, strict=True)])
     states = walk([each for each, _, _ in axes], start, normal)
-    found = np.stack([states[i] @ axes[i][2].T for i in range(3)]) * intensities[:, None, None]
+    found = np.stack([portable.product(states[i], axes[i][2].T) for i in range(3)]) * intensities[:, None, None]
     wind = np.stack([forward, [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
-    offset = (found[..., 2] - found[:, :1, 2]).T @ wind * step
-    acceleration = found[..., 3].T @ wind / step
+    offset = portable.product((found[..., 2] - found[:, :1, 2]).T, wind) * step
+    acceleration = portable.product(found[..., 3].T, wind) / step
     ahead = attitude(row["yaw_rad"], 0.0, 0.0)
-    return Perturbation({}, offset, tilt(acceleration @ ahead, pitches=cloud.like == "UAV"))
+    return Perturbation({}, offset, tilt(portable.product(acceleration, ahead), pitches=cloud.like == "UAV"))
 
 
 def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:
@@ -131,6 +132,6 @@ def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:
     """
     result = np.zeros((len(acceleration_mps2), 3))
     if pitches:
-        result[:, 1] = -np.arctan(acceleration_mps2[:, 1] / GRAVITY_MPS2)
-    result[:, 2] = np.arctan(acceleration_mps2[:, 0] / GRAVITY_MPS2)
+        result[:, 1] = -portable.arctan(acceleration_mps2[:, 1] / GRAVITY_MPS2)
+    result[:, 2] = portable.arctan(acceleration_mps2[:, 0] / GRAVITY_MPS2)
     return result

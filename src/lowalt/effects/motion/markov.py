@@ -1,15 +1,21 @@
 """Linear Gaussian processes driven by white noise, discretised exactly; the motion effects are made of them.
 
 A process x' = F x + g n with white noise n of unit intensity moves over a step h by x <- exp(F h) x + w, and the
-covariance of w is known in closed form; no step is too long for it, and none adds an error.
+covariance of w is known in closed form; no step is too long for it, and none adds an error. All operations are ones
+that IEEE 754 fixes, in one written order, so every processor draws the same walks.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm, solve_continuous_lyapunov
 
+from lowalt.common import portable
 from lowalt.common.jit import PLAIN
+
+_ORDER = 24
+"""Orders of the exponential's Taylor series; of norms up to 2 the rest is below 2^25 / 25! = 2e-18."""
+_LEAST = 1e-15
+"""Pivots of a covariance of unit variances that are smaller than this are roundings of zero."""
 
 
 class Steps(NamedTuple):
@@ -22,12 +28,41 @@ class Steps(NamedTuple):
 def root_of(covariance: np.ndarray) -> np.ndarray:
     """Return B (K, K) with B B^T = `covariance`, positive semidefinite to rounding.
 
-    States of very different size are scaled alike first, so that the small ones keep their digits.
+    States of very different size are scaled alike first, so that the small ones keep their digits. Source: Cholesky's
+    decomposition, the largest pivot first, so that those left out are the smallest: Higham 2002, section 10.3.
     """
     size = np.sqrt(np.diag(covariance))
     scale = np.where(size > 0, size, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    rest, root = covariance / (scale[:, None] * scale), np.zeros_like(covariance)
+    for column in range(len(rest)):
+        place = int(np.argmax(np.diag(rest)))
+        if rest[place, place] <= _LEAST:
+            break
+        root[:, column] = rest[:, place] / np.sqrt(rest[place, place])
+        rest = rest - root[:, None, column] * root[None, :, column]
+        rest[place], rest[:, place] = 0.0, 0.0
+    return scale[:, None] * root
+
+
+def exponential(matrix: np.ndarray) -> np.ndarray:
+    """Return the exponential of a matrix (K, K) whose largest column sum of sizes is at most 2."""
+    result = np.eye(len(matrix))
+    for order in range(_ORDER, 0, -1):
+        result = np.eye(len(matrix)) + portable.product(matrix, result) / order
+    return result
+
+
+def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Return x with matrix x = right, (K, K) and (K,), by elimination with pivots of rows that are scaled alike."""
+    scale = np.abs(matrix).max(axis=1)
+    table = np.concatenate([matrix, right[:, None]], axis=1) / scale[:, None]
+    for place in range(len(table)):
+        pivot = place + int(np.argmax(np.abs(table[place:, place])))
+        table[[place, pivot]] = table[[pivot, place]]
+        table[place] = table[place] / table[place, place]
+        others = np.arange(len(table)) != place
+        table[others] = table[others] - table[others, place, None] * table[place]
+    return table[:, -1]
 
 
 def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
@@ -37,23 +72,29 @@ def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
     """
     count = len(drift)
     # Short enough a part of the step that its exponentials neither grow nor cancel, then doubled.
-    halvings = max(0, int(np.ceil(np.log2(max(np.linalg.norm(drift, 1), 1.0)))))
+    halvings = max(0, int(np.frexp(portable.total(np.abs(drift), axis=0).max())[1]))
     block = np.zeros((2 * count, 2 * count))
     block[:count, :count] = -drift
-    block[:count, count:] = np.outer(noise, noise)
+    block[:count, count:] = noise[:, None] * noise
     block[count:, count:] = drift.T
-    found = expm(block / 2**halvings)
+    found = exponential(block / 2**halvings)
     transition = found[count:, count:].T
-    covariance = transition @ found[:count, count:]
+    covariance = portable.product(transition, found[:count, count:])
     for _ in range(halvings):
-        covariance = covariance + transition @ covariance @ transition.T
-        transition = transition @ transition
+        covariance = covariance + portable.product(portable.product(transition, covariance), transition.T)
+        transition = portable.product(transition, transition)
     return Steps(transition, root_of(0.5 * (covariance + covariance.T)))
 
 
 def stationary(drift: np.ndarray, noise: np.ndarray) -> np.ndarray:
     """Return the covariance (K, K) at which a stable process stays. Source: the Lyapunov equation."""
-    return solve_continuous_lyapunov(drift, -np.outer(noise, noise))
+    one = np.eye(len(drift))
+    # F P + P F^T = -g g^T, all K^2 equations at once.
+    matrix = (drift[:, None, :, None] * one[None, :, None] + one[:, None, :, None] * drift[None, :, None]).reshape(
+        one.size, one.size
+    )
+    found = solved(matrix, -(noise[:, None] * noise).ravel()).reshape(one.shape)
+    return 0.5 * (found + found.T)
 
 
 @PLAIN
