@@ -1,5 +1,7 @@
 """Users' meshes that cannot be read or used: each is refused by file, key and reason."""
 
+import json
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -45,6 +47,25 @@ def test_bad_files_are_refused_by_name_and_reason(name, text, reason, tmp_path):
     with pytest.raises(InputError, match=reason) as error:
         made("DJI Mini 2", tmp_path, **plain(name))
     assert name in str(error.value)
+
+
+def test_a_glb_compressed_by_draco_is_refused_with_the_way_out(tmp_path):
+    name = "KHR_draco_mesh_compression"
+    points = {"attributes": {"POSITION": 0}, "extensions": {name: {"bufferView": 0, "attributes": {"POSITION": 0}}}}
+    scene = {
+        "asset": {"version": "2.0"}, "extensionsUsed": [name], "extensionsRequired": [name],
+        "meshes": [{"primitives": [points]}], "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}],
+        "accessors": [{"componentType": 5126, "count": 3, "type": "VEC3"}],
+        "bufferViews": [{"buffer": 0, "byteLength": 8}], "buffers": [{"byteLength": 8}],
+    }  # fmt: skip
+    text = json.dumps(scene).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", 8, b"BIN\0") + bytes(8)
+    (tmp_path / "small.glb").write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
+    (tmp_path / "small.gltf").write_bytes(text)
+    for file in ("small.glb", "small.gltf"):
+        with pytest.raises(InputError, match=rf"{file}: is compressed by Draco.*export it without compression"):
+            read_mesh(tmp_path / file, "m")
 
 
 def test_nan_in_binary_stl_is_refused(tmp_path):

@@ -71,6 +71,14 @@ def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
     axes.scatter(seen[order, 0] + shift, seen[order, 1], c=colours(cloud)[order], s=size, linewidths=0)
 
 
+def caption(cloud: Cloud) -> str:
+    """Return a cloud's name, points, source and size, and how far apart the ends of a recording's cycle are."""
+    size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
+    source, gap = cloud.record["source"], cloud.record.get("loop_mismatch_m")
+    closes = "" if source != "mocap" or gap is None else f" (closes to {100 * gap:.2g} cm)"
+    return f"{cloud.subtype}\n{len(cloud.points)} points, {source}{closes}, {size} m"
+
+
 def _lineup(axes, clouds: list[Cloud]) -> None:
     """All clouds of a category side by side at one scale, with a bar of a round length."""
     widths = np.array([np.ptp(shown(cloud)[:, 0]) for cloud in clouds])
@@ -93,8 +101,7 @@ def _panel(axes, cloud: Cloud, aspect: float) -> None:
     half = max(width, height / aspect) / 2 * 1.06
     draw(axes, cloud, float(np.clip(1400 / len(cloud.points), 5, 22)))
     axes.set(xlim=(-half, half), ylim=(-half * aspect, half * aspect), xticks=[], yticks=[], aspect="equal")
-    size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
-    axes.set_title(f"{cloud.subtype}\n{len(cloud.points)} points, {cloud.record['source']}, {size} m", fontsize=7)
+    axes.set_title(caption(cloud), fontsize=7)
     for spine in axes.spines.values():
         spine.set_color("#d4d4d8")
 
