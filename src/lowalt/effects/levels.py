@@ -69,6 +69,10 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
         result.append(Level("loss beyond the cyclic prefix", kept, "dB"))
     if "clutter" in effects:
         result += _clutter(view, effects["clutter"], range_m)
+    if "background_channel" in effects:
+        around = effects["background_channel"]
+        usual = dbm(around.module.usual_power(around.settings, view))
+        result.append(Level("background, one subcarrier, median of draws", usual, "dBm"))
     if sender is not station and "direct_path" in effects:
         direct = effects["direct_path"].module.scatter(effects["direct_path"].settings, view, None)
         result.append(Level("direct path, one subcarrier", dbm(float(np.mean(abs(direct) ** 2))), "dBm"))

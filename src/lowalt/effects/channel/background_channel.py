@@ -33,6 +33,8 @@ PLACES = {
 WEAK = 360, -25.0
 """Number of weak clusters, of one ray each, and their power over that of the strongest cluster (dB)."""
 HIGHEST_RURAL_GHZ = 7.0
+USUAL = 64
+"""Draws whose median is the usual level."""
 
 
 def idle(settings: dict) -> bool:
@@ -114,6 +116,12 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     steps = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
     turned = np.exp(-2j * np.pi * late[:, None] * steps)
     return np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy()
+
+
+def usual_power(settings: dict, view: View) -> float:
+    """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
+    drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
+    return float(np.median([np.mean(abs(one) ** 2) for one in drawn]))
 
 
 def _antennas(view: View, network: Network, station: Station, direction: np.ndarray) -> np.ndarray:
