@@ -17,7 +17,7 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.effects import interpolation, moment_loops, response_loops
+from lowalt.effects import interpolation, moment_loops, near_field, response_loops
 
 
 class ImagePath(NamedTuple):
@@ -186,11 +186,12 @@ class _PathFactors:
         if wavefront:
             gains = np.empty_like(out)
             centre = 0.5 * (kappas.min() + kappas.max())
-            series = _series(np.pi * (kappas - centre) / spacing, spacing * _half_diagonal(shape), error)
-            response_loops.near_field(
-                self.places, radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape,
-                series, response_loops.waves(error), gains,
+            series = _series(np.pi * (kappas - centre) / spacing, spacing * _half_diagonal(shape), error / 40)
+            array = near_field.Arrays(
+                radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
+                response_loops.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
             )  # fmt: skip
+            near_field.sums(self.places, array, error, gains)
         fault = response_loops.one_way(
             self.places, radio.station, axes, self.refs, self.origin, 0.5 * radio.turns, spacing, self.aims,
             radio.kappa, kappas, squint, shape, self.coefficient, gains, out, excess,

@@ -1,0 +1,207 @@
+"""Array sums of spherical waves at many points, from sums at few nodes of the box of directions and ranges they fill.
+
+A target fills a small box of direction cosines and inverse ranges while a few symbols last, and over it an array's sum
+is a smooth function: a polynomial of a few dozen terms. Each element's path beyond that of the array's middle changes
+by at most STRETCH times half the array's side per unit of direction cosine, and by at most DEPTH D^2 per unit of
+inverse range, D being the array's diagonal. That holds for complex directions too, as long as cosines are below WIDEST
+and D times the inverse range below NEAR: with a = -(x psi + y omega), b = x^2 + y^2 and u = 2 t a + t^2 b, a path is
+(sqrt(1 + u) - 1) / t, and |u| < 0.104. These rates bound the sum on ellipses in the complex plane, and so the size of
+its Chebyshev terms (Trefethen, Approximation Theory and Approximation Practice, 2013, theorems 8.1 and 8.2).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.effects import interpolation, response_loops
+from lowalt.effects.moment_loops import BLOCK, LOOPS
+
+SYMBOLS = 100
+"""Symbols that share a box."""
+STRETCH, DEPTH, LOUDER = 1.23, 3.2, 1.06
+WIDEST, NEAR = 1.2, 0.03
+ELLIPSES = 1.0 + 2.0 ** np.arange(-3.0, 14.0)
+"""Sums of the semi-axes of the ellipses on which sums are bounded."""
+WORK = 1_000_000
+"""Time of a box's nodes and terms before any point is summed, in terms of one point."""
+LEBESGUE = 3.5
+"""Bound of the norm of an interpolation from up to 50 Chebyshev points, 1 + (2 / pi) log(n + 1)."""
+MOST = 50
+DECAYS = np.log(ELLIPSES)[:, None] * np.arange(MOST)
+
+
+class Arrays(NamedTuple):
+    """One station's array as `response_loops.near_field` takes it, without places and results; and `highest`, turns a
+    metre at the band's upper end."""
+
+    station: np.ndarray
+    axes: tuple[float, float]
+    spacing: float
+    wave: float
+    beam: float
+    aims: tuple[float, float]
+    shape: tuple[int, int]
+    series: np.ndarray
+    rows: np.ndarray
+    highest: float
+
+
+@LOOPS
+def directions(places, station, axes, out):
+    """Fill out (3, N, L) with direction cosines across and up, and inverse ranges (1/m), of places (N, L, 3)."""
+    sine, cosine = axes
+    for n in range(places.shape[0]):
+        for i in range(places.shape[1]):
+            x, y, z = places[n, i, 0] - station[0], places[n, i, 1] - station[1], places[n, i, 2] - station[2]
+            inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
+            out[0, n, i], out[1, n, i], out[2, n, i] = (cosine * y - sine * x) * inverse, z * inverse, inverse
+
+
+@LOOPS
+def chebyshev(at, middle, half, table):
+    """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,)."""
+    for i in range(len(at)):
+        table[0, i] = 1.0
+    for k in range(1, len(table)):
+        for i in range(len(at)):
+            x = (at[i] - middle) / half
+            table[k, i] = 2.0 * x * table[k - 1, i] - table[k - 2, i] if k > 1 else x
+
+
+@LOOPS
+def added(four, first, across, weight, total):
+    """Add weight (L,) times the sum of four (BLOCK,) times the rows of `across` from `first` on to total (L,)."""
+    t, u, v, w = four[0], four[1], four[2], four[3]
+    for i in range(len(total)):
+        total[i] += weight[i] * (
+            (t * across[first, i] + u * across[first + 1, i]) + (v * across[first + 2, i] + w * across[first + 3, i])
+        )
+
+
+@LOOPS
+def evaluated(at, middle, half, terms, lengths, out):
+    """Fill out (Q, N, L) with the polynomials `terms` (2, Q, B, C, A), real and imaginary, of directions at (3, N, L).
+
+    Chebyshev polynomials of (at - middle) / half: A across, B up, C inverse range; of each (B, C) the first
+    lengths[b, c] count, which are multiples of BLOCK.
+    """
+    count = at.shape[2]
+    across, up = np.empty((terms.shape[4], count)), np.empty((terms.shape[2], count))
+    near, weight, total = np.empty((terms.shape[3], count)), np.empty(count), np.empty((2, terms.shape[1], count))
+    for n in range(at.shape[1]):
+        chebyshev(at[0, n], middle[0], half[0], across)
+        chebyshev(at[1, n], middle[1], half[1], up)
+        chebyshev(at[2, n], middle[2], half[2], near)
+        total[:] = 0.0
+        for b in range(terms.shape[2]):
+            for c in range(terms.shape[3]):
+                for i in range(count):
+                    weight[i] = up[b, i] * near[c, i]
+                for q in range(terms.shape[1]):
+                    for a in range(0, lengths[b, c], BLOCK):
+                        added(terms[0, q, b, c, a:], a, across, weight, total[0, q])
+                        added(terms[1, q, b, c, a:], a, across, weight, total[1, q])
+        for q in range(terms.shape[1]):
+            for i in range(count):
+                out[q, n, i] = complex(total[0, q, i], total[1, q, i])
+
+
+def sums(places: np.ndarray, array: Arrays, error: float, out: np.ndarray) -> None:
+    """Fill out (Q, N, L) with the array's sums at places (N, L, 3) m, within `error` of the number of elements."""
+    at = np.empty((3, *places.shape[:2]))
+    directions(places, array.station, array.axes, at)
+    for first in range(0, len(places), SYMBOLS):
+        rows = slice(first, first + SYMBOLS)
+        # A term takes about as long as a fifth of an element.
+        each = np.prod(array.shape) * (4 + array.series.shape[1])
+        points = places[rows].shape[0] * places.shape[1]
+        if points * each < WORK:
+            _every_point(places[rows], array, out[:, rows])
+            continue
+        low, high = at[:, rows].min(axis=(1, 2)), at[:, rows].max(axis=(1, 2))
+        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9 * np.array([1.0, 1.0, high[2]]))
+        sizes = term_bounds(middle, half, array)
+        counts = None if sizes is None else node_counts(sizes, error / 4)
+        nodes = None if counts is None else _nodes(counts, middle, half, array)
+        lengths = None if nodes is None else _lengths(sizes, counts, error / 4)
+        if nodes is None or WORK + points * len(out) * lengths.sum() + nodes.shape[1] * each > points * each:
+            _every_point(places[rows], array, out[:, rows])
+            continue
+        terms = _terms(nodes, counts, array, len(out))
+        evaluated(np.ascontiguousarray(at[:, rows]), middle, half, terms, lengths, out[:, rows])
+
+
+def _every_point(places: np.ndarray, array: Arrays, out: np.ndarray) -> None:
+    """Fill out (Q, N, L) with the sums at places (N, L, 3) m, element by element."""
+    response_loops.near_field(places, *array[:-1], out)
+
+
+def term_bounds(middle: np.ndarray, half: np.ndarray, array: Arrays) -> np.ndarray | None:
+    """Return bounds (3, MOST) whose products bound the Chebyshev terms of the sums over the number of elements.
+
+    None where the rates of change do not hold. A function below M on an ellipse has terms below 2 M rho^-k.
+    """
+    wide, high = (array.spacing * (count - 1) for count in array.shape)
+    diagonal = float(np.hypot(wide, high))
+    rates = (
+        2 * np.pi * array.highest * np.array([0.5 * STRETCH * wide, 0.5 * STRETCH * high, DEPTH * diagonal**2]) * half
+    )
+    swollen = 0.5 * (ELLIPSES + 1.0 / ELLIPSES)
+    result = np.empty((3, MOST))
+    for axis, rate in enumerate(rates):
+        if axis < 2:
+            holds = abs(middle[axis]) + half[axis] * swollen <= WIDEST
+        else:
+            holds = diagonal * (middle[2] + half[2] * swollen) <= NEAR
+        if not holds.any():
+            return None
+        # The amplitude of an element is at most LOUDER times the corner's.
+        growth = 0.5 * rate * (ELLIPSES - 1.0 / ELLIPSES)[holds, None]
+        result[axis] = 2.0 * LOUDER ** (axis == 0) * np.exp((growth - DECAYS[holds]).min(axis=0))
+    return result
+
+
+def node_counts(sizes: np.ndarray, error: float) -> tuple[int, int, int] | None:
+    """Return how many Chebyshev points each direction needs for this error together; None where that is too many."""
+    # Interpolation folds each term left out onto another one, so it errs twice by them; the axes follow each other.
+    left = 2.0 * LEBESGUE**2 * np.cumsum(sizes[:, ::-1], axis=1)[:, ::-1]
+    enough = left <= error / 3.0
+    if not enough.any(axis=1).all():
+        return None
+    return tuple(np.maximum(enough.argmax(axis=1), 1).tolist())
+
+
+def _nodes(counts: tuple[int, int, int], middle: np.ndarray, half: np.ndarray, array: Arrays) -> np.ndarray | None:
+    """The places (1, K, 3) m of all nodes, None where a node is no direction."""
+    grid = [m + h * interpolation.points(count) for count, m, h in zip(counts, middle, half, strict=True)]
+    across, up, inverse = (axis.ravel() for axis in np.meshgrid(*grid, indexing="ij"))
+    ahead = 1.0 - across**2 - up**2
+    if not (ahead > 0).all():
+        return None
+    sine, cosine = array.axes
+    # The sums depend on the direction along the array alone, so its front stands for its back.
+    x, y = np.sqrt(ahead) * cosine - across * sine, np.sqrt(ahead) * sine + across * cosine
+    return (array.station + np.stack([x, y, up], axis=1) / inverse[:, None])[None]
+
+
+def _terms(nodes: np.ndarray, counts: tuple[int, int, int], array: Arrays, frequencies: int) -> np.ndarray:
+    """Chebyshev coefficients (2, Q, B, C, A) of the sums, real and imaginary, A rounded up to a multiple of BLOCK."""
+    values = np.empty((frequencies, 1, nodes.shape[1]), np.complex128)
+    _every_point(nodes, array, values)
+    across, up, near = (interpolation.coefficients(count) for count in counts)
+    found = values.reshape(frequencies, *counts) @ near.T
+    found = np.tensordot(up @ found, across, ([1], [1]))
+    padded = np.zeros((2, *found.shape[:3], -(-counts[0] // BLOCK) * BLOCK))
+    padded[0, ..., : counts[0]], padded[1, ..., : counts[0]] = found.real, found.imag
+    return padded
+
+
+def _lengths(sizes: np.ndarray, counts: tuple[int, int, int], error: float) -> np.ndarray:
+    """How many terms of each row (B, C) matter: those left out sum to at most `error`. Multiples of BLOCK."""
+    across, up, near = (sizes[axis, :count] for axis, count in enumerate(counts))
+    bound = up[:, None, None] * near[:, None] * across
+    ordered = np.sort(bound, axis=None)
+    dropped = int(np.searchsorted(np.cumsum(ordered), error))
+    matters = bound >= ordered[dropped] if dropped < ordered.size else np.zeros(bound.shape, np.bool_)
+    lengths = np.where(matters.any(axis=2), counts[0] - matters[:, :, ::-1].argmax(axis=2), 0)
+    return -(-lengths // BLOCK) * BLOCK

@@ -1,0 +1,85 @@
+"""Sums of spherical waves from a box's nodes, held against the sum over every element at every point."""
+
+import numpy as np
+import pytest
+
+from lowalt.common.config import load_yaml
+from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.effects import near_field, response_loops
+
+NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
+SPACING = SPEED_OF_LIGHT / (2 * NETWORK.carrier_hz)
+
+
+def given(shape: tuple[int, int]) -> near_field.Arrays:
+    turn = 0.7
+    return near_field.Arrays(
+        np.array([3.0, -4.0, 25.0]), (np.sin(turn), np.cos(turn)), SPACING, 0.5 / SPACING, 1.0, (0.3, 0.1), shape,
+        np.ones((1, 1), np.complex128), response_loops.waves(1e-16), 0.505 / SPACING,
+    )  # fmt: skip
+
+
+def direct(places: np.ndarray, array: near_field.Arrays) -> np.ndarray:
+    """The sum over elements with NumPy, relative to the path of the array's middle."""
+    sine, cosine = array.axes
+    d = places - array.station
+    wide, high = array.shape
+    elements = np.array([
+        [-sine * i * SPACING, cosine * i * SPACING, j * SPACING] for i in range(wide) for j in range(high)
+    ])  # fmt: skip
+    middle = elements.mean(axis=0)
+    weights = np.array([
+        np.exp(-1j * np.pi * ((i - 0.5 * (wide - 1)) * array.aims[0] + (j - 0.5 * (high - 1)) * array.aims[1]))
+        for i in range(wide) for j in range(high)
+    ])  # fmt: skip
+    r, reference = np.linalg.norm(d, axis=2), np.linalg.norm(d - middle, axis=2)
+    total = np.zeros(r.shape, np.complex128)
+    for element, weight in zip(elements, weights, strict=True):
+        own = np.linalg.norm(d - element, axis=2)
+        total += weight * r / own * np.exp(-2j * np.pi * array.wave * (own - reference))
+    return total
+
+
+@pytest.mark.parametrize("shape", [(16, 4), (8, 8), (5, 3)])
+@pytest.mark.parametrize("range_m", [25.0, 60.0, 400.0])
+@pytest.mark.parametrize("error", [1e-13, 1e-8, 1e-4])
+def test_sums_of_a_box_keep_their_error(shape, range_m, error, monkeypatch):
+    rng = np.random.default_rng(int(range_m) + shape[0])
+    array, used = given(shape), []
+    evaluated = near_field.evaluated
+    monkeypatch.setattr(near_field, "evaluated", lambda *values: (used.append(1), evaluated(*values)))
+    monkeypatch.setattr(near_field, "WORK", 0)
+    way = np.array([0.8, 0.5, 0.33])
+    course = np.linspace(-1.5, 1.5, 120)[:, None, None] * rng.normal(size=3)
+    places = array.station + range_m * way + course + rng.uniform(-0.6, 0.6, (150, 3))
+    out = np.empty((1, 120, 150), np.complex128)
+    near_field.sums(places, array, error, out)
+    truth = direct(places, array)
+    # The plain difference of two ranges in the truth loses digits with range.
+    assert abs(out[0] - truth).max() <= max(error, 1e-14 * range_m) * np.prod(shape)
+    # Coarse errors and far targets must have gone through the box.
+    assert used or error < 1e-4 or range_m < 60
+
+
+def test_close_points_and_small_targets_are_summed_one_by_one(monkeypatch):
+    monkeypatch.setattr(near_field, "evaluated", lambda *values: pytest.fail("a box was used"))
+    array = given((16, 4))
+    rng = np.random.default_rng(3)
+    for range_m, points in ((4.0, 400), (200.0, 3)):
+        places = array.station + np.array([range_m, 0.0, 1.0]) + rng.uniform(-0.5, 0.5, (100, points, 3))
+        out = np.empty((1, 100, points), np.complex128)
+        near_field.sums(places, array, 1e-6, out)
+        assert abs(out[0] - direct(places, array)).max() <= 1e-6 * 64
+
+
+def test_terms_fall_below_their_bounds():
+    array = given((16, 4))
+    middle, half = np.array([0.5, 0.2, 1 / 40.0]), np.array([0.04, 0.03, 4e-4])
+    sizes = near_field.term_bounds(middle, half, array)
+    counts = (24, 14, 10)
+    terms = near_field._terms(near_field._nodes(counts, middle, half, array), counts, array, 1)
+    found = np.hypot(*terms[:, 0]).transpose(2, 0, 1)[:24] / 64
+    bound = sizes[0, :24, None, None] * sizes[1, None, :14, None] * sizes[2, :10]
+    assert (found <= bound + 1e-14).all()
+    # The bounds are of use: the largest terms of an order are within a hundred times theirs.
+    assert found[8].max() > 1e-4 * bound[8].max()
