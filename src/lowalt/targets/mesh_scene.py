@@ -32,9 +32,9 @@ class Piece:
 
 
 def _compressed(path: Path) -> bool:
-    """Whether a GLB or glTF file needs the Draco decoder, which trimesh does not have."""
+    """Whether a GLB needs the Draco decoder, which trimesh does not have."""
     with path.open("rb") as file:
-        return path.suffix.lower() in (".glb", ".gltf") and b"KHR_draco_mesh_compression" in file.read(HEADER_BYTES)
+        return path.suffix.lower() == ".glb" and b"KHR_draco_mesh_compression" in file.read(HEADER_BYTES)
 
 
 def pieces(path: Path, groups: bool = False) -> list[Piece]:
@@ -48,9 +48,7 @@ def pieces(path: Path, groups: bool = False) -> list[Piece]:
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
     if _compressed(path):
-        raise InputError(
-            f"{path}: is compressed by Draco, expected a plain GLB or glTF file: export it without compression"
-        )
+        raise InputError(f"{path}: is compressed by Draco, expected a plain GLB: export it without compression")
     options = {"split_objects": True, "split_groups": True, "group_material": False} if groups else {}
     found = []
     try:
