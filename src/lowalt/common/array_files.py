@@ -1,4 +1,4 @@
-"""Files of arrays (.npy, .npz) from anywhere: what reading a damaged one may raise, and what one may promise."""
+"""Files of arrays (.npy, .npz) from anywhere: the errors of damaged ones, and limits on the size they may claim."""
 
 import struct
 import tokenize
@@ -18,7 +18,7 @@ UNREADABLE = (
 FREE_BYTES = 64 << 20
 """Up to this size a member of an archive may expand as it likes."""
 MOST_EXPANSION = 16
-"""Larger members may be this many times their compressed size; the project's own are stored as they are."""
+"""Larger members may be this many times their compressed size; the project's own files are not compressed."""
 
 
 def checked_archive(path: str | Path, what: str) -> Path:

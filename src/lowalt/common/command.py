@@ -25,7 +25,7 @@ def parser(module: str, description: str) -> argparse.ArgumentParser:
 
 
 def _argument(text: str) -> dict:
-    """`settings`, with its words kept: argparse replaces the message of any ValueError."""
+    """Return `settings` of the text and keep its error message: argparse replaces the message of any ValueError."""
     try:
         return settings(text)
     except InputError as error:

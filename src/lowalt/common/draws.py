@@ -103,10 +103,10 @@ class Draws(np.random.Generator):
         return np.concatenate(parts) if parts else np.zeros(0, np.uint64)
 
     def _shuffled(self, count: int, first: int) -> np.ndarray:
-        """0 .. count - 1, the places from the last down to `first` changed with one drawn from those not above."""
+        """Return 0 .. count - 1, each place from the last to `first` swapped with a random place not above it."""
         order, place = list(range(count)), count - 1
         while place >= first:
-            # Each place needs a half or more, so no half is drawn that is not used.
+            # Each place needs at least one half, so every half that is drawn is used.
             for half in self._halves(place - first + 1).tolist():
                 partner = half & ((1 << place.bit_length()) - 1)
                 if partner <= place:
@@ -142,7 +142,7 @@ class Draws(np.random.Generator):
             raise InputError(f"standard_normal: arguments {sorted(kwargs)}, expected none besides size")
         count = _count(size)
         if count >= COMPILED:
-            # Loaded here, since most commands draw few numbers and start in less time than the compiler needs.
+            # Loaded here: most commands draw few numbers, and loading the compiler would take longer than the draws.
             from lowalt.common.normals import interleaved
 
             return _shaped(interleaved(self.words(count + count % 2))[:count], size)

@@ -52,7 +52,7 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
 
 
 def _sweep(path: Path) -> None:
-    """Remove what killed processes had written of `path`: nobody else would, and a full disk needs the room."""
+    """Remove the temporary files that killed processes left of `path`: a full disk needs the room."""
     begin, end = f".{path.stem}.", f".part{path.suffix}"
     for entry in os.scandir(path.parent):
         number = entry.name.removeprefix(begin).removesuffix(end)

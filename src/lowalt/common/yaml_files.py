@@ -58,7 +58,7 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         value = None if root is None else loader.construct_document(root)
     except InputError:
         raise
-    # Beside its own errors the library lets those of its converters pass: a date of month 99, a number of 5000 digits.
+    # Besides its own errors, the library raises those of its converters: a date of month 99, a number of 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: not YAML ({error})") from error
     except RecursionError:

@@ -14,9 +14,6 @@ INTERVAL = ("edge_mps", "line_mps", "width_mps", "kurtosis", "entropy")
 EDGE_SHARE = 0.95
 
 
-SIDES = ("both", "positive", "wrapped")
-
-
 def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the numbers of the speeds that are shown, in order, and the speeds (m/s) that they stand for.
 

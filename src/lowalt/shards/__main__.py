@@ -52,7 +52,7 @@ def write(arguments: list[str]) -> None:
 
 
 def _classes(settings: dict) -> tuple[str, ...]:
-    """Take the classes out of the settings of a command: the published ones where they do not stand there."""
+    """Remove the classes from a command's settings and return them: the published ones if the settings name none."""
     found = stated(settings)
     settings.pop("classes", None)
     return found

@@ -69,7 +69,7 @@ def _slug(key: str) -> str:
 
 
 def _subtypes(shards: ShardSet) -> tuple[np.ndarray, list[dict]]:
-    """For every sample the number of its subtype, and of each subtype one record."""
+    """Return the number of every sample's subtype, and one record of each subtype."""
     slugs = [_slug(key.decode()) for key in shards.keys.tolist()]
     _, first, numbers = np.unique(slugs, return_index=True, return_inverse=True)
     return numbers, [shards.record(int(place)) for place in first]
@@ -132,7 +132,7 @@ def size_category(samples: int) -> str:
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
-    """Return a pattern that matches the shards of a group and fold, or their names where they are called otherwise."""
+    """Return a pattern that matches the shards of a group and fold, or else the names themselves."""
     names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
     usual = f"{group}-{fold}-"
     return [f"{usual}*.tar"] if all(name.startswith(usual) for name in names) else names

@@ -1,4 +1,4 @@
-"""What earlier stages have left of a chunk, as a function from (motion model, SNR) to the bytes of a shard's member."""
+"""The files of a chunk from earlier stages, as a function from (motion model, SNR) to a shard member's bytes."""
 
 from collections.abc import Callable
 

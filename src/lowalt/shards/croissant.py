@@ -78,7 +78,7 @@ MEDIA = {
     ),
 }
 OF = {"image": "sample", "signal": "sample", "recipe": "motion model"}
-"""What one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
+"""The set of records that one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
 
 
 def metadata(index: dict, table: dict, facts: dict) -> dict:
@@ -131,7 +131,7 @@ def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str)
 
 
 def _samples(path: str, classes: tuple[str, ...]) -> dict:
-    """One row a sample, from the table."""
+    """The record set with one row for each sample, from the table."""
     named = ", ".join(f"{number} {name}" for number, name in enumerate(classes))
     fields = [
         {
@@ -148,7 +148,7 @@ def _samples(path: str, classes: tuple[str, ...]) -> dict:
 
 
 def _media(kind: str, data_type: str, meaning: str) -> dict:
-    """One row a member: its name and the member itself."""
+    """The record set with one row for each member: its name and the member itself."""
     name = f"{kind}s"
     parts = {"file": ("sc:Text", "filename", "Name of the member: KEY and its extension."),
              "content": (data_type, "content", meaning)}  # fmt: skip

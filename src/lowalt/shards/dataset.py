@@ -38,7 +38,7 @@ class Sample(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Which sample a number means."""
+    """The sample that a number stands for."""
 
     group: str
     subtype: str
@@ -115,7 +115,7 @@ class Dataset:
         return self._all if self._numbers is None else len(self._numbers)
 
     def _place(self, number: int) -> Place:
-        """Which sample a number over all folds means."""
+        """Return the sample that a number, counted over all folds, stands for."""
         rest, level = divmod(number, len(self.plan.snrs))
         for group in self.groups:
             names = self.plan.groups[group]
@@ -215,7 +215,7 @@ class Endless:
         self.first = dataset.plan.models if first is None else first
 
     def places(self) -> Iterator[Place]:
-        """Yield which sample comes next; nothing is made."""
+        """Yield the place of each sample in turn; no sample is made."""
         plan = self.dataset.plan
         for model in itertools.count(self.first + self.part, self.parts):
             for group in self.dataset.groups:

@@ -61,7 +61,7 @@ def build(
 
 
 def _checksum(index: dict) -> str:
-    """SHA-256 of everything in an index but the checksum itself."""
+    """SHA-256 of everything in an index except the checksum itself."""
     content = {name: value for name, value in index.items() if name != "sha256"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
@@ -96,7 +96,7 @@ NEEDED = {"name": str, "path": str, "group": str, "fold": str, "samples": int, "
 
 
 def _check_entries(index: dict, path: str | Path) -> None:
-    """Refuse an index whose checksum is right and whose shards are no shards, or lie outside its folder."""
+    """Refuse an index whose entries are no shards or name files outside its folder, even if its checksum is right."""
     entries = index.get("shards")
     if not isinstance(entries, list) or not isinstance(index.get("kind"), str):
         raise InputError(f"{path}: lacks its kind or its list of shards")

@@ -70,7 +70,7 @@ def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
 
 
 def _seen(row: dict, station: Station) -> dict[str, float]:
-    """What one station's place and array see of the target's reference point."""
+    """Range, direction and speed of the target's reference point, seen by one station's array."""
     offset = np.array([row["x_m"], row["y_m"], row["z_m"]]) - np.array(station.position_m)
     distance = float(norm(offset))
     towards = offset / distance if distance != 0 else np.zeros(3)

@@ -43,7 +43,7 @@ SIZES = {
     "plane": "wing span", "lift and cruise": "wing span", "helicopter": "rotor diameter",
     "tail rotor": "rotor diameter", "balloon": "envelope diameter",
 }  # fmt: skip
-"""What the published size of each layout is."""
+"""The extent that the published size of each layout states."""
 
 _ROTORS = {"plane": (1,), "lift and cruise": (1, 5), "helicopter": (1,), "tail rotor": (2,), "balloon": (None,)}
 """Rotors that turn: a plane's lift propellers stand still in cruise and turn in hover and transition."""

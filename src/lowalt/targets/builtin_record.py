@@ -1,4 +1,4 @@
-"""What the record of a built-in model may say, and the check of it: the model's figures, their units and sources."""
+"""The record of a built-in model: its keys, and the check of its figures with their units and sources."""
 
 import math
 

@@ -154,7 +154,7 @@ def _cycle(record: dict, frames: int) -> tuple[np.ndarray, tuple[str, ...], floa
 
 
 def _gait_facts(record: dict, names: tuple[str, ...], track: np.ndarray, rate_hz: float, speed_mps: float) -> dict:
-    """What a record says of the feet; or of wheels, which turn with the speed whatever `motion.cadence` is."""
+    """The record's entries for feet, or for wheels, which turn with the speed whatever `motion.cadence` is."""
     if record["gait"] == "cycle":
         return {"cadence": "tied"}
     feet = FEET if names == NODES else [number for number, name in enumerate(names) if name.endswith("paw")]

@@ -1,4 +1,4 @@
-"""What walkers on four legs and cyclists share: a limb of two bones from a fixed joint to a point that moves.
+"""A limb of two bones from a fixed joint to a moving point, as walkers on four legs and cyclists have it.
 
 Axes: x right, y front, z up, metres; positions, not angles, since the feet's paths are what is known.
 """

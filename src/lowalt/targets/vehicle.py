@@ -48,7 +48,7 @@ def fault(record: dict) -> str | None:
 
 
 def _profile_fault(f: dict, table: dict) -> str | None:
-    """What makes the figures of a car's side view no car's, or None."""
+    """The fault in the figures of a car's side view, or None where they describe a car."""
     stations = [f[name] for name in ("windshield_base", "roof_front", "roof_rear", "rear_glass_base")]
     if not 0.18 < stations[0] < stations[1] < stations[2] < stations[3] < 1:
         return f"figures windshield_base to rear_glass_base are {stations}, expected rising from 0.18 to 1"

@@ -25,7 +25,7 @@ def noise_modules(config: dict) -> list[str]:
 
 
 def content(wildcards: Any, input: Any) -> str:
-    """What a shard is packed from, by its kind."""
+    """Options that name the files that a shard is packed from, by its kind."""
     found = {name: input.get(name) for name in ("signals", "tiles", "echoes", "powers")}
     return " ".join(f"--{name} {paths}" for name, paths in found.items() if paths)
 

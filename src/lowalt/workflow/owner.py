@@ -1,4 +1,4 @@
-"""Who holds a run's lock: a process named so that it is recognised, or known to be dead, after any crash.
+"""The holder of a run's lock: a process named so that it is recognised, or known to be dead, after any crash.
 
 The system reuses process ids, so the record also holds the start time of the process; the boot id tells whether the
 machine has started anew since; host and process-id namespace tell whether the id can be looked up here at all.

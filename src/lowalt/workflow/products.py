@@ -240,7 +240,7 @@ class Products:
         return files
 
     def prepared(self, wildcards: Any) -> list[str]:
-        """What the run makes without torch before its first training; nothing where its data are another run's.
+        """Files that the run makes without torch before its first training; none where its data are another run's.
 
         The echo's cost is left out: a download at the same time would falsify its times.
         """

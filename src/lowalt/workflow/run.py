@@ -141,7 +141,7 @@ class Run:
 
     @property
     def launcher(self) -> str:
-        """What stands between `python -m` and the training's module: torchrun's own module for several processes."""
+        """The words between `python -m` and the training's module: torchrun's own module for several processes."""
         alone = self.processes == 1
         return "" if alone else f"torch.distributed.run --standalone --nproc-per-node {self.processes} -m"
 

@@ -23,7 +23,7 @@ arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
 
 
 class Placing(NamedTuple):
-    """What places a symbol's points: twice the unit vector to the reference (array's axes), and how the horizontal and
+    """Constants that place the points: twice the unit vector to the reference (array's axes), and how horizontal and
     vertical coordinates become direction cosines on [-1, 1] before the division by r."""
 
     twice_x: float

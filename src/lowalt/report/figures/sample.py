@@ -11,7 +11,7 @@ from lowalt.tiles.render import Renderer, split
 
 
 class Axes(NamedTuple):
-    """What the edges of an image stand for: its width (s), and the speeds (m/s) of its lowest and highest row."""
+    """The scales of an image: its width (s), and the speeds (m/s) of its lowest and highest row."""
 
     seconds: float
     bottom_mps: float
