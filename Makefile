@@ -139,9 +139,9 @@ accuracy-cost: $(SETUP)  ## what recognition accuracy costs in time: results/def
 	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost
 
 # The paper's scene first: its model is what the other scenes' samples are tried on, in addition to a model of their own.
-scenes: $(SETUP)  ## small trials of three scenes: accuracy of a model trained without effects, and of their own
+scenes: $(SETUP)  ## small trials of the paper's scene and three others: accuracy of a model trained without effects, and of their own
 	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- models results/scene-paper/accuracy.csv
-	for scene in urban worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
+	for scene in urban rural worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
 		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
 
 effects-cost: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png

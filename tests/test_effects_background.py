@@ -81,15 +81,19 @@ def test_spreads_have_the_tables_medians_and_correlations(environment):
 def test_clusters_keep_their_power_and_have_about_the_spreads_asked_for(environment):
     rng = np.random.default_rng(3)
     link, large = Link(100.0, 25.0, 5.0, 4.9), Large(1e-7, 12.0, 2.0, 0.0)
-    delays, angles = [], []
+    delays, angles, zeniths = [], [], []
     for _ in range(400):
         rays = fast_fading.rays(environment, link, large, rng)
         share = rays.power / rays.power.sum()
         assert 0.93 < rays.power.sum() <= 1 + 1e-12 and len(share) % 20 == 0
         assert rays.delay_s.min() == 0
         delays.append(np.sqrt(share @ rays.delay_s**2 - (share @ rays.delay_s) ** 2))
+        zeniths.append(share @ rays.zenith_deg)
         angles.append(np.sqrt(share @ rays.azimuth_deg**2 - (share @ rays.azimuth_deg) ** 2))
     assert np.mean(delays) == pytest.approx(large.delay_s, rel=0.25)
+    # The point lies 20 m below the station and 100 m away: 90 + atan(0.2) degrees from the zenith.
+    below = 101.310 + fast_fading.zenith_spread(environment, link)[1]
+    assert np.mean(zeniths) == pytest.approx(below, abs=0.3)
     # The rays' own spread adds to the clusters'.
     wide = np.hypot(large.azimuth_deg, fast_fading.ENVIRONMENTS[environment].cluster_azimuth_deg)
     assert np.mean(angles) == pytest.approx(wide, rel=0.25)
