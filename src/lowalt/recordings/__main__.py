@@ -113,16 +113,19 @@ def compare_(arguments: list[str]) -> None:
     """Compute measured-figures.csv, measured-files.csv and measured-distances.csv."""
     options = _line("compare", compare_.__doc__, inputs=True)
     options.add_argument("--count", type=int, default=60, help="simulated intervals a class")
+    options.add_argument("--recorded", default=f"{FOLDER}/recorded.yaml", help="scenes as they were recorded")
     given = options.parse_args(arguments)
     block, found = load_yaml(given.pairs), recordings(given.inputs, given.sets, given.split)
-    library = Library.read(given.twins)
+    library, recorded = Library.read(given.twins), Library.read(given.recorded)
     rows, files = [], []
     for name, pair in block["pairs"].items():
         more = compare.class_figures(name, pair, found, library.records, block)
         rows += more[0]
         files += more[1]
     apart = [
-        row for name in library.twins for row in compare.distances(name, found, library, block["mended"], given.count)
+        row
+        for name in library.twins
+        for row in compare.distances(name, found, library, recorded, block["mended"], given.count)
     ]
     samples.write_table(given.out / "measured-figures.csv", compare.FIGURES, rows)
     samples.write_table(given.out / "measured-files.csv", ("pair", "half", "file", "figure", "value"), files)

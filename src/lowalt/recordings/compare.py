@@ -4,7 +4,9 @@ measured-figures.csv: figures of whole recordings and of simulated scenes of the
 measured-distances.csv: Wasserstein distances of the figures of coherent intervals, in the figure's unit,
     floor      between the two halves of the measured set (by file)
     before     measured to simulated without the mends of the model
-    distance   measured to simulated, low and high its 95 % interval over files
+    distance   measured to simulated as recorded, low and high its 95 % interval over files
+    tuning     the same with the half of the recordings that set the scenes, test with the other half
+    learnt     measured to the wider scenes that networks learn from
     ceiling    measured to the nearest other class: a measured one where the radar has one, else the twin's
 """
 
@@ -28,8 +30,8 @@ FIGURES = (
     "before_low", "before_high", "simulated", "simulated_low", "simulated_high",
 )  # fmt: skip
 DISTANCES = (
-    "radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high", "ceiling",
-    "ceiling_class",
+    "radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high", "tuning",
+    "test", "learnt", "ceiling", "ceiling_class",
 )  # fmt: skip
 REPEATS = 400
 
@@ -104,49 +106,62 @@ def unmended(library: Library, mended: list[str]) -> Library:
     return replace(library, scenes=scenes)
 
 
-def _near(files: dict[str, np.ndarray], other: np.ndarray, column: int) -> float:
-    values = np.concatenate([table[:, column] for table in files.values()])
-    return float(wasserstein_distance(values, other[:, column]))
+def _near(tables: list[np.ndarray], other: np.ndarray, column: int) -> float:
+    """Distance of one figure between files' tables and another table; NaN where there is no file."""
+    if not tables:
+        return float("nan")
+    return float(wasserstein_distance(np.concatenate(tables)[:, column], other[:, column]))
 
 
-def distances(name: str, found: list[Measured], library: Library, mended: list[str], count: int) -> list[list]:
+def _measured(found: list[Measured], twin: Twin) -> dict[str, dict[str, tuple[str, np.ndarray]]]:
+    """Class -> file -> (half, table) of the recordings in `found`; files without a target are left out."""
+    tables: dict[str, dict[str, tuple[str, np.ndarray]]] = {}
+    for one in found:
+        own = at_carrier(twin, one.record.carrier_hz)
+        intervals = measured_intervals(one, own)
+        if len(intervals):
+            tables.setdefault(one.record.label, {})[f"{one.set}/{one.name}"] = one.half, _table(intervals, own)
+    return tables
+
+
+def distances(
+    name: str, found: list[Measured], library: Library, recorded: Library, mended: list[str], count: int
+) -> list[list]:
     """Return the rows of `DISTANCES` of one radar; `count` simulated intervals stand for each class.
 
+    recorded: scenes as they were in front of the radar; library: those that networks learn from.
     The interval resamples whole recordings: windows of one are not independent.
     """
     twin = library.twins[name]
-    tables: dict[str, dict[str, np.ndarray]] = {}
-    half: dict[str, str] = {}
-    for one in found:
-        if one.set in library.sets[name]:
-            own = at_carrier(twin, one.record.carrier_hz)
-            tables.setdefault(one.record.label, {})[one.name] = _table(measured_intervals(one, own), own)
-            half[one.name] = one.half
-    flat = lambda block: block.reshape(-1, block.shape[-1])  # noqa: E731
-    model = {label: _table(flat(library.simulated(name, label, count, "compare")[0]), twin) for label in CATEGORIES}
-    early = unmended(library, mended)
+
+    def model(scenes: Library, label: str) -> np.ndarray:
+        intervals = scenes.simulated(name, label, count, "compare")[0]
+        return _table(intervals.reshape(-1, intervals.shape[-1]), twin)
+
+    measured = _measured([one for one in found if one.set in library.sets[name]], twin)
+    learnt = {label: model(library, label) for label in CATEGORIES} if measured else {}
     rows = []
-    for label, files in tables.items():
-        before = _table(flat(early.simulated(name, label, count, "compare")[0]), twin)
-        sides = [[table for file, table in files.items() if half[file] == part] for part in HALVES]
-        others = {other: np.concatenate(list(block.values())) for other, block in tables.items() if other != label}
+    for label, files in measured.items():
+        own, before = model(recorded, label), model(unmended(recorded, mended), label)
+        tables = [table for _, table in files.values()]
+        sides = [[table for part, table in files.values() if part == half] for half in HALVES]
+        others = {other: [table for _, table in block.values()] for other, block in measured.items() if other != label}
         if not others:
-            others = {f"{other}, simulated": table for other, table in model.items() if other != label}
+            others = {f"{other}, simulated": [table] for other, table in learnt.items() if other != label}
         for column, figure in enumerate(INTERVAL):
-            floor = float("nan")
-            if all(sides):
-                floor = wasserstein_distance(*(np.concatenate(side)[:, column] for side in sides))
-            rng, names = stream(library.seed, "distances", name, label, figure), list(files)
+            floor = _near(sides[0], np.concatenate(sides[1]), column) if all(sides) else float("nan")
+            rng = stream(library.seed, "distances", name, label, figure)
             spread = [
-                _near({str(k): files[names[place]] for k, place in enumerate(chosen)}, model[label], column)
-                for chosen in rng.integers(0, len(names), (REPEATS, len(names)))
+                _near([tables[place] for place in chosen], own, column)
+                for chosen in rng.integers(0, len(tables), (REPEATS, len(tables)))
             ]
             low, high = np.quantile(spread, [0.025, 0.975])
-            far = {other: _near(files, table, column) for other, table in others.items()}
+            far = {other: _near(tables, np.concatenate(table), column) for other, table in others.items()}
             nearest = min(far, key=far.get)
-            windows = sum(map(len, files.values()))
             rows.append([
-                name, label, figure, unit(figure), len(files), windows, float(floor), _near(files, before, column),
-                _near(files, model[label], column), float(low), float(high), far[nearest], nearest,
+                name, label, figure, unit(figure), len(files), sum(map(len, tables)), floor,
+                _near(tables, before, column), _near(tables, own, column), float(low), float(high),
+                *(_near(side, own, column) for side in sides), _near(tables, learnt[label], column), far[nearest],
+                nearest,
             ])  # fmt: skip
     return rows

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.classes import CATEGORIES
-from lowalt.common.config import load_yaml
+from lowalt.common.config import load_yaml, merge
 from lowalt.common.errors import InputError
 from lowalt.recordings.scenes import clouds_of, intervals
 from lowalt.recordings.twin import Twin
@@ -30,9 +30,12 @@ class Library:
     def read(cls, path: str | Path) -> "Library":
         """Return the library in a YAML file such as `config/measured/twins.yaml`.
 
+        A file that names another one as `base` lies over it, key by key; a category's scenes replace those below.
         Raises: InputError naming the key that is missing or wrong.
         """
         block = load_yaml(path, "twins")
+        if "base" in block:
+            block = merge(load_yaml(block.pop("base"), "twins"), block)
         try:
             records = load_records(block["targets"]["table"], block["targets"]["records"])
             twins = {name: Twin.from_settings(twin["radar"]) for name, twin in block["twins"].items()}
@@ -40,7 +43,7 @@ class Library:
             scenes = {
                 name: {
                     category: [
-                        {**scene, "receiver": twin["receiver"]}
+                        {**scene, "receiver": twin["receiver"] | scene.get("receiver", {})}
                         for scene in {**block["scenes"], **twin.get("scenes", {})}[category]
                     ]
                     for category in CATEGORIES

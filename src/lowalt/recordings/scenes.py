@@ -16,7 +16,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
     flap           changes of the wing beat, degrees (optional)
     size           length, width and height as multiples of the subtype's (optional)
     second         share of samples with a second target of the same scene, and its level_db (optional)
-    receiver       settings of `lowalt.recordings.receiver`
+    receiver       settings of `lowalt.recordings.receiver` (in a twin: only those that differ from its receiver)
 """
 
 import json

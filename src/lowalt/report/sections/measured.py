@@ -15,8 +15,10 @@ FIGURES = (
     "pair", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "before", "before_low",
     "before_high", "simulated", "simulated_low", "simulated_high",
 )  # fmt: skip
-DISTANCES = ("radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high",
-             "ceiling", "ceiling_class")  # fmt: skip
+DISTANCES = (
+    "radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high", "tuning",
+    "test", "learnt", "ceiling", "ceiling_class",
+)  # fmt: skip
 RECOGNITION = ("radar", "seed", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
 ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
 
