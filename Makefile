@@ -73,9 +73,11 @@ real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
 measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
 	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs $(INPUTS) --out results/measured || exit 1; done
 	$(BIN)/python -m lowalt.recordings recognise --inputs $(INPUTS) --out results/measured --models results/measured/models
+	$(BIN)/python -m lowalt.recordings ablate --inputs $(INPUTS) --out results/measured --models results/measured/models/ablation
 	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/measured --page results/measured/report.html
-	cp results/measured/measured-*.csv results/measured/measured-vehicle.png results/reference/
-	cp results/measured/measured-short.png design/pictures/measured.png
+	cp results/measured/measured-*.csv results/reference/
+	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
+	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
 
 test: $(TESTING)  ## the test suite
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow"

@@ -15,7 +15,7 @@ from lowalt.recordings.library import Library
 from lowalt.recordings.samples import spectra, write
 from lowalt.recordings.sets import halves
 from lowalt.report import measured
-from lowalt.report.sections.measured import ACCURACY, DISTANCES, FIGURES, RECOGNITION
+from lowalt.report.sections.measured import ABLATION, ACCURACY, DISTANCES, FIGURES, RECOGNITION
 from lowalt.shards import ShardSet, faults
 
 
@@ -69,8 +69,20 @@ def test_pictures_and_page_show_what_was_computed(tmp_path):
     assert Image.open(tmp_path / "measured-overview.png").width > 200
     measured.main(arguments)
     assert (tmp_path / "measured-bird.png").read_bytes() == first
+    assert "What each randomisation adds" not in page
+    cells = {"change": "antenna beam", "difference_percent": "-8.7539"}
+    write_csv(tmp_path / "measured-ablation.csv", ABLATION, [[cells.get(column, "7") for column in ABLATION]])
+    measured.main(arguments)
+    page = (tmp_path / "page.html").read_text()
+    assert "What each randomisation adds" in page and "antenna beam" in page and "-8.7539" in page
     (tmp_path / "pair-bird.npz").unlink()
-    with pytest.raises(InputError, match=r"no pair-\*.npz"):
+    (tmp_path / "measured-bird.png").unlink()
+    measured.main(arguments)
+    assert (
+        "2.31" in (tmp_path / "page.html").read_text() and "data:image/png" not in (tmp_path / "page.html").read_text()
+    )
+    (tmp_path / "measured-figures.csv").unlink()
+    with pytest.raises(InputError, match=r"measured-figures\.csv"):
         measured.main(arguments)
 
 

@@ -1,4 +1,7 @@
-"""A recording nobody has seen: a WAV and five lines become spectra, tiles and a prediction, in mono or stereo."""
+"""A recording nobody has seen: a WAV and five lines become spectra, tiles and a prediction, in mono or stereo.
+
+Files of the public sets that came later, and folders that are no set yet, go through without a change of the code.
+"""
 
 import numpy as np
 import pytest
@@ -8,7 +11,8 @@ from scipy.io import wavfile
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.recordings.__main__ import main
-from lowalt.recordings.sets import recordings
+from lowalt.recordings.library import Library
+from lowalt.recordings.sets import measured_intervals, recordings, usable
 
 SECONDS = 1.3
 CARRIER = 24.0e9
@@ -78,3 +82,68 @@ def test_a_record_beside_a_new_file_goes_before_the_sets_pattern(tmp_path):
     drive(folder, 22050, True)
     with pytest.raises(InputError, match=r"drive.yaml: no label, expected one of"):
         recordings(tmp_path, "config/measured/sets.yaml", "config/measured/split.yaml")
+
+
+SETS, SPLIT = "config/measured/sets.yaml", "config/measured/split.yaml"
+
+
+def volts(folder, name, rate, seconds=1.0):
+    """Write a CSV of the set at 10 GHz: volts and sample times."""
+    folder.mkdir(exist_ok=True)
+    time = np.arange(round(rate * seconds)) / rate
+    wave = np.sin(2 * np.pi * 60.0 * time) + 0.01 * np.random.default_rng(1).standard_normal(len(time))
+    rows = np.stack([wave, time], axis=1)
+    np.savetxt(folder / name, rows, delimiter=",", header="V,timestamps", comments="", fmt="%.9g")
+
+
+def test_later_files_of_a_set_may_have_another_rate_and_bad_ones_are_left_out_by_name(tmp_path, capsys):
+    folder = tmp_path / "bird_drone_10ghz"
+    volts(folder, "bird99.csv", 10000)
+    volts(folder, "bird98.csv", 20000)
+    volts(folder, "DRONE97.CSV", 10000)
+    volts(folder, "bird96.csv", 8000)
+    volts(folder, "bird95.csv", 10000, seconds=0.2)
+    volts(folder, "quadcopter.csv", 10000)
+    twin = Library.read("config/measured/twins.yaml").twins["bird_drone_10ghz"]
+    found = usable(recordings(tmp_path, SETS, SPLIT), {"bird_drone_10ghz": twin})
+    assert {one.name: one.record.label for one in found} == {
+        "bird99.csv": "Bird", "bird98.csv": "Bird", "DRONE97.CSV": "UAV",
+    }  # fmt: skip
+    assert {one.half for one in found} == {"test"}
+    for one in found:
+        # 60 Hz stand at 60 Hz, whichever of the set's rates the file has.
+        power = np.abs(np.fft.fft(measured_intervals(one, twin)[0])) ** 2
+        assert power.argmax() / len(power) * 1000.0 == pytest.approx(60.0, abs=2.5)
+    told = capsys.readouterr().err
+    assert "quadcopter.csv: left out" in told
+    assert "bird96.csv: wrong rate" in told and "bird95.csv: 200 symbols, shorter than one window" in told
+    with pytest.raises(InputError, match="none of 1 recordings can be used"):
+        usable(
+            [one for one in recordings(tmp_path, SETS, SPLIT) if one.name == "bird95.csv"], {"bird_drone_10ghz": twin}
+        )
+
+
+def test_the_carrier_stands_in_the_name_of_later_files(tmp_path):
+    folder = tmp_path / "uav_3ghz"
+    folder.mkdir()
+    for name in ("DJI_Hovering_on_Rotors_Foil_10000000__Freq_3.400__Sample_2.mat", "renamed.mat"):
+        (folder / name).write_bytes(b"")
+    found = {one.name: one.record.carrier_hz for one in recordings(tmp_path, SETS, SPLIT)}
+    assert sorted(found.values()) == [3.3e9, 3.4e9] and found["renamed.mat"] == 3.3e9
+
+
+def test_a_folder_that_is_no_set_becomes_one_by_a_file(tmp_path, capsys):
+    (tmp_path / "buses").mkdir()
+    drive(tmp_path / "buses", 22050, False)
+    (tmp_path / "buses/drive.yaml").unlink()
+    with pytest.raises(InputError, match="no recordings of"):
+        recordings(tmp_path, SETS, SPLIT)
+    assert "buses: left out, no set of that name and no set.yaml in it" in capsys.readouterr().err
+    own = tmp_path / "buses/set.yaml"
+    line = '{file: "*.wav", carrier_hz: 24.0e+9, channel: real, label: Vehicle, source: made here, licence: MIT}'
+    own.write_text(f"like: vehicle_24ghz\nfiles:\n  - {line}\n")
+    (one,) = recordings(tmp_path, SETS, SPLIT)
+    assert (one.set, one.like, one.half, one.name) == ("buses", "vehicle_24ghz", "test", "drive.wav")
+    own.write_text(f"like: aircraft_77ghz\nfiles:\n  - {line}\n")
+    with pytest.raises(InputError, match=r"set\.yaml: expected files, a list of records, and like, one of"):
+        recordings(tmp_path, SETS, SPLIT)

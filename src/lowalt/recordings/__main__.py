@@ -24,7 +24,7 @@ from lowalt.recordings.pairs import pair_of
 from lowalt.recordings.presence import present
 from lowalt.recordings.recognise import settings
 from lowalt.recordings.record import read_record
-from lowalt.recordings.sets import HALVES, at_carrier, recordings
+from lowalt.recordings.sets import HALVES, Measured, at_carrier, recordings, usable
 from lowalt.targets.records import load_records
 
 FOLDER = "config/measured"
@@ -46,6 +46,12 @@ def _line(name: str, description: str, *, inputs: bool = False) -> argparse.Argu
         options.add_argument("--record", required=True, type=Path, help="record of the recording (.yaml)")
         options.add_argument("--radar", required=True, help="the twin whose symbol rate the signals get")
     return options
+
+
+def _found(given: argparse.Namespace, library: Library) -> list[Measured]:
+    """The usable recordings below the folder of inputs."""
+    twins = {name: library.twins[twin] for twin, sets in library.sets.items() for name in sets}
+    return usable(recordings(given.inputs, given.sets, given.split), twins)
 
 
 def _twin(library: Library, name: str):
@@ -92,7 +98,7 @@ def predict(arguments: list[str]) -> None:
 def pairs(arguments: list[str]) -> None:
     """Compute the pairs of pictures, measured and simulated, into one pair-NAME.npz each."""
     given = _line("pairs", pairs.__doc__, inputs=True).parse_args(arguments)
-    block, found = load_yaml(given.pairs), recordings(given.inputs, given.sets, given.split)
+    block, found = load_yaml(given.pairs), _found(given, Library.read(given.twins))
     records = load_records(block["targets"]["table"], block["targets"]["records"])
     for name, pair in block["pairs"].items():
         before = {**pair, "scene": compare.plain(pair["scene"], block["mended"])}
@@ -115,8 +121,8 @@ def compare_(arguments: list[str]) -> None:
     options.add_argument("--count", type=int, default=60, help="simulated intervals a class")
     options.add_argument("--recorded", default=f"{FOLDER}/recorded.yaml", help="scenes as they were recorded")
     given = options.parse_args(arguments)
-    block, found = load_yaml(given.pairs), recordings(given.inputs, given.sets, given.split)
     library, recorded = Library.read(given.twins), Library.read(given.recorded)
+    block, found = load_yaml(given.pairs), _found(given, library)
     rows, files = [], []
     for name, pair in block["pairs"].items():
         more = compare.class_figures(name, pair, found, library.records, block)
@@ -145,7 +151,7 @@ def recognise(arguments: list[str]) -> None:
     from lowalt.recordings.reality import ACCURACY, RECOGNITION, accuracy, radar
 
     library, block = Library.read(given.twins), settings(given.recognition)
-    found = [one for one in recordings(given.inputs, given.sets, given.split) if one.half in given.halves]
+    found = [one for one in _found(given, library) if one.half in given.halves]
     names = list(library.twins)
     # Each radar is a world of its own, so their order and number at a time change nothing. The costliest comes first.
     with ProcessPoolExecutor(min(given.jobs, len(names)), get_context("spawn")) as pool:
@@ -168,7 +174,7 @@ def ablate(arguments: list[str]) -> None:
     library, own = Library.read(given.twins), load_yaml(given.ablation, "ablation")
     block = settings(given.recognition) | {key: own[key] for key in ("echoes", "receivers", "seeds")}
     block["training"] = block["training"] | {"steps": own["steps"], "validate_every": own["steps"]}
-    found = recordings(given.inputs, given.sets, given.split)
+    found = _found(given, library)
     rows = ablation(own["radar"], found, library, block, own["changes"], given.models)
     samples.write_table(given.out / "measured-ablation.csv", ABLATION, rows)
 

@@ -53,7 +53,7 @@ def shares(rows: list[list]) -> dict[str, np.ndarray]:
     found: dict[str, dict[str, list[float]]] = {}
     for row in rows:
         if row[1] != "mean":
-            found.setdefault(row[5], {}).setdefault(row[4], []).append(row[-1])
+            found.setdefault(row[5], {}).setdefault(f"{row[2]}/{row[4]}", []).append(row[-1])
     return {label: np.array(list(files.values())) for label, files in found.items()}
 
 
@@ -88,11 +88,14 @@ def summarised(name: str, change: str, own: dict, full: dict, windows: dict[str,
 def ablation(name: str, found: list[Measured], library: Library, block: dict, changes: dict, folder) -> list[list]:
     """Return the rows of `ABLATION` of the twin `name`: trained as it is, and with each of the changes.
 
-    changes: name -> change as `changed` takes it; folder: where the networks go. Test recordings are not looked at.
+    changes: name -> change as `changed` takes it; folder: where the networks go. Test recordings are not looked at;
+    without any tuning recording there are no rows.
     """
-    mine = [one for one in found if one.set in library.sets[name] and one.half == "tuning"]
+    mine = [one for one in found if one.like in library.sets[name] and one.half == "tuning"]
     measured = [(one, windows_of(one, library, block)) for one in mine]
     measured = [(one, windows) for one, windows in measured if len(windows.images)]
+    if not measured:
+        return []
     windows: dict[str, int] = {}
     for one, held in measured:
         windows[one.record.label] = windows.get(one.record.label, 0) + len(held.images)

@@ -65,7 +65,7 @@ def class_figures(name: str, pair: dict, found: list[Measured], records: dict, s
 
     settings: seed, mended and realisations of the file of pairs.
     """
-    mine = [one for one in found if one.set == pair["set"] and one.record.file.match(pair["figures"]["files"])]
+    mine = [one for one in found if one.like == pair["set"] and one.record.file.match(pair["figures"]["files"])]
     if not mine:
         return [], []
     twin, seed = Twin.from_settings(pair["radar"]), settings["seed"]
@@ -138,7 +138,7 @@ def distances(
         intervals = scenes.simulated(name, label, count, "compare")[0]
         return _table(intervals.reshape(-1, intervals.shape[-1]), twin)
 
-    measured = _measured([one for one in found if one.set in library.sets[name]], twin)
+    measured = _measured([one for one in found if one.like in library.sets[name]], twin)
     learnt = {label: model(library, label) for label in CATEGORIES} if measured else {}
     rows = []
     for label, files in measured.items():

@@ -24,12 +24,15 @@ SIDE_RATIO = 4.0
 """How many times stronger the wrong side of the Doppler axis must be to call the channels swapped (6 dB)."""
 
 
-def agreed_rate(path: Path, stated_hz: float | None, header_hz: float | None, times_s: np.ndarray | None) -> float:
+def agreed_rate(
+    path: Path, stated_hz: float | tuple[float, ...] | None, header_hz: float | None, times_s: np.ndarray | None
+) -> float:
     """Return the sampling rate (Hz) on which record, file header and sample times (s) agree.
 
+    stated_hz: the record's rate, or several of which the file has one: the nearest to header or times is taken.
     Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly spaced.
     """
-    found = {"record": stated_hz, "file": header_hz}
+    found: dict[str, float | None] = {"record": None, "file": header_hz}
     if times_s is not None:
         steps = np.diff(times_s)
         if len(steps) < 1 or not np.isfinite(steps).all() or steps.min() <= 0:
@@ -40,6 +43,10 @@ def agreed_rate(path: Path, stated_hz: float | None, header_hz: float | None, ti
             raise InputError(f"{path}: the sample times jump by {steps[place]:.4g} s at sample {place + 1}, expected "
                              f"{middle:.4g} s everywhere")  # fmt: skip
         found["times"] = float(1 / middle)
+    if isinstance(stated_hz, tuple):
+        own = next((rate for rate in (header_hz, found.get("times")) if rate is not None), stated_hz[0])
+        stated_hz = min(stated_hz, key=lambda rate: abs(rate - own))
+    found["record"] = stated_hz
     known = {name: rate for name, rate in found.items() if rate is not None}
     if not known:
         raise InputError(f"{path}: nothing says the sampling rate, expected rate_hz in the record")

@@ -139,16 +139,17 @@ def read(record: Record) -> Baseband:
     no quadrature or contradicts the known direction of motion.
     """
     path = existing(record.file, "recording")
-    if path.suffix not in READERS:
+    kind = path.suffix.lower()
+    if kind not in READERS:
         raise InputError(f"{path}: unknown kind of file {path.suffix!r}, expected one of {sorted(READERS)}")
     try:
-        table = READERS[path.suffix](path, record)
+        table = READERS[kind](path, record)
     except InputError:
         raise
     except UNREADABLE as error:
         raise InputError(f"{path}: not a readable {path.suffix} file ({error})") from error
     times = None if record.times is None else _column(table, record.times, path)
-    rate = faults.agreed_rate(path, record.rate_hz, table.rate_hz, times)
+    rate = faults.agreed_rate(path, record.rates_hz or record.rate_hz, table.rate_hz, times)
     values = _channel(table, record)
     faults.check(path, values, record.moves)
     return Baseband(values, rate)

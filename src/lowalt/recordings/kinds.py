@@ -39,7 +39,8 @@ def wing_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: 
     track = tracks(shown[speeds > 0], speeds[speeds > 0], 0.0)
     beat = 1 / cycle_s(shown[fast], spec["hop"] / rate_hz, *spec["cycle_s"])
     harmonic, level = _strongest(signal, rate_hz, *spec["harmonic_hz"])
-    _, base = _strongest(signal, rate_hz, 0.8 * beat, 1.2 * beat)
+    # A stretch shorter than two beats has no beat that could be found.
+    base = _strongest(signal, rate_hz, 0.8 * beat, 1.2 * beat)[1] if np.isfinite(beat) else float("nan")
     return {
         "beat_hz": beat,
         "edge_mps": float(np.quantile(track["edge"], 0.9)),

@@ -24,7 +24,7 @@ REPEATS = 4000
 
 def windows_of(one: Measured, library: Library, block: dict) -> Windows:
     """Return the windows of a recording that hold a target, rendered as its radar's twin renders its own."""
-    twin = at_carrier(library.twins[library.twin_of(one.set)], one.record.carrier_hz)
+    twin = at_carrier(library.twins[library.twin_of(one.like)], one.record.carrier_hz)
     images = rendered(measured_intervals(one, twin), twin, Images.from_settings(block["images"]), block["size"])
     count, label = len(images), CATEGORIES.index(one.record.label)
     told = facts(np.full(count, label), [one.name] * count, np.arange(count), np.zeros(count), "test")
@@ -56,7 +56,7 @@ def radar(
     folder: where the networks go, one folder a seed; reuse: take those that are
     there and train none. Recordings without any window that holds a target are left out.
     """
-    mine = [one for one in found if one.set in library.sets[name]]
+    mine = [one for one in found if one.like in library.sets[name]]
     if not mine:
         return []
     measured = [(one, windows_of(one, library, block)) for one in mine]
@@ -85,7 +85,8 @@ def accuracy(rows: list[list], seed: int) -> list[list]:
     shares: dict[tuple, dict[str, list[float]]] = {}
     windows: dict[str, int] = {}
     for row in (row for row in rows if row[1] == "mean"):
-        name, _, _, half, file, label, count = row[:7]
+        name, _, folder, half, file, label, count = row[:7]
+        file = f"{folder}/{file}"
         shares.setdefault((name, half, label), {}).setdefault(file, []).append(row[-1])
         windows[file] = count
     chance = 100 / len(CATEGORIES)

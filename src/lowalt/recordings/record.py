@@ -43,6 +43,8 @@ class Record:
     times: str | None = None
     label: str | None = None
     moves: str | None = None
+    rates_hz: tuple[float, ...] | None = None
+    """Rates of which the file has one, where a set has files of several."""
 
     @property
     def name(self) -> str:

@@ -11,7 +11,6 @@ import argparse
 from pathlib import Path
 
 from lowalt.common.command import run
-from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.report.figures.measured import overview, pair_picture, read_pair
 from lowalt.report.page import section_page
@@ -19,9 +18,9 @@ from lowalt.report.sections.measured import held
 
 
 def main(arguments: list[str]) -> None:
-    """Draw the pictures, then write the page.
+    """Draw the pictures that there are, then write the page; recordings that stand in no pair have tables alone.
 
-    Raises: InputError where there is no pair of pictures, or a table is missing.
+    Raises: InputError where a table is missing.
     """
     options = argparse.ArgumentParser(prog="python -m lowalt.report.measured", description=__doc__)
     options.add_argument("--pairs", required=True, type=Path, help="folder of pair-NAME.npz")
@@ -29,10 +28,9 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--page", required=True, type=Path, help="page to write (.html)")
     given = options.parse_args(arguments)
     pairs = {path.stem.removeprefix("pair-"): read_pair(path) for path in sorted(given.pairs.glob("pair-*.npz"))}
-    if not pairs:
-        raise InputError(f"{given.pairs}: no pair-*.npz, expected those of `python -m lowalt.recordings pairs`")
     pictures = {name: pair_picture(pair) for name, pair in pairs.items()}
-    pictures["overview"] = overview(list(pairs.values()))
+    if pairs:
+        pictures["overview"] = overview(list(pairs.values()))
     if "vehicle" in pairs:
         pictures["short"] = pair_picture(pairs["vehicle"], ("measured", "simulated"))
     for name, picture in pictures.items():

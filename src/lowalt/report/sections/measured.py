@@ -22,14 +22,21 @@ DISTANCES = (
 RECOGNITION = ("radar", "seed", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
 ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
 
+ABLATION = (
+    "radar", "change", "class", "seeds", "files", "windows", "accuracy_percent", "low", "high", "difference_percent",
+    "difference_low", "difference_high",
+)  # fmt: skip
+
 
 def held(folder: str | Path) -> dict:
     """Return the section's values from a folder of reference tables and pictures.
 
     classes: one entry a category that was measured, with its pictures (name, address), and its rows of the tables;
-    accuracy: the rows over whole radars. Raises: InputError for a table that is missing or lacks a column.
+    accuracy: the rows over whole radars; ablation: those of measured-ablation.csv, none where it was not computed.
+    Raises: InputError for another table that is missing, or one that lacks a column.
     """
     folder = Path(folder)
+    without = folder / "measured-ablation.csv"
     figures = read_csv(folder / "measured-figures.csv", *FIGURES)
     distances = read_csv(folder / "measured-distances.csv", *DISTANCES)
     recognition = read_csv(folder / "measured-recognition.csv", *RECOGNITION)
@@ -52,6 +59,7 @@ def held(folder: str | Path) -> dict:
             }
         )
     return {"classes": classes, "accuracy": [row for row in accuracy if row["class"] == "balanced"],
+            "ablation": read_csv(without, *ABLATION) if without.is_file() else [],
             "categories": CATEGORIES}  # fmt: skip
 
 
