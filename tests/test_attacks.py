@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import torch
 
+import fuzzed_readers
 import fuzzing
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
@@ -22,7 +23,7 @@ from lowalt.shards import index, recipe
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.tiles.png import SIGNATURE, _chunk, decode
 
-READERS = {reader.name: reader for reader in fuzzing.readers()}
+READERS = {reader.name: reader for reader in fuzzed_readers.readers()}
 LACKING = ("checksums", "recipe")
 """Good files that name others which are not there."""
 SLOW_STARTS = ("recording .mat",)

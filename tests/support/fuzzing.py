@@ -1,4 +1,4 @@
-"""Damaged inputs for every reader of files: a good file of each kind, seeded ways to break it, and what may come of it.
+"""Damaged inputs for every reader of files (`fuzzed_readers`): seeded ways to break a good file, and the ends allowed.
 
     PYTHONPATH=src:tests/support python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
@@ -11,7 +11,6 @@ import contextlib
 import csv
 import hashlib
 import io
-import json
 import multiprocessing
 import os
 import re
@@ -23,10 +22,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import yaml
-from scipy.io import savemat, wavfile
 
-from craft import craft, row
 from lowalt.common.errors import InputError
 
 LIMIT_S = 20.0
@@ -97,180 +93,6 @@ class Reader:
         return "accepted"
 
 
-def _bytes(write: Callable[[Path], object], name: str) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        write(Path(folder) / name)
-        return (Path(folder) / name).read_bytes()
-
-
-def _recording(kind: str) -> Callable[[Path], object]:
-    from lowalt.recordings.files import read
-    from lowalt.recordings.record import record
-
-    more = {".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}}.get(kind, {"rate_hz": 800.0})
-    base = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", **more}
-    return lambda path: read(record({**base, "file": path.name}, path.parent, "record"))
-
-
-def _recordings() -> list[Reader]:
-    times = np.arange(2000) / 800
-    wave = np.exp(2j * np.pi * 97 * times) * (1 + 0.3 * np.cos(5 * times)) * 0.4
-    pair = np.stack([wave.real, wave.imag], axis=1)
-    text = "i,q\n" + "".join(f"{a:.6f},{b:.6f}\n" for a, b in pair)
-    files = {
-        ".wav": _bytes(lambda path: wavfile.write(path, 800, pair.astype(np.float32)), "a.wav"),
-        ".mat": _bytes(lambda path: savemat(path, {"x": wave}, do_compression=True), "a.mat"),
-        ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
-        ".csv": text.encode(),
-    }
-    return [Reader(f"recording {kind}", f"a{kind}", data, _recording(kind)) for kind, data in files.items()]
-
-
-def _meshes() -> list[Reader]:
-    import trimesh
-
-    from lowalt.targets.mesh_files import read_mesh
-
-    box = trimesh.creation.box((0.3, 0.4, 0.1)).subdivide()
-    kinds = ("stl", "obj", "ply", "glb", "dae")
-    readers = []
-    for kind in kinds:
-        data = box.export(file_type=kind)
-        data = data.encode() if isinstance(data, str) else bytes(data)
-        readers.append(Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m")))
-    return readers
-
-
-def _texts() -> list[Reader]:
-    from lowalt.common.command import settings
-    from lowalt.common.config import check, merge
-    from lowalt.common.csv_tables import read_csv
-    from lowalt.common.yaml_files import load_yaml
-    from lowalt.motion import read_table, write_table
-    from lowalt.recognition import choose, freeze, orderings, schemes
-    from lowalt.recordings.record import read_record
-    from lowalt.shards import manifest
-    from lowalt.targets.records import load_records, load_table
-    from lowalt.workflow.run import Run
-
-    config, schema = load_yaml("config/default.yaml"), "workflow/schemas/config.schema.yaml"
-    table = Path("config/targets.csv").read_bytes()
-
-    def run(path: Path) -> object:
-        return Run.of(merge(config, load_yaml(path)), schema, None)
-
-    def sums(path: Path) -> object:
-        return freeze.verify(path)
-
-    record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
-    return [
-        Reader("configuration", "a.yaml", Path("config/default.yaml").read_bytes(),
-               lambda p: check(load_yaml(p), schema)),
-        Reader("overlay", "a.yaml", Path("config/workstation.yaml").read_bytes(), run),
-        Reader("scene", "a.yaml", Path("config/scenes/worst.yaml").read_bytes(), run),
-        Reader("record of a target", "a.yaml", Path("config/targets/pedestrian.yaml").read_bytes(),
-               lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p])),
-        Reader("table of targets", "a.csv", table, load_table),
-        Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
-        Reader("candidates", "a.yaml", Path("config/choices/default.yaml").read_bytes(), choose.read),
-        Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
-               orderings.read_published),
-        Reader("table", "a.csv", Path("config/accuracy.csv").read_bytes(), read_csv),
-        Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
-               read_table),
-        Reader("manifest", "a.sha256", Path("results/reference/tiny.sha256").read_bytes(), manifest.read),
-        Reader("checksums", "SHA256SUMS", (hashlib.sha256(b"").hexdigest() + "  a\n").encode(), sums),
-        Reader("record of a recording", "a.yaml", record.encode(), read_record),
-        Reader("settings", "a.json", json.dumps({"seed": 1, "network": config["network"]}).encode(),
-               lambda p: settings(f"@{p}")),
-    ]  # fmt: skip
-
-
-def _captures() -> list[Reader]:
-    from lowalt.targets.mocap_files import read_motion, read_skeleton
-    from lowalt.targets.skeleton import NODES
-    from walkers import asf, walk
-
-    text = asf({name: np.array([0.3, 1.0, 0.1]) for name in NODES})
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "a.asf"
-        path.write_text(text)
-        skeleton = read_skeleton(path)
-    return [
-        Reader("skeleton .asf", "a.asf", text.encode(), read_skeleton),
-        Reader("motion .amc", "a.amc", walk(40).encode(), lambda path: read_motion(path, skeleton)),
-    ]
-
-
-def _arrays() -> list[Reader]:
-    import torch
-
-    from lowalt.recognition import checkpoint, predictions, samples
-    from lowalt.shards import recipe, table
-    from lowalt.shards.index import load as load_index
-    from lowalt.shards.table import map_samples, read_header
-    from lowalt.targets.cloud import read as read_cloud
-    from lowalt.targets.cloud import write as write_cloud
-    from lowalt.tiles.files import Tiles
-    from lowalt.tiles.files import write as write_tiles
-    from lowalt.tiles.png import decode, encode
-
-    image = np.add.outer(np.arange(24), np.arange(24)).astype(np.uint8)
-    png = encode(image, np.stack([np.arange(256)] * 3, 1).astype(np.uint8))
-    count = 6
-    facts = samples.Facts(
-        *(np.array([f"{name}{n}" for n in range(count)]) for name in ("k", "s")), np.arange(count), np.full(count, 3.0),
-        np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
-    )  # fmt: skip
-    cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
-    rows = np.zeros(count, table.SAMPLE)
-    header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    index = {"format": "lowalt-shards-2", "shards": [], "kind": "image"}
-    index["sha256"] = hashlib.sha256(json.dumps(index, sort_keys=True).encode()).hexdigest()
-    model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
-    said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])
-    return [
-        Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud),
-        Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")})),
-        Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p))),
-        Reader("index", "index.json", json.dumps(index).encode(), load_index),
-        Reader("tiles", "a.npz", _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"), lambda p: [*_all(Tiles(p))]),
-        Reader("image", "a.png", png, lambda p: decode(p.read_bytes())),
-        Reader("checkpoint", "a.pt", model, checkpoint.load),
-        Reader("predictions", "a.csv", _bytes(lambda p: predictions.write(p, said), "a.csv"), predictions.read),
-        Reader("recipe", "a.tar", _recipe(), lambda p: recipe.unpack(p, p.parent / "out")),
-    ]
-
-
-def _all(tiles) -> list[bytes]:
-    return [tiles[number] for number in range(len(tiles))]
-
-
-def _recipe() -> bytes:
-    import tarfile
-
-    from lowalt import __version__
-    from lowalt.common.config import plain
-    from lowalt.common.yaml_files import load_yaml
-
-    head = {"format": "lowalt-recipe-1", "lowalt": __version__, "config": plain(load_yaml("config/default.yaml")),
-            "published": {}}  # fmt: skip
-    members = {"recipe.json": json.dumps(head).encode(), "manifest.sha256": b"0" * 64 + b"  clouds/a.npz\n",
-               "clouds/a.npz": b"nothing"}  # fmt: skip
-    buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w") as archive:
-        for name, data in members.items():
-            info = tarfile.TarInfo(name)
-            info.size = len(data)
-            archive.addfile(info, io.BytesIO(data))
-    return buffer.getvalue()
-
-
-def readers() -> list[Reader]:
-    """Return every reader with a good file of its kind."""
-    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes()]
-
-
 def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
     """Return a row (keys COLUMNS) of what becomes of `count` damaged files."""
     found = dict.fromkeys(COLUMNS, 0) | {"reader": reader.name, "inputs": count, "first_fault": ""}
@@ -301,6 +123,8 @@ def _apart(name: str, count: int, seed: int, queue) -> None:
     resource.setrlimit(resource.RLIMIT_AS, ((LIMIT_MB + 6144) << 20,) * 2)
     with Path(os.devnull).open("w") as silent, tempfile.TemporaryDirectory() as folder:
         os.dup2(silent.fileno(), 2)
+        from fuzzed_readers import readers
+
         (reader,) = [reader for reader in readers() if reader.name == name]
         queue.put(attack(reader, count, seed, Path(folder)))
 
@@ -313,6 +137,8 @@ def main() -> None:
     line.add_argument("--only", help="part of the names of the readers to attack")
     line.add_argument("--out", required=True, help="table to write (.csv)")
     given = line.parse_args()
+    from fuzzed_readers import readers
+
     context, rows = multiprocessing.get_context("spawn"), []
     for reader in readers():
         if given.only and given.only not in reader.name:
