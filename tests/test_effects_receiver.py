@@ -23,6 +23,7 @@ from lowalt.effects.receiver import (
     phase_noise,
     receiver_noise,
     timing_offset,
+    transmit_leakage,
 )
 
 C = 299_792_458.0
@@ -282,3 +283,17 @@ def test_carrier_offset_leaks_as_the_dirichlet_kernel_says():
     own = np.mean(moved * turn.conj())
     assert abs(own) == pytest.approx(kept, rel=0.02)
     assert np.mean(abs(moved) ** 2) == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("effect", [timing_offset, transmit_leakage])
+def test_an_effect_on_the_response_is_that_on_the_samples(effect):
+    look = frame(network(subcarriers=64, symbols=20), seed=4)
+    rng = np.random.default_rng(8)
+    response = rng.standard_normal((20, 128)).view(np.complex128)
+    drawn = [np.random.default_rng(5), np.random.default_rng(5)]
+    settings_of = effect.DEFAULTS | ({"isolation_db": 10.0, "delay_s": 3e-7} if effect is transmit_leakage else {})
+    samples = effect.receive(settings_of, waveform.transmit(response, look.waveform), look, drawn[0])
+    changed = effect.respond(settings_of, response, look, drawn[1])
+    assert abs(changed - response).max() > 1e-3
+    np.testing.assert_allclose(waveform.transmit(changed, look.waveform), samples, rtol=0, atol=1e-13)
+    assert drawn[0].random() == drawn[1].random()

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,6 +16,7 @@ from lowalt.effects.interface import (
     AddsPaths,
     Amplifies,
     BoundsItself,
+    ChangesResponse,
     ChoosesCells,
     FiltersCells,
     MovesImages,
@@ -134,6 +136,7 @@ class Chain:
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
+        left = self.receiver
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             samples = self._samples(view, on, factor, rows)
             for other in self.others:
@@ -147,15 +150,28 @@ class Chain:
                 spectrum = spectrum + other.own_response[rows]
             if self._clutter is not None:
                 spectrum = spectrum + self._clutter[rows]
-            if not self.receiver and not self.sending.distorts:
+            spectrum, left = self._responded(spectrum)
+            if not left and not self.sending.distorts:
                 return self.sending.cells(spectrum)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
-        for effect in self.receiver:
+        for effect in left:
             draws = self.draws(stream_name(effect.name))
             if providing([effect], Quantises):
                 self.step = effect.module.step(effect.settings, samples)
             samples = effect.module.receive(effect.settings, samples, self._frame, draws)
         return self.sending.cells(self.sending.received(samples, rows))
+
+    def _responded(self, spectrum: np.ndarray) -> tuple[np.ndarray, list[NamedEffect]]:
+        """The response (N, M) after the receiver's first effects, as far as they act on responses, and the others."""
+        for place, effect in enumerate(self.receiver):
+            changed = None
+            if providing([effect], ChangesResponse):
+                draws = self.draws(stream_name(effect.name))
+                changed = effect.module.respond(effect.settings, spectrum, self._bare_frame, draws)
+            if changed is None:
+                return spectrum, self.receiver[place:]
+            spectrum = changed
+        return spectrum, []
 
     @cached_property
     def own_response(self) -> np.ndarray:
@@ -318,13 +334,18 @@ class Chain:
     @cached_property
     def _frame(self) -> Frame:
         """The look as receiver and detection effects know it."""
+        aired = self.sending.aired if self.sending.distorts else None
+        return replace(self._bare_frame, sent=self.sending.known, aired=aired)
+
+    @cached_property
+    def _bare_frame(self) -> Frame:
+        """The look for effects that need no data: all ones in their place, so that none are drawn."""
         view = self.view
         range_m = float(np.linalg.norm(view.aim_m - np.asarray(view.station.position_m)))
-        aired = self.sending.aired if self.sending.distorts else None
         starts = None if view.sampling is None else view.sampling.times_s
-        return Frame(
-            view.network, view.station, self.sending.known, self.power, 2.0 * range_m / SPEED_OF_LIGHT, aired, starts
-        )  # fmt: skip
+        ones = np.broadcast_to(np.ones((), np.complex128), (view.network.symbols, view.network.subcarriers))
+        delay_s = 2.0 * range_m / SPEED_OF_LIGHT
+        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts)
 
 
 def _every_row(factor: np.ndarray, count: int) -> np.ndarray:

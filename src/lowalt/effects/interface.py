@@ -214,6 +214,19 @@ class ChangesSamples(Protocol):
 
 
 @runtime_checkable
+class ChangesResponse(Protocol):
+    """Optional, receiver: an effect that can also act on subcarriers before there are samples, in less time."""
+
+    def respond(
+        self, settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator
+    ) -> np.ndarray | None:
+        """Return the response (N, M) whose samples are those that `receive` returns, None where there is none.
+
+        frame: the look with ones instead of its data.
+        """
+
+
+@runtime_checkable
 class FiltersCells(Protocol):
     """Detection: an effect on all range cells before the strongest is chosen (canceller)."""
 

@@ -51,3 +51,8 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     ramp = turned(-2 * np.pi * np.fft.ifftshift(frame.baseband_hz) * late)
     moved = np.fft.ifft(np.fft.fft(samples, axis=1) * ramp, axis=1)
     return moved * turned(2e-6 * np.pi * ppm * frame.oscillator_hz * frame.times_s)
+
+
+def respond(settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray | None:
+    """Return the response (N, M) of a station that hears itself, as it is; None for a link, whose carriers differ."""
+    return response if frame.station.transmitter is None else None

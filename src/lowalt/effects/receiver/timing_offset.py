@@ -47,3 +47,8 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     turn = turned(2 * np.pi * np.fft.ifftshift(frame.baseband_hz) * late_s(settings, frame, rng))
     return np.fft.ifft(np.fft.fft(samples, axis=1) * turn, axis=1)
+
+
+def respond(settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the response (N, M) that a late window sees, as `receive`."""
+    return response * turned(2 * np.pi * frame.baseband_hz * late_s(settings, frame, rng))

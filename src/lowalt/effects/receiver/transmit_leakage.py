@@ -41,6 +41,16 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
 
     Every subcarrier leaks with the power that the network gives it. One draw a sample and station.
     """
+    leaked = _leaked(settings, frame, rng)
+    return samples + waveform.transmit(np.broadcast_to(leaked, frame.sent.shape), frame.waveform)
+
+
+def respond(settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the response (N, M) of the channel and the leakage together, as `receive`."""
+    return response + _leaked(settings, frame, rng)
+
+
+def _leaked(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """The leakage's response (M,); one draw."""
     level = np.sqrt(frame.network.power) * 10 ** (-settings["isolation_db"] / 20)
-    turn = np.exp(2j * np.pi * (float(rng.random()) - frame.baseband_hz * settings["delay_s"]))
-    return samples + waveform.transmit(np.broadcast_to(level * turn, frame.sent.shape), frame.waveform)
+    return level * np.exp(2j * np.pi * (float(rng.random()) - frame.baseband_hz * settings["delay_s"]))
