@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.effects.antenna import Element, gain, pattern_db
+from lowalt.effects.antenna import Element, gain, local_gain, pattern_db
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import clutter
 from lowalt.effects.received import Scene, observe, received_signal
@@ -63,3 +63,17 @@ def test_land_behind_and_below_the_mast_fades():
     isotropic = clutter.cell_power(settings, radio, radio.stations[0], aim, Element(gain_dbi=3.0, back_db=0.0))
     assert isotropic == pytest.approx(plain * 10**0.6)
     assert shaped[:near].sum() / shaped.sum() < plain[:near].sum() / plain.sum()
+
+
+@pytest.mark.parametrize("element", [Element(), Element(5.0, 30.0, 60.0, 6.0), Element(3.0, 90.0, 0.0, -20.0)])
+def test_the_loops_give_the_tables_pattern_in_every_direction(element):
+    rng = np.random.default_rng(4)
+    for station in network().stations:
+        place = np.asarray(station.position_m)
+        normal = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
+        axes = np.array([normal, station.horizontal, [0, 0, 1.0]])
+        # Along the axes and in all directions.
+        away = np.concatenate([axes, -axes, rng.normal(0, 300, (700, 3))])
+        expected = local_gain(element, *(away @ axes.T).T)
+        assert gain(element, station, place + away) == pytest.approx(expected, rel=1e-9)
+        assert gain(element, station, place + away[6:]) == pytest.approx(expected[6:], rel=1e-12)

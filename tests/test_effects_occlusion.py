@@ -111,8 +111,11 @@ def built(name: str) -> tuple[View, dict]:
     return View(NETWORK, NETWORK.station("A"), cloud, row, NETWORK.times_s, occluders=given), record
 
 
-def cast(view: View, n: int) -> np.ndarray:
-    """Hidden points of one symbol by intersecting every ray with every triangle (Moeller & Trumbore 1997)."""
+def cast(view: View, n: int, closed: bool = False) -> np.ndarray:
+    """Hidden points of one symbol by intersecting every ray with every triangle (Moeller & Trumbore 1997).
+
+    closed: triangles hide only what is behind the side of their normal.
+    """
     given, (rotation, translation, _, part) = view.occluders, view.motion
     owner = given["vertex_part"]
     vertices = np.einsum("kij,kj->ki", rotation[n][owner], given["vertices"]) + translation[n][owner]
@@ -127,7 +130,8 @@ def cast(view: View, n: int) -> np.ndarray:
             scale = 1 / ((b - a) * h).sum(axis=1)
             q = np.cross(point - a, b - a)
             u, v, t = ((point - a) * h).sum(axis=1) * scale, (q @ way) * scale, (q * (c - a)).sum(axis=1) * scale
-            result[l] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)).any()
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)
+            result[l] = (hit & ((np.cross(b - a, c - a) @ way > 0) | (not closed))).any()
     return result
 
 
@@ -140,6 +144,29 @@ def test_built_in_targets_agree_with_slow_rays(name):
     assert 0.3 < found.mean() < 0.8
     away = np.einsum("nli,nli->nl", view.normals, np.array(view.station.position_m) - view.places) < 0
     assert found[away].mean() > 0.98
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("count", [1, 8, 9, 64, 65, 700])
+def test_rays_through_loose_triangles_agree_with_slow_rays(count, closed):
+    # Triangles of all sizes, some flat along an axis, some without an area, in two parts of which one turns.
+    rng = np.random.default_rng(count)
+    size = 10 ** rng.uniform(-2, 0, (count, 1, 1))
+    corners = rng.normal(0, 1, (count, 1, 3)) + rng.normal(0, 1, (count, 3, 3)) * size
+    corners[::5, :, 2] = corners[::5, :1, 2]
+    corners[::11, 2] = corners[::11, 1]
+    surfaces = [Surface(half.reshape(-1, 3), np.arange(3 * len(half)).reshape(-1, 3))
+                for half in (corners[: count // 2 + 1], corners[count // 2 + 1 :])]  # fmt: skip
+    points = rng.normal(0, 1.5, (60, 3))
+    view = scene(
+        points, rng.normal(0, 1, (60, 3)), surfaces, np.arange(60) % 2, ("body", "rotor"), closed, rate_hz=7.0,
+        x_m=40.0, y_m=9.0, z_m=70.0,
+    )  # fmt: skip
+    view = replace(view, times_s=NETWORK.times_s[:12])
+    found, slow = occlusion.hidden(view), np.array([cast(view, n, closed) for n in range(12)])
+    assert (found == slow).all()
+    assert count < 100 or 0.02 < found.mean() < 0.98
+    assert (occlusion.hidden(view, "rest") | occlusion.hidden(view, "blades") == found).all()
 
 
 def test_a_car_body_does_not_hide_its_wheels_in_their_wells():

@@ -1,10 +1,12 @@
 """The gain of one antenna element by direction; array sums are in `response`."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.common.network import Station
+from lowalt.effects import antenna_loops
 
 
 class Element(NamedTuple):
@@ -38,7 +40,15 @@ def local_gain(element: Element, ahead: np.ndarray, side: np.ndarray, up: np.nda
 
 
 def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
-    """Return the power gain (...) toward places (..., 3) m."""
-    d = places - np.asarray(station.position_m)
-    normal = np.array([np.cos(station.normal_rad), np.sin(station.normal_rad), 0.0])
-    return local_gain(element, d @ normal, d @ station.horizontal, d[..., 2])
+    """Return the power gain (...) toward places (..., 3) m, to rounding that of `local_gain`."""
+    places = np.ascontiguousarray(places, np.float64)
+    out = np.empty(places.shape[:-1])
+    tilt, nepers = math.radians(element.downtilt_deg), math.log(10) / 10
+    most = nepers * element.back_db
+    axes = np.array([math.cos(station.normal_rad), math.sin(station.normal_rad), *station.horizontal[:2]])
+    antenna_loops.power_gain(
+        places.reshape(-1, 3), np.asarray(station.position_m, float), axes, np.array([math.cos(tilt), math.sin(tilt)]),
+        10 ** (element.gain_dbi / 10), nepers * 12.0 * math.degrees(1.0 / element.width_deg) ** 2, most,
+        antenna_loops.halvings(most), np.empty((7, antenna_loops.TILE)), out.reshape(-1),
+    )  # fmt: skip
+    return out

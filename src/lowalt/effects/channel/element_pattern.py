@@ -27,6 +27,7 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
 
     On a link it is the geometric mean of both stations' gains.
     """
-    own = gain(element(settings), view.station, view.places)
+    shape = element(settings)
+    own = view.element_gain if view.element == shape else gain(shape, view.station, view.places)
     sends = view.station.transmitter
-    return own if sends is None else np.sqrt(own * gain(element(settings), sends, view.places))
+    return own if sends is None else np.sqrt(own * gain(shape, sends, view.places))

@@ -10,6 +10,7 @@ from scipy.special import i0e
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.effects import series
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.fresnel import fresnel
 from lowalt.effects.response import ImagePath
@@ -94,8 +95,12 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     # The middle of the station's band stands for all of it.
     frequency = radar(view.network, view.station).centre_hz
     properties = (*ground(settings, frequency), frequency, settings["polarisation"])
-    coefficient = fresnel(np.clip(sine, 0.0, 1.0), *properties)
-    if settings["roughness_m"] > 0:
-        coefficient *= roughness(sine, settings["roughness_m"], frequency)
+
+    def reflected(sine: np.ndarray) -> np.ndarray:
+        found = fresnel(sine, *properties)
+        return found * roughness(sine, settings["roughness_m"], frequency) if settings["roughness_m"] > 0 else found
+
+    # Over the few degrees that a look covers, the coefficient is a short series of the sine.
+    coefficient = series.at(reflected, np.clip(sine, 0.0, 1.0))
     below = np.asarray(view.station.position_m) * [1.0, 1.0, -1.0]
     return [ImagePath(mirrored, coefficient * view.relative_gain(mirrored), below)]

@@ -93,10 +93,14 @@ def hidden(view: View, by: str = "all") -> np.ndarray:
     toward = np.where(known, 0.0, offset / range_m)
     blade = np.isin(surfaces["vertex_part"][surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
     faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
-    closed = surfaces["closed"][surfaces["vertex_part"][faces[:, 0]]]
+    owner = surfaces["vertex_part"]
+    closed = surfaces["closed"][owner[faces[:, 0]]]
+    # Corners of other surfaces are not wanted on the screen.
+    wanted = np.zeros(len(owner), np.bool_)
+    wanted[faces] = True
     triangles(
         place, np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.asarray(part, np.int64), start,
-        toward, surfaces["vertices"], surfaces["vertex_part"], faces, closed, GRID, result,
+        toward, surfaces["vertices"][wanted], owner[wanted], (np.cumsum(wanted) - 1)[faces], closed, GRID, result,
     )  # fmt: skip
     return result
 
