@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy manifest help
+.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -172,6 +172,11 @@ check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/r
 # Two environments of their own, so that this one keeps its NumPy.
 check-numpy: $(SETUP)  ## the tiny data set with the oldest and the newest NumPy that pyproject.toml allows
 	for version in $(NUMPYS); do .ci/numpy.sh $(PYTHON) $$version || exit 1; done
+
+# Debian's packages of another architecture; everything goes into ARM, nothing is installed.
+ARM ?= .venv/arm
+check-arm: $(SETUP)  ## the tiny data set on an emulated 64-bit ARM processor: Debian on x86-64, ten minutes
+	.ci/arm.sh $(ARM)
 
 manifest:  ## keep the checksums of the finished default and tiny runs
 	for run in default tiny; do $(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done

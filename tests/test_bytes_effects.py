@@ -1,0 +1,52 @@
+"""Every effect alone on two processors: which give the same numbers, and how far the others are apart."""
+
+import numpy as np
+import pytest
+
+from emulation import run
+from lowalt.effects.catalogue import PLACES
+
+UNEQUAL = {}
+"""Effects whose numbers depend on the processor, with the share of all numbers that may differ."""
+CLOSE = 2e-7
+"""Largest difference, relative to the largest value: three units in the last place of float32."""
+
+PROBE = """
+import sys
+import numpy as np
+from lowalt.common.config import load
+from lowalt.effects.catalogue import PLACES
+from lowalt.shards.dataset import Dataset
+from lowalt.targets.occluders import make
+from lowalt.targets.records import records_of
+config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
+names = config["targets"]["select"] = ["DJI Mini 2", "Owl"]
+config["effects"] = {}
+records = records_of(config["targets"], None)
+occluders = {name: make(records[name], None, config["seed"]) | {"subtype": name} for name in names}
+clouds, found = Dataset(config).clouds, {}
+for name in ["none", *PLACES]:
+    dataset = Dataset(config | {"effects": {} if name == "none" else {name: {}}}, clouds, occluders=occluders)
+    rows = [dataset.row(dataset.place(number)) for number in (0, len(dataset) // 2)]
+    found[name] = np.stack([dataset.maker.signal(row, np.inf) for row in rows])
+np.savez(sys.argv[1], **found)
+"""
+
+
+@pytest.fixture(scope="module")
+def signals(tmp_path_factory):
+    """Signals of every effect by name, native and without AVX: (2 targets, 3 stations, symbols) complex64 each."""
+    folder = tmp_path_factory.mktemp("effects")
+    for name in ("native", "x86-64-v2"):
+        run(name, "-c", PROBE, str(folder / f"{name}.npz"))
+    here, there = (np.load(folder / f"{name}.npz") for name in ("native", "x86-64-v2"))
+    return {name: (here[name], there[name]) for name in here.files}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["none", *PLACES])
+def test_an_effect_gives_the_numbers_of_another_processor(signals, name):
+    here, there = signals[name]
+    assert abs(here).max() > 0
+    assert (here != there).mean() <= UNEQUAL.get(name, 0.0)
+    assert abs(here - there).max() <= CLOSE * abs(here).max()
