@@ -169,6 +169,18 @@ def test_rays_through_loose_triangles_agree_with_slow_rays(count, closed):
     assert (occlusion.hidden(view, "rest") | occlusion.hidden(view, "blades") == found).all()
 
 
+def test_a_closed_surface_that_turns_its_back_no_longer_hides():
+    # One triangle turns about the point; as it turns on, it still stands before the point, but shows its back.
+    sail = Surface(np.array([[-1.0, 0, -1.0], [1.0, 0, -1.0], [0, 0, 1.5]]), np.array([[0, 1, 2]]))
+    view = scene(
+        [[0.0, 0.05, 0.0]], [[0, 0, 1.0]], [cylinder(0.001, (0, 0, -2), (0, 0, -1.9)), sail], [0], ("body", "rotor"),
+        rate_hz=3.0, y_m=60.0, z_m=25.0,
+    )  # fmt: skip
+    both, front = (np.array([cast(view, n, closed)[0] for n in range(400)]) for closed in (False, True))
+    assert (occlusion.hidden(view)[:, 0] == front).all()
+    assert front.any() and (both & ~front).any()
+
+
 def test_a_car_body_does_not_hide_its_wheels_in_their_wells():
     view, record = built("ZEEKR 001 2022")
     turned = np.einsum("li,li->l", view.normals[0], np.array(view.station.position_m) - view.places[0]) > 0
