@@ -56,43 +56,46 @@ def samples(folder):
     return {shards.keys[n].decode(): (shards.record(n), shards.signal(n).tobytes()) for n in range(len(shards))}
 
 
+DESCRIBED = {f"shards/{name}" for name in ("index.json", "README.md", "samples.csv", "croissant.json", "SHA256SUMS")}
+"""Files that list or describe all samples."""
+
+
 def test_more_motion_models_add_chunks_and_touch_no_other(base, tmp_path):
     before, after, made = extended(base, tmp_path, {"motion": {"models": 20}})
-    described = {
-        "shards/index.json",
-        "shards/README.md",
-        "shards/samples.csv",
-        "shards/croissant.json",
-        "shards/SHA256SUMS",
-    }
-    assert {name for name in made & set(before)} == described
-    assert all(after[name] == before[name] for name in set(before) - described)
-    assert {name for name in after if "00001" in name} == made - described
+    assert made & set(before) == DESCRIBED
+    assert all(after[name] == before[name] for name in set(before) - DESCRIBED)
+    assert {name for name in after if "00001" in name} == made - DESCRIBED
     assert samples(base).items() <= samples(tmp_path).items()
 
 
-def test_more_snrs_keep_clouds_motion_echoes_and_every_old_sample(base, tmp_path):
-    before, after, made = extended(base, tmp_path, {"noise": {"snr_db": [8, float("inf"), 13]}})
-    assert {name.partition("/")[0] for name in made} == {"noisy", "shards"}
-    assert all(after[name] == before[name] for name in before if name.partition("/")[0] in ("clouds", "motion", "echo"))
-    assert samples(base).items() <= samples(tmp_path).items()
+def test_snrs_and_subtypes_that_are_added_get_shards_of_their_own_and_touch_no_other(base, tmp_path):
+    added = [{"snr_db": [13]}, {"subtypes": ["AITO M9 2024"]}]
+    before, after, made = extended(base, tmp_path, {"added": added})
+    assert made & set(before) == DESCRIBED
+    assert all(after[name] == before[name] for name in set(before) - DESCRIBED)
+    new = made - DESCRIBED
+    assert {name.partition("/")[0] for name in new} == {"clouds", "motion", "echo", "noisy", "shards"}
+    assert {name for name in new if "s1" in name} == {name for name in new if "t2" not in name} - CLOUD
+    # The same samples as where all is made at once, in other shards.
+    whole = {"noise": {"snr_db": [8, float("inf"), 13]}, "targets": {"select": [*SELECT, "AITO M9 2024"]}}
+    at_once = workplace(tmp_path / "at-once")
+    (at_once / "overlay.yaml").write_text(yaml.safe_dump(BASE | whole))
+    snakemake(at_once, "--", "data")
+    assert samples(tmp_path) == samples(at_once)
 
 
-def test_more_subtypes_keep_the_other_group_and_every_old_sample(base, tmp_path):
-    """A chunk holds all subtypes of its group, so the new subtype's group is made again; its old samples are equal."""
-    before, after, made = extended(base, tmp_path, {"targets": {"select": [*SELECT, "AITO M9 2024"]}})
-    others = {name for name in before if "unseen-" in name or name.startswith("clouds/")}
-    assert not others & made and all(after[name] == before[name] for name in others)
-    assert "clouds/aito-m9-2024.npz" in made
-    assert samples(base).items() <= samples(tmp_path).items()
+CLOUD = {"clouds/aito-m9-2024.npz"}
 
 
-def test_more_stations_keep_the_signals_of_the_old_ones(base, tmp_path):
-    """Motion keeps clear of every mast and echoes name the network, so all is made again, with the same bytes."""
+def test_more_stations_keep_clouds_motion_and_the_echoes_of_the_old_ones(base, tmp_path):
+    """A sample holds the signals of all stations, so noise and shards are made again; old signals stay in them."""
     network = yaml.safe_load((base / "config/default.yaml").read_text())["network"]["stations"]
-    before, after, _ = extended(base, tmp_path, {"network": {"stations": network | STATION}})
+    before, after, made = extended(base, tmp_path, {"network": {"stations": network | STATION}})
     same = {name for name in before if name.startswith(("clouds/", "motion/", "echo/"))}
-    assert all(after[name] == before[name] for name in same)
+    assert not same & made and all(after[name] == before[name] for name in same)
+    assert {name for name in made if name.startswith("echo/")} == {
+        f"echo/{group}-00000/D.npy" for group in ("seen", "unseen")
+    }
     old, new = (
         np.load(base / "results/test/noisy/seen-00000.npy"),
         np.load(tmp_path / "results/test/noisy/seen-00000.npy"),

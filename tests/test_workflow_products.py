@@ -130,11 +130,11 @@ def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_
 def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
     _, products, _ = parts({"shards": {"kind": "signal"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
     assert products.shard_content(CHUNK) == {"signals": "results/default/noisy/seen-00001.npy"}
-    surfaces = products.group_occluders(CHUNK)
+    surfaces = products.chunk_occluders(CHUNK)
     assert [path.replace("occluders", "clouds") for path in surfaces] == products.group_clouds(CHUNK)
     assert [Path(path).name for path in products.chunk_powers(CHUNK)] == ["A.power.npy", "B.power.npy", "C.power.npy"]
     _, usual, _ = parts()
-    assert usual.group_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []
+    assert usual.chunk_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []
 
 
 def test_recipe_shards_need_clean_echoes_and_neither_noise_nor_tiles():
@@ -202,7 +202,7 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
 
 def test_settings_of_different_jobs_differ_and_are_json():
     _, _, settings = parts()
-    one, other = (SimpleNamespace(run="default", group=group) for group in ("seen", "unseen"))
+    one, other = (SimpleNamespace(run="default", group=group, part="00000") for group in ("seen", "unseen"))
     drawn = [set(json.loads(settings.motion(job))["published"]) for job in (one, other, one)]
     assert drawn[0] == drawn[2] and drawn[0].isdisjoint(drawn[1])
     assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))

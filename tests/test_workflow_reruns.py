@@ -28,6 +28,8 @@ OVERLAY = {
     "noise": {"snr_db": [8, float("inf")]},
     "report": {"cost": False},
 }
+# The region is given, so that it does not follow from the stations.
+OVERLAY["motion"]["region"] = {"polygon_m": [[100, 60], [400, 60], [250, 300]], "mast_clearance_m": 10.0}
 MESH = "meshes/uav/crazyflie_cf2_assembly.stl"
 
 # --- the model: which jobs follow from which ---
@@ -62,7 +64,8 @@ def next_jobs(job):
     """Jobs that read what a job makes."""
     rule, *names = job
     if rule == "cloud":
-        group = next(group for group, members in GROUPS.items() if names[0] in members)
+        # A subtype that is added belongs to no chunk that was there.
+        group = next((group for group, members in GROUPS.items() if names[0] in members), None)
         own = {work for work in MOTION | ECHO if work[1] == group}
         return own | GALLERY | FREEZE | DISTANCES | REPORT
     if rule == "motion":
@@ -107,6 +110,18 @@ def grown(part):
     return own | INDEX | CARD | FREEZE | TRAIN | EVALUATE | TABLES | REPORT | MANIFEST | SETTINGS
 
 
+def added(part, groups, motion):
+    """The jobs of added chunks, with motion models of their own or without, and those that read all samples."""
+    rules = ("motion", "noise", "tiles") if motion else ("noise", "tiles")
+    own = {(rule, group, f"{number}{part}") for rule in rules for group in groups for number in PARTS}
+    chunks = [(group, f"{number}{part}") for group in groups for number in PARTS]
+    if motion:
+        own |= {("echo", *chunk, station) for chunk in chunks for station in STATIONS} | FREEZE | DISTANCES | GALLERY
+    for group, number in chunks:
+        own |= {(*work, group, fold, number) for work in (("shard",), ("views", "24")) for fold in FOLDS}
+    return own | INDEX | CARD | TRAIN | EVALUATE | TABLES | REPORT | MANIFEST | SETTINGS
+
+
 # --- the changes ---
 
 
@@ -144,6 +159,23 @@ CHANGES = {
     "colour map": Change(TILES | INDEX | TRAIN, overlay={"images": {"colour_map": "magma"}}),
     "more motion models": Change(
         set(), ("Missing output files",), overlay={"motion": {"models": 30}}, expected=grown("00002")
+    ),
+    "an SNR added": Change(
+        set(),
+        ("Missing output files",),
+        overlay={"added": [{"snr_db": [13]}]},
+        expected=added("s1", GROUPS, motion=False),
+    ),
+    "a subtype added": Change(
+        set(),
+        ("Missing output files",),
+        overlay={"added": [{"subtypes": ["AITO M9 2024"]}]},
+        expected=added("t1", ["seen"], motion=True) | {("cloud", "aito-m9-2024")},
+    ),
+    "a station more": Change(
+        {("echo", *chunk, "D") for chunk in CHUNKS} | NOISE | TILES | SHARD | INDEX | MANIFEST,
+        ("Missing output files", "Params have changed", "Set of input files has changed"),
+        overlay={"network": {"stations": {"D": {"position_m": [800.0, 800.0, 25.0], "normal_deg": 225.0}}}},
     ),
     "split": Change(SHARD, overlay={"split": {"val": 2, "train": 7}}),
     "kind of shards": Change(

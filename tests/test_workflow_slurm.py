@@ -1,6 +1,7 @@
 """A data set from two Slurm nodes has the bytes of the local one, and a lost node costs its jobs only.
 
 Needs a Slurm of at least two nodes (`sinfo`) that this user may take down and up again; elsewhere tests are skipped.
+The test of what is asked for needs none.
 """
 
 import os
@@ -13,7 +14,7 @@ import time
 import pytest
 import yaml
 
-from test_workflow import checksums, snakemake, workplace
+from test_workflow import ROOT, checksums, snakemake, workplace
 from test_workflow_extension import BASE
 
 pytest.importorskip("snakemake_executor_plugin_slurm")
@@ -82,6 +83,47 @@ def watched(run, folder):
 
 def chunk_jobs(folder):
     return [job for job, path in submitted(folder).items() if "chunks" in path]
+
+
+# A job named as a rule of the profile, so that the profile's own resources and groups are what is tested.
+GREEDY = """
+rule evaluate:
+    output:
+        "made.txt",
+    shell:
+        "echo {resources.mem_mb} >> attempts.txt; ulimit -v $(( {resources.mem_mb} * 1024 ));"
+        " {config[python]} -c 'bytes(3000 << 20)' && touch {output}"
+"""
+
+
+def submit(folder, *arguments):
+    """Run the small workflow in the queue by the profile; return its exit status and what it said."""
+    (folder / "Snakefile").write_text(GREEDY)
+    command = [sys.executable, "-m", "snakemake", "--profile", ROOT / "profiles/slurm", "--workflow-profile", "none"]
+    command += ["--slurm-status-command", "squeue", "--config", f"python={sys.executable}", *arguments]
+    run = subprocess.run(list(map(str, command)), cwd=folder, capture_output=True, text=True)
+    return run.returncode, run.stdout + run.stderr
+
+
+@needs_slurm
+def test_a_job_that_needs_more_memory_than_it_asked_for_gets_more_the_next_time(tmp_path):
+    status, said = submit(tmp_path)
+    assert status == 0, said[-3000:]
+    assert (tmp_path / "attempts.txt").read_text().split() == ["2000", "4000"]
+
+
+def test_a_gpu_is_asked_for_by_name(tmp_path, monkeypatch):
+    """A queue that refuses every job, but notes what it was asked for."""
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for name in ("sbatch", "sinfo", "squeue", "scontrol", "sacct", "sacctmgr"):
+        (tools / name).write_text(f'#!/bin/sh\necho {name} "$@" >> {tmp_path}/asked.txt\nexit 1\n')
+        (tools / name).chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tools}:{os.environ['PATH']}")
+    resources = ("evaluate:gpu=1", "evaluate:gpu_model=h100", "evaluate:mem_mb=32000", "evaluate:runtime=1440")
+    status, _ = submit(tmp_path, "--set-resources", *resources, "--retries", "0")
+    (line,) = [line for line in (tmp_path / "asked.txt").read_text().splitlines() if line.startswith("sbatch")]
+    assert status and "--gpus=h100:1" in line and "--mem 32000" in line and "-t 1440" in line
 
 
 @needs_slurm

@@ -7,6 +7,7 @@ from snakemake.exceptions import WorkflowError
 
 from lowalt.common.environment import prepare
 from lowalt.common.errors import InputError
+from lowalt.common.plan import PART
 from lowalt.effects.catalogue import dotted
 from lowalt.workflow import locks, options, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
@@ -41,7 +42,7 @@ wildcard_constraints:
     run=RUN.name,
     subtype="|".join(RUN.subtypes),
     group="|".join(RUN.plan.groups),
-    part=r"\d{5}",
+    part=PART,
     station="|".join(RUN.stations),
     fold="train|val|test",
     protocol="seen|unseen",

@@ -7,7 +7,7 @@ rule echo:
     input:
         code=code("lowalt.echo"),
         motion="results/{run}/motion/{group}-{part}.csv",
-        clouds=products.group_clouds,
+        clouds=products.chunk_clouds,
     output:
         expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
     log:

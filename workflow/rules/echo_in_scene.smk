@@ -10,7 +10,7 @@ rule echo_in_scene:
         code=code("lowalt.effects", *map(dotted, config["effects"])),
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=products.scene_clouds,
-        occluders=products.group_occluders,
+        occluders=products.chunk_occluders,
     output:
         signals=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.npy", station=LISTENING),
         power=expand("results/{{run}}/echo/{{group}}-{{part}}/{station}.power.npy", station=LISTENING),

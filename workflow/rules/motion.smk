@@ -1,12 +1,12 @@
 # Motion: the table of motion models of one chunk, one row a model, every parameter drawn from its own stream.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's group
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
 
 
 rule motion:
     input:
         code=code("lowalt.motion"),
-        clouds=products.group_clouds,
+        clouds=products.chunk_clouds,
     output:
         "results/{run}/motion/{group}-{part}.csv",
     log:

@@ -1,12 +1,12 @@
 # Noise: complex white Gaussian noise at every SNR of the set, independent from station to station and SNR to SNR.
-# REQUIRED INPUTS: results/{run}/motion/{group}-{part}.csv, results/{run}/echo/{group}-{part}/*.npy
+# REQUIRED INPUTS: motion table and echoes of the chunk
 # OUTPUTS: results/{run}/noisy/{group}-{part}.npy, complex64 (models, snrs, stations, symbols)
 
 
 rule noise:
     input:
         code=code("lowalt.noise", *options.noise_modules(config)),
-        motion="results/{run}/motion/{group}-{part}.csv",
+        motion=products.motion,
         echoes=products.chunk_echoes,
         powers=products.chunk_powers,
     output:

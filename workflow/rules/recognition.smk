@@ -32,7 +32,7 @@ rule freeze:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.freeze"),
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
-        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=RUN.plan.chunks),
+        motion=expand("results/{{run}}/motion/{chunk}.csv", chunk=RUN.plan.sources),
     output:
         "results/{run}/SHA256SUMS",
     log:
@@ -48,7 +48,7 @@ rule distances:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.distances"),
         clouds=expand("results/{{run}}/clouds/{subtype}.npz", subtype=RUN.subtypes),
-        motion=expand("results/{{run}}/motion/{group}-00000.csv", group=RUN.plan.groups),
+        motion=products.first_motion,
     output:
         "results/{run}/distances.csv",
     log:

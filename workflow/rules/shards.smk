@@ -9,7 +9,7 @@ rule shard:
     input:
         unpack(products.shard_content),
         code=code("lowalt.shards"),
-        motion="results/{run}/motion/{group}-{part}.csv",
+        motion=products.motion,
     output:
         tar="results/{run}/shards/{group}-{fold}-{part}.tar",
         table="results/{run}/shards/{group}-{fold}-{part}.npz",

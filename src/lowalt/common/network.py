@@ -59,6 +59,21 @@ def station_names(block: dict) -> list[str]:
     return sorted(block["stations"])
 
 
+def as_far_as(block: dict, name: str) -> dict:
+    """Return a `network` block with the stations that decide what a station of it hears, and no others.
+
+    Its sub-band follows from how many stations stand before it; a link needs the stations that it connects.
+    """
+    stations = block["stations"]
+    last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))
+    kept = {
+        other: place
+        for other, place in stations.items()
+        if other == name or (other <= last and "transmit" not in place)
+    }
+    return {**block, "stations": kept}
+
+
 def masts_m(block: dict) -> list[list[float]]:
     """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have none."""
     return [place["position_m"][:2] for place in block["stations"].values() if "position_m" in place]

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
+from lowalt.common.plan import snrs_of
 from lowalt.effects.catalogue import called, providing
 from lowalt.effects.interface import Checks
 
@@ -31,7 +32,7 @@ def check(config: dict) -> CheckedScene:
     scene = CheckedScene(
         Network.from_settings(config["network"]),
         {effect.name: effect.settings for effect in effects},
-        tuple(float(snr) for snr in config["noise"]["snr_db"]),
+        snrs_of(config),
     )
     links = [station.name for station in scene.network.stations if station.transmitter is not None]
     if links and "direct_path" not in config["effects"]:

@@ -21,7 +21,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--out", required=True, help="motion table to write (.csv)")
     given = options.parse_args(arguments)
     seed, masts_m, motion, published = pick(given.settings, "seed", "masts_m", "motion", "published")
-    masts_m = np.array(masts_m, dtype=float)
+    masts_m = np.array(masts_m, dtype=float).reshape(-1, 2)
     corners = region_polygon(masts_m, motion["region"]["polygon_m"])
     clouds = [read(path) for path in given.clouds]
     rows = []

@@ -44,6 +44,28 @@ def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
     return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
 
 
+def masts_in_reach(masts_m: list[list[float]], polygon_m: list | None, mast_clearance_m: float) -> list[list[float]]:
+    """Return the masts [x, y] (m) on which the places of targets depend.
+
+    polygon_m: corners of a convex region, or None where the masts themselves span it; mast_clearance_m: least distance
+    of a target to a mast. A mast farther than that from a given region changes no draw.
+    """
+    if polygon_m is None:
+        return masts_m
+    corners = region_polygon(np.zeros((0, 2)), polygon_m)
+    # Two clearances, so that no rounding here decides about a draw.
+    return [mast for mast in masts_m if _distance_m(np.array(mast, dtype=float), corners) < 2 * mast_clearance_m]
+
+
+def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
+    """Distance of a point (2,) to a convex polygon (K, 2), 0 inside (m)."""
+    if np.all(_edges(corners, point) >= 0):
+        return 0.0
+    side, away = np.roll(corners, -1, axis=0) - corners, point - corners
+    share = np.clip((away * side).sum(1) / (side * side).sum(1), 0.0, 1.0)
+    return float(np.hypot(*(away - share[:, None] * side).T).min())
+
+
 def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
     low, high = corners.min(axis=0), corners.max(axis=0)
     for _ in range(10_000):

@@ -79,17 +79,18 @@ class DatasetSamples:
         """Note the samples of one shard in its order; return their facts."""
         plan, network = self.dataset.plan, self.dataset.maker.network
         rows, first = rows_of(self.dataset, chunk), len(self.rows)
-        chosen = select(rows, list(plan.snrs), plan.split, plan.seed, fold)
+        levels = plan.chunk(chunk).snrs
+        chosen = select(rows, list(levels), plan.split, plan.seed, fold)
         self.rows += rows
-        self.chosen += [(first + number, plan.snrs[level]) for number, level in chosen]
+        self.chosen += [(first + number, levels[level]) for number, level in chosen]
         blank = [math.nan] * len(network.stations)
         places = []
         for number, level in chosen if placed else ():
-            entry = json.loads(record(rows[number], plan.snrs[level], fold, plan.seed, network, self.dataset.classes))
+            entry = json.loads(record(rows[number], levels[level], fold, plan.seed, network, self.dataset.classes))
             places.append(geometry(entry, network))
         places = places or [(blank, blank)] * len(chosen)
         own = [rows[number] for number, _ in chosen]
-        snrs = [plan.snrs[level] for _, level in chosen]
+        snrs = [levels[level] for _, level in chosen]
         return Facts(
             key=np.array([sample_key(row["subtype"], row["model"], snr) for row, snr in zip(own, snrs, strict=True)]),
             subtype=np.array([row["subtype"] for row in own]),

@@ -3,6 +3,7 @@
 import functools
 
 from lowalt.common.network import station_names
+from lowalt.common.plan import snrs_of
 from lowalt.report.inputs import Inputs
 from lowalt.report.tables import stage_times
 from lowalt.shards import ShardSet
@@ -29,7 +30,7 @@ class Run:
     @property
     def snr_labels(self) -> list[str]:
         """The run's SNRs (dB) as the tables write them."""
-        return [f"{snr:g}" for snr in map(float, self.config["noise"]["snr_db"])]
+        return [f"{snr:g}" for snr in snrs_of(self.config)]
 
     @property
     def stations(self) -> list[str]:

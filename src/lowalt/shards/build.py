@@ -49,7 +49,7 @@ def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
     places = [
         Place(group, subtype, model, 0.0)
         for model in range(first, first + count)
-        for subtype in dataset.plan.groups[group]
+        for subtype in dataset.plan.chunk(chunk).members
     ]
     return [dataset.row(place) for place in places]
 
@@ -57,15 +57,17 @@ def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
     """Write the motion table and the shards of one chunk; return the shards' paths."""
     plan, maker, rows = dataset.plan, dataset.maker, rows_of(dataset, chunk)
+    levels = plan.chunk(chunk).snrs
     group, _, part = chunk.partition("-")
-    write_table(folder / "motion" / f"{chunk}.csv", rows)
+    if chunk in plan.sources:
+        write_table(folder / "motion" / f"{chunk}.csv", rows)
     # A shard's samples are shuffled, so the echoes of all its motion models are kept meanwhile.
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> bytes:
         if kind == "recipe":
             return npy(maker.received(rows[number])[0])
-        signal = maker.signal(rows[number], plan.snrs[level])
+        signal = maker.signal(rows[number], levels[level])
         return npy(signal) if kind == "signal" else maker.png(signal)
 
     powers, effects = None, maker.echo["effects"]
@@ -78,7 +80,7 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     paths = []
     for name in plan.folds(chunk):
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
-        given = (rows, list(plan.snrs), plan.split, plan.seed, maker.network, name, kind, content)
+        given = (rows, list(levels), plan.split, plan.seed, maker.network, name, kind, content)
         write_shard(paths[-1], *given, dataset.classes, powers, canceller)
     return paths
 

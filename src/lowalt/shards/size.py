@@ -6,6 +6,7 @@ from lowalt.common.command import run
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
+from lowalt.common.plan import snrs_of
 from lowalt.common.splits import FOLDS
 from lowalt.shards.tar import BLOCK
 
@@ -49,7 +50,7 @@ def main(arguments: list[str]) -> None:
     given = options.parse_args(arguments)
     config = load_yaml(given.config)
     network = Network.from_settings(config["network"])
-    snrs = len(config["noise"]["snr_db"])
+    snrs = len(snrs_of(config))
     sample = sample_bytes(config["shards"]["kind"], len(network.stations), network.symbols, snrs)
     print(models_per_chunk(1e6 * given.target_mb, sample, given.subtypes, snrs, config["split"]))
 

@@ -42,16 +42,39 @@ class Products:
             self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
         return self._groups[key]
 
+    def _of_chunk(self, folder: str, wildcards: Any) -> list[str]:
+        names = self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").members
+        key = (folder, wildcards.run, names)
+        if key not in self._groups:
+            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
+        return self._groups[key]
+
     def record_files(self, wildcards: Any) -> list[str]:
         """The user's mesh or recording files that the record of one subtype names."""
         return source_files(self._run.records[self._run.subtypes[wildcards.subtype]], self._run.inputs)
+
+    def chunk_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of the subtypes of a chunk, in the table's order."""
+        return self._of_chunk("clouds", wildcards)
+
+    def motion(self, wildcards: Any) -> str:
+        """The motion table of a chunk, which SNRs added later share with the chunk that they are added to."""
+        return f"results/{wildcards.run}/motion/{self._source(wildcards)}.csv"
+
+    def first_motion(self, wildcards: Any) -> list[str]:
+        """Motion tables that together hold at least one model of every subtype."""
+        names = [name for name in self._run.plan.sources if not self._run.plan.span(name)[0]]
+        return [f"results/{wildcards.run}/motion/{name}.csv" for name in names]
+
+    def _source(self, wildcards: Any) -> str:
+        return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
 
     def group_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of a group's subtypes, in the table's order."""
         return self._of_group("clouds", wildcards)
 
     def scene_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a group's subtypes, and of the subtypes that the scene adds to them.
+        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them.
 
         Raises: InputError for a companion that the run does not have.
         """
@@ -59,13 +82,13 @@ class Products:
         unknown = sorted(set(companions) - set(self._run.records))
         if unknown:
             raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
-        own = self.group_clouds(wildcards)
+        own = self.chunk_clouds(wildcards)
         more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
         return [*own, *(path for path in more if path not in own)]
 
-    def group_occluders(self, wildcards: Any) -> list[str]:
-        """Surfaces of a group's subtypes where the scene hides points behind surfaces, none elsewhere."""
-        return self._of_group("occluders", wildcards) if "occlusion" in self._config["effects"] else []
+    def chunk_occluders(self, wildcards: Any) -> list[str]:
+        """Surfaces of a chunk's subtypes where the scene hides points behind surfaces, none elsewhere."""
+        return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
 
     def call_occluders(self, wildcards: Any) -> list[str]:
         """Surfaces of a group's subtypes where the call hides points behind surfaces, none elsewhere."""
@@ -90,12 +113,12 @@ class Products:
 
     def chunk_echoes(self, wildcards: Any) -> list[str]:
         """The clean signals of a chunk, in the order of the stations."""
-        stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
         return [f"{stem}/{station}.npy" for station in self._run.stations]
 
     def chunk_powers(self, wildcards: Any) -> list[str]:
         """The powers of the targets' own echoes, to which set SNRs refer in a scene with effects; none elsewhere."""
-        stem = f"results/{wildcards.run}/echo/{wildcards.group}-{wildcards.part}"
+        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
@@ -112,7 +135,7 @@ class Products:
         if not self._run.is_reduced(int(wildcards.size)):
             return {}
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
-        return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": f"{base}/motion/{chunk}.csv"}
+        return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": self.motion(wildcards)}
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files of training and evaluation: images shrunk to the scheme's size, the shards, or what samples are made
@@ -261,11 +284,11 @@ class Products:
         kind = self._config["shards"]["kind"]
         cached = self._config["recognition"]["cache"]
         sizes = sorted({run.pixels(scheme) for scheme in run.trained}) if cached else []
-        echoes = [f"{chunk}-{station}" for chunk in plan.chunks for station in run.stations]
+        echoes = [f"{chunk}-{station}" for chunk in plan.sources for station in run.stations]
         data = [
             *(f"cloud/{subtype}" for subtype in run.subtypes),
-            *(f"motion/{chunk}" for chunk in plan.chunks),
-            *(f"echo/{name}" for name in (echoes if run.echo_per_station else plan.chunks)),
+            *(f"motion/{chunk}" for chunk in plan.sources),
+            *(f"echo/{name}" for name in (echoes if run.echo_per_station else plan.sources)),
             *(f"noise/{chunk}" for chunk in plan.chunks if kind != "recipe"),
             *(f"tiles/{chunk}" for chunk in plan.chunks if kind == "image"),
             *(f"shard/{shard}" for shard in plan.shards),

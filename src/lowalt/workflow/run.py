@@ -15,6 +15,7 @@ from lowalt.common.files import slug
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
 from lowalt.common.yaml_files import load_yaml
+from lowalt.effects.set_noise import in_all_cells
 from lowalt.recognition.schemes import Scheme, columns_in, named
 from lowalt.shards.clean import refuse
 from lowalt.spectra import Spectra
@@ -75,6 +76,8 @@ class Run:
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
         _check_data(config)
         _check_input(config)
+        if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
+            raise InputError("added: snr_db beside effects.cell_noise, whose echoes hold the noise of all SNRs")
         for name in block.get("extra", []):
             _check_extra(config, name, classes)
         return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)

@@ -7,8 +7,10 @@ wildcards of a job and can stand in a rule's `params:`. A text is made once: Sna
 from typing import Any
 
 from lowalt.common.config import canonical
-from lowalt.common.network import masts_m
+from lowalt.common.network import as_far_as, masts_m
+from lowalt.common.plan import Chunk
 from lowalt.effects.set_noise import in_all_cells
+from lowalt.motion.sample import masts_in_reach
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
@@ -35,6 +37,15 @@ class Settings:
     def _published(self) -> dict[str, dict]:
         return {name: record["published"] for name, record in self._run.records.items()}
 
+    def _chunk(self, wildcards: Any) -> Chunk:
+        return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}")
+
+    def _snrs(self, wildcards: Any) -> list[float]:
+        """SNRs (dB) of a job's chunk, as the configuration writes them."""
+        steps = [self._config["noise"], *self._config.get("added", [])]
+        written = {float(snr): snr for step in steps for snr in step.get("snr_db", [])}
+        return [written[snr] for snr in self._chunk(wildcards).snrs]
+
     def configuration(self, wildcards: Any) -> str:
         """The whole configuration."""
         return self._text("configuration", **self._config)
@@ -45,21 +56,21 @@ class Settings:
         return self._text("cloud", wildcards.subtype, seed=self._config["seed"], record=record)
 
     def motion(self, wildcards: Any) -> str:
-        """Data that motion models are drawn from: region, masts, and the published ranges of a group's subtypes."""
-        block = self._config["motion"]
+        """Data that a chunk's motion models are drawn from: region, masts in its reach, ranges of its subtypes."""
+        block, members = self._config["motion"], self._chunk(wildcards).members
         return self._text(
-            "motion", wildcards.group,
+            "motion", members,
             seed=self._config["seed"],
-            masts_m=masts_m(self._config["network"]),
+            masts_m=masts_in_reach(masts_m(self._config["network"]), **block["region"]),
             motion={key: block[key] for key in MOTION if key in block},
-            published={
-                name: self._run.records[name]["published"] for name in self._run.plan.groups[wildcards.group]
-            },
+            published={name: self._run.records[name]["published"] for name in members},
         )  # fmt: skip
 
     def echo(self, wildcards: Any) -> str:
-        """The network and the echo's tolerance."""
-        return self._text("echo", **self._blocks("network"), tolerance=self._config["echo"]["tolerance"])
+        """The network as far as it decides the job's station, and the echo's tolerance."""
+        tolerance, station = self._config["echo"]["tolerance"], getattr(wildcards, "station", None)
+        network = as_far_as(self._config["network"], station) if station else self._config["network"]
+        return self._text("echo", station, network=network, tolerance=tolerance)
 
     def echo_in_scene(self, wildcards: Any) -> str:
         """The network, the echo's tolerance, the scene's effects with their SNRs, and the seed that they draw from."""
@@ -69,9 +80,9 @@ class Settings:
 
     def noise(self, wildcards: Any) -> str:
         """The set of SNRs, the names of the stations, and the canceller that the noise passes."""
-        snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
+        snrs, effects = self._snrs(wildcards), self._config["effects"]
         passed = {"canceller": effects["canceller"] or {}} if "canceller" in effects else {}
-        return self._text("noise", **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
+        return self._text("noise", *snrs, **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
         """Network, spectra and images."""
@@ -85,12 +96,12 @@ class Settings:
 
     def shard(self, wildcards: Any) -> str:
         """The fold of each sample, its name and its form, and the companions that its record names."""
-        snrs, effects = self._config["noise"]["snr_db"], self._config["effects"]
+        snrs, effects = self._snrs(wildcards), self._config["effects"]
         added = {"companions": effects["companions"] or {}} if "companions" in effects else {}
         if self._config["shards"]["kind"] == "recipe" and "canceller" in effects:
             added["canceller"] = effects["canceller"] or {}
         blocks = self._blocks("seed", "network", "split", "shards")
-        return self._text("shard", **blocks, snr_db=snrs, classes=self._run.classes, **added)
+        return self._text("shard", *snrs, **blocks, snr_db=snrs, classes=self._run.classes, **added)
 
     def cost_table(self, wildcards: Any) -> str:
         """Settings with which the echo is timed, and the rows of the table of targets."""
@@ -104,9 +115,9 @@ class Settings:
 
     def views(self, wildcards: Any) -> str:
         """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""
-        size = int(wildcards.size)
-        more = {"snr_db": self._config["noise"]["snr_db"]} if self._run.is_reduced(size) else {}
-        return self._text("views", wildcards.size, size=size, **more)
+        size, snrs = int(wildcards.size), self._snrs(wildcards)
+        more = {"snr_db": snrs} if self._run.is_reduced(size) else {}
+        return self._text("views", wildcards.size, *snrs, size=size, **more)
 
     def training(self, wildcards: Any) -> str:
         """How a network is trained: from its own seed, or from the run's where a job names no training seed."""

@@ -80,10 +80,10 @@ def units(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> 
     samples = _samples(wildcards, plan)
     stations, symbols = len(config["network"]["stations"]), config["network"]["symbols"]
     if rule == "echo":
-        return samples / len(plan.snrs) * symbols * (1 if "station" in wildcards else stations)
+        return samples / _levels(wildcards, plan) * symbols * (1 if "station" in wildcards else stations)
     kind = config["shards"]["kind"]
     if rule == "noise" or (rule == "shard" and kind != "image"):
-        return samples * stations * symbols / (len(plan.snrs) if (rule, kind) == ("shard", "recipe") else 1)
+        return samples * stations * symbols / (_levels(wildcards, plan) if (rule, kind) == ("shard", "recipe") else 1)
     if rule in ("tiles", "shard"):
         return samples * stations * 3 * config["images"]["size"] ** 2
     if rule in TRAINING and not config["recognition"]["cache"]:
@@ -102,10 +102,16 @@ def _samples(wildcards: Mapping[str, str], plan: Plan) -> float:
     if "part" not in wildcards:
         return plan.models * sum(map(len, plan.groups.values())) * len(plan.snrs)
     group = wildcards["group"]
-    samples = plan.span(f"{group}-{wildcards['part']}")[1] * len(plan.groups[group]) * len(plan.snrs)
+    chunk = plan.chunk(f"{group}-{wildcards['part']}")
+    samples = chunk.count * len(chunk.members) * len(chunk.snrs)
     if "fold" not in wildcards:
         return samples
     return samples * plan.split[wildcards["fold"]] / sum(plan.split[fold] for fold in FOLDS)
+
+
+def _levels(wildcards: Mapping[str, str], plan: Plan) -> int:
+    """SNRs of the chunk that a job is about."""
+    return len(plan.chunk(f"{wildcards['group']}-{wildcards['part']}").snrs)
 
 
 def need(jobs: Iterable[Job], figures: dict[str, Figures], plan: Plan, config: dict, cores: int) -> Need:
