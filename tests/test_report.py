@@ -1,34 +1,18 @@
-"""The report: tables are read and pivoted as written, faults are named, pictures are pictures."""
+"""The report: tables are read and pivoted as written, faults are named."""
 
-import io
-import itertools
 import json
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
-from matplotlib import pyplot as plt
-from PIL import Image
 
 from lowalt.common.config import load
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
-from lowalt.report.figures import confusion as confusion_figure
-from lowalt.report.figures.accuracy_over_snr import accuracy_over_snr
-from lowalt.report.figures.bands import band_figure
-from lowalt.report.figures.confusion import confusion_matrices
-from lowalt.report.figures.stage_times import stage_bars
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
 from lowalt.report.sections import accuracy_cost, echo_cost, effects, hard_cases, measured, transfer
 from lowalt.report.tables import by_scheme, cloud_seconds, confusion, spreads, stage_times
-
-BANDS = [
-    {"protocol": protocol, "scheme": "A", "from": low, "to": high, "accuracy_percent": "90.0", "samples": count}
-    for protocol in ("seen", "unseen")
-    for low, high, count in (("0", "50", "40"), ("50", "100", "60"), ("100", "150", "2"))
-]
 
 
 def test_accuracy_is_pivoted_in_order(tmp_path):
@@ -75,39 +59,6 @@ def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
 def test_confusion_counts_add_up():
     row = {"protocol": "seen", "scheme": "A", "category": "UAV", "predicted": "Bird", "samples": "3"}
     assert confusion([row, row]) == {("seen", "A"): {("UAV", "Bird"): 6}}
-
-
-@pytest.mark.parametrize(
-    "draw",
-    [
-        lambda: accuracy_over_snr({"seen": {"A": {"3": 90.0, "inf": 99.0, "avg": 95.0}}}, {}),
-        lambda: confusion_matrices({("seen", "A"): {("UAV", "UAV"): 5, ("Bird", "UAV"): 1}}, ("UAV", "Bird")),
-        lambda: band_figure({"range (m)": BANDS, "aspect (°)": BANDS[1:]}),
-        lambda: stage_bars([{"rule": "echo", "jobs": 2, "wall_s": 5.0}]),
-    ],
-)
-def test_figures_are_pictures_with_ink_and_repeat_to_the_byte(draw):
-    first = draw()
-    assert first == draw()
-    pixels = np.asarray(Image.open(io.BytesIO(first)).convert("L"))
-    assert pixels.min() < 100 < 250 < pixels.max()
-
-
-def test_numbers_and_names_of_nine_classes_stand_apart_and_a_class_without_samples_has_dashes(monkeypatch):
-    monkeypatch.setattr(confusion_figure, "png", lambda figure: figure)
-    names = ("UAV", "Bird", "Vehicle", "Pedestrian", "Fixed-wing", "Helicopter", "Cyclist", "Animal", "Balloon")
-    cells = {(name, name): 7 for name in names[:-1]}
-    figure = confusion_matrices({("seen", "A"): cells, ("unseen", "A"): cells}, names)
-    figure.canvas.draw()
-    for panel in figure.axes:
-        words = [text.get_text() for text in panel.texts]
-        assert words[:2] == ["100.0", "0.0"] and set(words[-9:]) == {"-"} and words.count("-") == 9
-        boxes = [text.get_window_extent() for text in panel.texts[:9]]
-        assert all(one.x1 < other.x0 for one, other in itertools.pairwise(boxes))
-        ends = [label.get_window_extent() for label in panel.get_xticklabels()]
-        # Slanted names end under their own column.
-        assert all(abs(end.x1 - (box.x0 + box.x1) / 2) < 12 for end, box in zip(ends, boxes, strict=True))
-    plt.close(figure)
 
 
 def test_an_estimate_scales_samples_and_bytes():

@@ -12,6 +12,7 @@ from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.echo_cost import COLUMNS as MEASURED
 from lowalt.measure.echo_pixels import changes, main, pixels, saved, signals
+from lowalt.report.figures import cost_plots
 from lowalt.report.figures.echo_cost import figure
 from lowalt.report.figures.echo_cost import main as draw
 from lowalt.report.page import rendered
@@ -150,5 +151,5 @@ def test_the_summary_compares_where_all_methods_were_timed():
     assert exact["seconds"] == pytest.approx(3e-3) and exact["over_finufft"] == pytest.approx(100)
     assert (exact["error"], exact["pixels"], exact["over_direct"]) == (5e-12, None, None)
     assert loose["pixels"] == [6, 300] and loose["error"] == 1e-5 and peer["over_finufft"] == 1
-    text = rendered("echo_cost", {"own": True, "cost": found, "picture": "data:,"})
+    text = rendered("echo_cost", {"own": True, "cost": found, "plot": cost_plots.echo(table), "picture": "data:,"})
     assert "6 of 300" in text and "<td>3.00</td>" in text and "mean over 2 samples at 150 m" in text

@@ -327,7 +327,7 @@ def test_a_trained_network_is_asked_about_every_sample_in_its_place(tmp_path):
 def test_the_page_shows_every_row(tmp_path):
     write(tmp_path / "effects.csv", list(table().values()))
     lines = read_csv(tmp_path / "effects.csv", *SHOWN)
-    text = rendered("effects", {"own": True, "rows": lines, "picture": "data:here"})
+    text = rendered("effects", {"own": True, "rows": lines, "plot": None, "picture": "data:here"})
     cells = [re.findall(r"<td>(.*?)</td>", line) for line in text.splitlines() if line.startswith("<tr><td>")]
     assert [line[0] for line in cells] == ["none", "gusts", "adc", "windy"]
     assert cells[3][1:4] == ["4.50", "5.00", "0.25"] and cells[1][2] == ""

@@ -121,7 +121,7 @@ def reported(folder, config, clouds, published=None):
     (folder / "report.json").write_text(json.dumps(manifest))
     published = published or load_table("config/targets.csv")
     run(
-        "report", "--manifest", folder / "report.json", "--stages", folder / "stages.csv", "--out",
-        folder / "report.html", config=config, published=published,
+        "report", "--manifest", folder / "report.json", "--stages", folder / "stages.csv", "--figures",
+        folder / "figures", "--out", folder / "report.html", config=config, published=published,
     )  # fmt: skip
     return (folder / "report.html").read_text()

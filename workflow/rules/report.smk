@@ -1,7 +1,8 @@
 # Report: one self-contained page of the run, and the table of the time that each stage took.
 # REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark;
 #                  where report.cost says so the echo's cost, where report.effects says so the effects' table
-# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html, results/{run}/stages.csv
+# OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html, results/{run}/stages.csv,
+#          results/{run}/figures (each plot as SVG and CSV)
 
 
 rule report_manifest:
@@ -29,6 +30,7 @@ rule report:
     output:
         page=report("results/{run}/report.html", caption="../report/report.rst", category="Run"),
         stages="results/{run}/stages.csv",
+        figures=directory("results/{run}/figures"),
     log:
         "results/{run}/logs/report.log",
     conda:
@@ -37,4 +39,4 @@ rule report:
         settings=settings.report,
     shell:
         "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q}"
-        " --stages {output.stages:q} --out {output.page:q} 2> {log:q}"
+        " --stages {output.stages:q} --figures {output.figures:q} --out {output.page:q} 2> {log:q}"

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import jinja2
 
+from lowalt.report.plots import Plot, plotted, scripts
 from lowalt.report.run import Run
 from lowalt.report.sections import (
     accuracy,
@@ -64,7 +65,9 @@ TEMPLATES = Path(__file__).parent
 
 def _templates() -> jinja2.Environment:
     loader = jinja2.FileSystemLoader(TEMPLATES)
-    return jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
+    environment.filters["plotted"] = plotted
+    return environment
 
 
 def rendered(name: str, values: dict | None) -> str:
@@ -74,7 +77,8 @@ def rendered(name: str, values: dict | None) -> str:
 
 def assembled(title: str, parts: list[dict[str, str]]) -> str:
     """Return a self-contained page of parts with their contents; each has id, title and html."""
-    return _templates().get_template("page.html").render(title=title, parts=parts)
+    drawn = any('<figure class="plot">' in part["html"] for part in parts)
+    return _templates().get_template("page.html").render(title=title, parts=parts, plots=scripts() if drawn else "")
 
 
 def section_page(title: str, name: str, values: dict) -> str:
@@ -82,11 +86,28 @@ def section_page(title: str, name: str, values: dict) -> str:
     return assembled(title, [{"id": name, "title": title, "html": rendered(name, values)}])
 
 
-def page(run: Run) -> str:
-    """Return the whole page. Raises: InputError for a table that is missing or lacks a column."""
+def contents(run: Run) -> dict[str, dict | None]:
+    """Return the values of every section by its name.
+
+    Raises: InputError for a table that is missing or lacks a column.
+    """
+    return {_name(module): module.values(run) for module in SECTIONS}
+
+
+def _name(module: ModuleType) -> str:
+    return module.__name__.rpartition(".")[2]
+
+
+def plots(values: dict[str, dict | None]) -> list[Plot]:
+    """Return the plots among the sections' values, in the order of the page."""
+    return [held for section in values.values() for held in (section or {}).values() if isinstance(held, Plot)]
+
+
+def page(run: Run, values: dict[str, dict | None]) -> str:
+    """Return the whole page of the sections' values."""
     parts = []
     for part in PARTS:
-        texts = [rendered(module.__name__.rpartition(".")[2], module.values(run)) for module in part.sections]
+        texts = [rendered(_name(module), values[_name(module)]) for module in part.sections]
         html = "\n".join(texts).strip() or "<p>Neither this run nor the kept reference has measured this.</p>"
         parts.append({"id": part.id, "title": part.title, "html": html})
     return assembled(f"run “{run.config['run']}”", parts)

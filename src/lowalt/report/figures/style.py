@@ -1,8 +1,7 @@
-"""Helpers of all figures: PNG bytes that repeat, one colour a scheme, legends that cover no line."""
+"""Helpers of all figures: PNG bytes that repeat, and pictures as parts of the page."""
 
 import base64
 import io
-from collections.abc import Iterable
 
 import matplotlib
 from PIL import Image
@@ -27,25 +26,6 @@ def png(figure: Figure, colours: int = 0) -> bytes:
         buffer = io.BytesIO()
         few.save(buffer, format="png", optimize=True)
     return buffer.getvalue()
-
-
-def scheme_colours(names: Iterable[str]) -> dict[str, tuple]:
-    """Return a colour for every scheme, the same in all panels of a figure."""
-    distinct = list(dict.fromkeys(names))
-    colours = plt.cm.tab10 if len(distinct) <= 10 else plt.cm.tab20
-    return {name: colours(number % colours.N) for number, name in enumerate(distinct)}
-
-
-def legend_below(figure: Figure, title: str | None = None) -> None:
-    """Name the lines of all panels once, under the figure, where no legend covers a line."""
-    entries = {}
-    for panel in figure.axes:
-        handles, labels = panel.get_legend_handles_labels()
-        entries.update(zip(labels, handles, strict=True))
-    figure.legend(
-        entries.values(), entries.keys(), title=title, fontsize=8, title_fontsize=8, loc="upper center",
-        bbox_to_anchor=(0.5, 0), ncols=min(max(len(entries), 1), 4),
-    )  # fmt: skip
 
 
 def embedded(data: bytes) -> str:

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv
-from lowalt.report.figures.accuracy_over_snr import accuracy_over_snr
-from lowalt.report.figures.style import embedded
+from lowalt.report.figures.accuracy_plots import over_snr
 from lowalt.report.run import Run
 from lowalt.report.tables import by_scheme, spreads
 
@@ -32,5 +31,5 @@ def values(run: Run) -> dict:
         "classes": len(run.shards.classes),
         "ours": ours, "published": paper, "spreads": spreads(measured), "snrs": run.snr_labels,
         "network": network_words(run.config["recognition"]),
-        "picture": embedded(accuracy_over_snr(ours, paper)) if ours else "",
+        "plot": over_snr(ours, paper) if ours else None,
     }  # fmt: skip

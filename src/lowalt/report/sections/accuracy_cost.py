@@ -1,5 +1,6 @@
 """Section: recognition accuracy over its time, from this run's table or the kept reference."""
 
+from lowalt.report.figures import cost_plots
 from lowalt.report.figures.accuracy_cost import FIDELITY, NEEDED, draw
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
@@ -15,4 +16,4 @@ def values(run: Run) -> dict | None:
     table = run.inputs.table(name, *NEEDED, *FIDELITY, *SHOWN)
     rows = [row for row in table if row["snr_db"] == "avg" and row["kind"] != "fidelity"]
     return {"own": name == "accuracy_cost", "rows": rows, "hardware": table[0]["hardware"],
-            "picture": embedded(draw(table))}  # fmt: skip
+            "plot": cost_plots.recognition(table), "picture": embedded(draw(table))}  # fmt: skip

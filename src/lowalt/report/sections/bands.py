@@ -1,18 +1,17 @@
 """Section: accuracy over distance and aspect."""
 
-from lowalt.report.figures.bands import FEWEST, band_figure
-from lowalt.report.figures.style import embedded
+from lowalt.report.figures.accuracy_plots import FEWEST, over_bands
 from lowalt.report.run import Run
 
 COLUMNS = ("protocol", "scheme", "from", "to", "accuracy_percent", "samples")
 
 
 def values(run: Run) -> dict | None:
-    """Return the figure; None where every band has fewer than FEWEST samples."""
+    """Return the plot; None where every band has fewer than FEWEST samples."""
     bands = {
         "distance to the nearest station used (m)": run.inputs.table("ranges", *COLUMNS),
         "aspect seen from it (°)": run.inputs.table("aspects", *COLUMNS),
     }
     if not any(int(row["samples"]) >= FEWEST for rows in bands.values() for row in rows):
         return None
-    return {"picture": embedded(band_figure(bands)), "fewest": FEWEST}
+    return {"plot": over_bands(bands), "fewest": FEWEST}

@@ -1,7 +1,6 @@
 """Section: confusion matrices."""
 
-from lowalt.report.figures.confusion import confusion_matrices
-from lowalt.report.figures.style import embedded
+from lowalt.report.figures import accuracy_plots
 from lowalt.report.run import Run
 from lowalt.report.tables import confusion
 
@@ -9,6 +8,6 @@ COLUMNS = ("protocol", "scheme", "category", "predicted", "samples")
 
 
 def values(run: Run) -> dict | None:
-    """Return the figure; None where nothing was predicted."""
+    """Return the plot; None where nothing was predicted."""
     counts = confusion(run.inputs.table("confusion", *COLUMNS))
-    return {"picture": embedded(confusion_matrices(counts, run.shards.classes))} if counts else None
+    return {"plot": accuracy_plots.confusion(counts, run.shards.classes)} if counts else None

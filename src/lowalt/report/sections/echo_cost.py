@@ -1,5 +1,6 @@
 """Section: the echo's accuracy over its time, a row a method and tolerance, from the two measured tables."""
 
+from lowalt.report.figures import cost_plots
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
 
@@ -54,6 +55,7 @@ def values(run: Run) -> dict | None:
         return None
     own = name == "echo_cost"
     changed = "echo_pixels" if own else "kept_echo_pixels"
-    cost = summary(run.inputs.table(name, *MEASURED), run.inputs.table(changed, *PIXELS))
+    measured = run.inputs.table(name, *MEASURED, "category")
+    cost = summary(measured, run.inputs.table(changed, *PIXELS))
     picture = embedded(run.inputs.path("echo_cost_figure").read_bytes()) if own else ""
-    return {"own": own, "cost": cost, "picture": picture}
+    return {"own": own, "cost": cost, "plot": cost_plots.echo(measured), "picture": picture}

@@ -1,5 +1,6 @@
 """Section: the time that each effect takes, and its influence on signals, spectra and recognition."""
 
+from lowalt.report.figures import cost_plots
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import Run
 
@@ -17,4 +18,5 @@ def values(run: Run) -> dict | None:
         return None
     own = name == "effects"
     picture = embedded(run.inputs.path("effects_figure").read_bytes()) if own else ""
-    return {"own": own, "rows": run.inputs.table(name, *COLUMNS), "picture": picture}
+    rows = run.inputs.table(name, *COLUMNS)
+    return {"own": own, "rows": rows, "plot": cost_plots.effects(rows) if rows[1:] else None, "picture": picture}

@@ -4,17 +4,16 @@ from pathlib import Path
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
-from lowalt.report.figures.stage_times import stage_bars
-from lowalt.report.figures.style import embedded
+from lowalt.report.figures import cost_plots
 from lowalt.report.run import Run
 
 COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
 
 
 def values(run: Run) -> dict:
-    """Return the times of the rules, their figure, and the number of samples."""
+    """Return the times of the rules, their plot, and the number of samples."""
     times = run.stage_times
-    return {"times": times, "samples": len(run.shards), "picture": embedded(stage_bars(times))}
+    return {"times": times, "samples": len(run.shards), "plot": cost_plots.stages(times)}
 
 
 def write_stages(path: str | Path, run: Run) -> None:

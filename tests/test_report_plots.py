@@ -1,0 +1,125 @@
+"""Plots of the page: their rows are the tables' figures, their files repeat, and Vega draws them in a browser."""
+
+import csv
+import json
+import re
+
+import pytest
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.report.figures import accuracy_plots, cost_plots
+from lowalt.report.page import assembled
+from lowalt.report.plots import Plot, plotted, svg, whole, write_plots
+from lowalt.report.tables import by_scheme, confusion
+from pages import browsed, sound
+
+REFERENCE = "results/reference/default"
+
+
+def table(name):
+    return read_csv(f"{REFERENCE}-{name}.csv")
+
+
+def one_of_each():
+    ours = by_scheme(table("accuracy"))
+    bands = [{"protocol": "seen", "scheme": "A:VT", "from": 0, "to": 90, "accuracy_percent": 71.0, "samples": count,
+              "confidence_percent": 80.0} for count in (29, 30)]  # fmt: skip
+    times = [{"rule": "echo", "jobs": 3, "wall_s": 2.0, "cpu_s": 1.5, "peak_mib": 90.0}]
+    return [
+        accuracy_plots.over_snr(ours, by_scheme(read_csv("config/published_accuracy.csv"))),
+        accuracy_plots.confusion(confusion(table("confusion")), ("UAV", "Bird", "Vehicle", "Pedestrian")),
+        accuracy_plots.over_bands({"distance (m)": bands}), accuracy_plots.over_confidence(bands),
+        cost_plots.recognition(table("accuracy_cost")), cost_plots.echo(table("cost")),
+        cost_plots.effects(table("effects")), cost_plots.stages(times),
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def plots():
+    return {plot.name: plot for plot in one_of_each()}
+
+
+def test_every_accuracy_of_the_table_is_a_point(plots):
+    rows = plots["accuracy_over_snr"].rows
+    mine = {(row["protocol"].split()[0], row["scheme"], row["snr_db"].replace("∞", "inf")): row["accuracy_percent"]
+            for row in rows if row["source"] == "this run"}  # fmt: skip
+    wanted = {(row["protocol"], row["scheme"], row["snr_db"]): float(row["accuracy_percent"])
+              for row in table("accuracy") if row["snr_db"] != "avg"}  # fmt: skip
+    assert mine == pytest.approx(wanted, abs=1e-3)
+    schemes = {row["scheme"] for row in table("accuracy")}
+    assert {row["scheme"] for row in rows if row["source"] == "paper"} <= schemes
+
+
+def test_a_row_of_a_confusion_matrix_is_whole(plots):
+    shares = {}
+    for row in plots["confusion"].rows:
+        shares.setdefault((row["panel"], row["true"]), []).append(row["percent"])
+    assert all(sum(found) == pytest.approx(100, abs=0.03) and len(found) == 4 for found in shares.values())
+
+
+def test_matrices_of_many_classes_stand_in_fewer_columns_and_a_class_without_samples_has_dashes(plots):
+    names = tuple("abcdefghi")
+    crowded = accuracy_plots.confusion({("seen", "A"): {(name, name): 7 for name in names[:-1]}}, names)
+    assert [row["shown"] for row in crowded.rows][:2] == ["100.0", "0.0"]
+    assert [row["shown"] for row in crowded.rows if row["true"] == "i"] == ["-"] * 9
+    assert crowded.spec["columns"] == 2 and plots["confusion"].spec["columns"] == 4
+    assert re.search(r">100\.0<", svg(crowded)) and ">-<" in svg(crowded)
+
+
+def test_bands_with_few_samples_are_left_out(plots):
+    assert [row["samples"] for row in plots["bands"].rows] == [30]
+    assert [row["samples"] for row in plots["reliability"].rows] == [30] and plots["bands"].rows[0]["middle"] == 45
+
+
+def test_costs_are_those_of_the_tables(plots):
+    trained = [row for row in table("accuracy_cost") if row["kind"] == "trained" and row["snr_db"] == "avg"]
+    drawn = [row for row in plots["accuracy_cost"].rows if row["subtypes"] == "unseen"]
+    assert sorted(row["value"] for row in drawn if row["cost"].startswith("training")) == sorted(
+        float(row["core_s_training"]) for row in trained)  # fmt: skip
+    assert len(plots["echo_cost"].rows) == len(table("cost")) and all(
+        row["error"] > 0 for row in plots["echo_cost"].rows
+    )
+    effects = table("effects")[1:]
+    assert [row["call"] for row in plots["effects"].rows] == [row["call"] for row in effects]
+    assert all(row["drawn_ms"] == max(float(kept["added_ms"]), 1e-3)
+               for row, kept in zip(plots["effects"].rows, effects, strict=True))  # fmt: skip
+
+
+def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
+    few = [plots["stage_times"], plots["bands"]]
+    for folder in ("one", "two"):
+        write_plots(tmp_path / folder, few)
+    names = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert names == ["bands.csv", "bands.svg", "stage_times.csv", "stage_times.svg"]
+    assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in names)
+    with (tmp_path / "one/stage_times.csv").open() as file:
+        assert next(csv.DictReader(file)) == {"rule": "echo (3)", "wall_s": "2.0", "cpu_s": "1.5", "peak_mib": "90.0"}
+    assert "echo (3)" in (tmp_path / "one/stage_times.svg").read_text()
+
+
+def test_a_name_cannot_end_the_script_that_holds_it():
+    plot = cost_plots.stages([{"rule": "</script><b>", "jobs": 1, "wall_s": 1.0, "cpu_s": 1.0, "peak_mib": 1.0}])
+    text = str(plotted(plot))
+    held = re.search(r'<script type="application/json">(.*?)</script>', text, re.S)[1]
+    assert json.loads(held) == whole(plot) and text.count("</script>") == 1
+
+
+def test_a_plot_says_to_screen_readers_what_it_shows(plots):
+    for plot in plots.values():
+        assert f'aria-label="{plot.description}"' in str(plotted(plot)).replace("&#39;", "'")
+
+
+def test_vega_draws_every_plot_in_the_page_and_hides_the_still_picture(plots, tmp_path):
+    html = "".join(map(str, map(plotted, plots.values())))
+    page = assembled("plots", [{"id": "one", "title": "One", "html": html}])
+    sound(page)
+    script = "document.querySelectorAll('figure.plot').forEach((figure) => figure.scrollIntoView());"
+    found = browsed(tmp_path, page, script)
+    assert found.count('class="vega-embed') >= 2 and 'role="img" aria-label' in found
+    assert len(re.findall(r'<div role="img"[^>]* hidden', found)) >= 2
+
+
+def test_a_plot_without_a_value_is_refused_by_the_page_s_data():
+    with pytest.raises(ValueError, match="JSON"):
+        plotted(Plot("x", "x", {"mark": "bar"}, [{"a": float("nan")}]))
+    assert svg(cost_plots.stages([])).startswith("<svg")
