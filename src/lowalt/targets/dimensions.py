@@ -32,16 +32,17 @@ _RATES = {
 def own_cells(record: dict) -> list[tuple[str, float, str, str]]:
     """Return name, value, unit and source of the sizes, rates and speeds in a merged record's own row.
 
-    A published row gives none. A cell that the record's `row_from` does not name is an estimate.
+    A published row gives none, nor does a record without a row. A cell that the record's `row_from` does not name is an estimate.
     """
-    if record["published"]["idx"] is not None:
+    row = record.get("published")
+    if row is None or row["idx"] is not None:
         return []
     names = {column: (figure, "m") for column, figure in _PUBLISHED.items()} | _RATES
     given = record.get("row_from", {})
     return [
-        (figure, record["published"][column], unit, given.get(column, "estimate"))
+        (figure, row[column], unit, given.get(column, "estimate"))
         for column, (figure, unit) in names.items()
-        if record["published"][column] is not None
+        if row[column] is not None
     ]
 
 
