@@ -32,7 +32,8 @@ _RATES = {
 def own_cells(record: dict) -> list[tuple[str, float, str, str]]:
     """Return name, value, unit and source of the sizes, rates and speeds in a merged record's own row.
 
-    A published row gives none, nor does a record without a row. A cell that the record's `row_from` does not name is an estimate.
+    A published row gives none, nor does a record without a row. A cell that the record's `row_from` does not name is
+    an estimate.
     """
     row = record.get("published")
     if row is None or row["idx"] is not None:
