@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -44,7 +44,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 $(DOCS): $(BASE)
@@ -88,6 +88,11 @@ test-slow: $(TESTING)  ## the slow checks
 # One process a reader; some ten minutes.
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
+
+# The map of tests is measured once and kept in results/mutants; remove it after a change of the suite.
+MUTANTS ?= 25
+mutants: $(TESTING)  ## set small faults into every room of the package, one at a time, and count those that the tests notice: results/benchmarks/mutants.csv
+	$(BIN)/python benchmarks/mutants.py --count $(MUTANTS) --out results/benchmarks/mutants.csv --survivors results/benchmarks/mutants_survivors.csv
 
 lint: $(TESTING)  ## ruff, snakefmt, mypy, snakemake --lint
 	$(BIN)/ruff check .

@@ -1,9 +1,9 @@
 """Small faults set into the package one at a time, and how many of them the tests notice.
 
-    python benchmarks/mutants.py --out results/benchmarks/mutants.csv --survivors results/benchmarks/mutants_survivors.csv
+    python benchmarks/mutants.py --out mutants.csv --survivors mutants_survivors.csv     (make mutants)
 
-For each room of `src/lowalt` a number of faults is drawn by seed. Each is set into a copy of the tree, and the tests that
-run its line are run there until one fails. A test that fails or a run that exceeds its time kills the fault.
+For each room of `src/lowalt` a number of faults is drawn by seed. Each is set into a copy of the tree, and the tests
+that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too long.
 """
 
 import argparse
@@ -20,13 +20,11 @@ from typing import NamedTuple
 
 import numpy as np
 from mutation.candidates import Mutant, draw, mutated, of_file
-from mutation.coverage_map import Coverage, measure, read, tests_of
+from mutation.coverage_map import Coverage, measure, read, shown_tests
 
 from lowalt.common.csv_tables import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("src", "tests", "config", "workflow", "benchmarks", "docs", "design", "envs", "examples", "profiles", "results/reference",
-          "results/benchmarks", "Snakefile", "Makefile", "pyproject.toml", "README.md", "CONTRIBUTING.md", "CHANGELOG.md")  # fmt: skip
 COLUMNS = ("room", "places", "drawn", "killed", "survived", "killed_percent")
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after")
 
@@ -50,14 +48,12 @@ def rooms(root: Path) -> dict[str, list[Mutant]]:
 
 
 def copy_of_tree(root: Path, folder: Path) -> Path:
-    """A copy of what the tests read, with the environment linked, in which faults can be set."""
-    for name in COPIED:
-        source, target = root / name, folder / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        if source.is_dir():
-            shutil.copytree(source, target, ignore=shutil.ignore_patterns("__pycache__"))
-        elif source.exists():
-            shutil.copy(source, target)
+    """A copy of the checkout's files, with its environment linked, in which faults can be set."""
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=root, check=True, capture_output=True, text=True).stdout
+    for name in files.split("\0"):
+        if name and (root / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(root / name, folder / name)
     (folder / ".venv").symlink_to((root / ".venv").resolve())
     return folder
 
@@ -93,7 +89,7 @@ def run(root: Path, found: Coverage, drawn: list[Mutant], jobs: int, limit: floa
 
         def one(mutant: Mutant) -> Outcome:
             """Try one fault in a tree that is free."""
-            tests = tests_of(root, found, mutant.file, mutant.line, limit)
+            tests = shown_tests(root, found, mutant.file, mutant.line, limit)
             tree = trees.get()
             try:
                 outcome = trial(tree, mutant, tests, sum(found.seconds[test] for test in tests))

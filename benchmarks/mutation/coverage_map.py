@@ -90,7 +90,7 @@ def importers(root: Path, file: str) -> set[str]:
             if pattern.search(path.read_text(encoding="utf-8"))}  # fmt: skip
 
 
-def tests_of(root: Path, found: Coverage, file: str, line: int, limit: float) -> list[str]:
+def shown_tests(root: Path, found: Coverage, file: str, line: int, limit: float) -> list[str]:
     """Tests that run a line, the quickest first, until they take `limit` seconds together."""
     rows = found.lines.get(file, {})
     names = set(rows.get(line, ()))
