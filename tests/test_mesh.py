@@ -87,7 +87,7 @@ def test_inches_given_as_metres_are_caught_by_the_published_size():
     record = REAL["BYD Song L EV 2024"] | {"unit": "m"}
     with pytest.raises(
         InputError,
-        match=r"BYD Song L EV 2024: parts.front left wheel.region .* 65.2362, 61.2816. m; is the unit 'm'",
+        match=r"BYD Song L EV 2024: parts.front left wheel.region .* 65\.2, 61\.3\] m; is the unit 'm'",
     ):
         made("BYD Song L EV 2024", FOLDER, **record)
 
