@@ -31,4 +31,5 @@ def error_before(chain: Chain, allowed: float) -> float:
     fits = allowed
     if chain.step > 0:
         fits = min(allowed, allowed**2 * math.sqrt(0.5 * chain.view.network.subcarriers) / chain.step)
-    return min(max(EXACT, fits / strongest), COARSEST)
+    # Where nothing reaches the converter, any error fits.
+    return min(max(EXACT, fits / strongest), COARSEST) if strongest > 0 else COARSEST
