@@ -20,6 +20,8 @@ from from_clone import NOTES, part, table
         (["python", "-m", "lowalt.recognition", "train", "--views", "a"], "recognition train"),
         (["/env/bin/python", "/env/bin/snakemake", "--cores", "2"], "Snakemake"),
         (["/env/bin/python", "-m", "snakemake", "--cores", "2"], "Snakemake"),
+        (["python", "-m", "lowalt.workflow.kernels", "echo"], "workflow.kernels echo"),
+        (["python", "-m", "lowalt.workflow.kernels"], None),
         (["python", "-m", "pip", "install", "snakemake"], None),
         (["python", "-c", "import tomllib"], None),
     ],
