@@ -237,3 +237,12 @@ def test_each_of_the_twenty_questions_is_answered_by_a_file_that_holds_its_word(
              for _, file, _ in rows}  # fmt: skip
     wrong = [row for row in rows if not found[row[1]] or not re.search(rf"\b{row[2]}\b", found[row[1]].read_text())]
     assert not wrong
+
+
+def test_names_in_brackets_after_a_path_stand_in_that_file():
+    text = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where does it live?")[2].partition("\n## ")[0]
+    named = [(path, word) for path, words in re.findall(r"`([\w./-]+\.py)` \(((?:`\w+`(?:, )?)+)", text)
+             for word in re.findall(r"`(\w+)`", words)]  # fmt: skip
+    assert len(named) >= 3
+    wrong = [pair for pair in named if not re.search(rf"\b(def|class) {pair[1]}\b", (ROOT / pair[0]).read_text())]
+    assert not wrong
