@@ -11,7 +11,10 @@ import torch
 from lowalt.common.streams import stream
 from lowalt.recognition import augment, checkpoint, inference, predictions, recipe, runs, statistics, tables
 from lowalt.recognition import training as loop
-from test_recognition_data import facts, read_rows, run_files
+from lowalt.recognition.evaluated import Run
+from lowalt.recognition.objective import objective
+from lowalt.recognition.reader import Reader
+from made_predictions import facts, read_rows, run_files
 from trainings import SCHEME, SETTINGS, sources, with_training, write_views
 
 MACHINE = inference.Machine(torch.device("cpu"), "fp32")
@@ -146,7 +149,7 @@ def test_the_loss_is_the_smoothed_cross_entropy_of_both_parts_by_weight(smoothin
     model, labels = Answers(), [0, 3]
     images = torch.zeros(2, 4, 1, 1, dtype=torch.uint8)
     block = {"label_smoothing": smoothing, "alone": weight}
-    found = loop.objective(model, images, torch.tensor(labels), block, MACHINE)
+    found = objective(model, images, torch.tensor(labels), block, MACHINE)
     expected = by_hand(model.together, labels)
     if weight:
         expected = (expected + weight * by_hand(model.alone, [0, 0, 3, 3])) / (1 + weight)
@@ -155,7 +158,7 @@ def test_the_loss_is_the_smoothed_cross_entropy_of_both_parts_by_weight(smoothin
 
 def test_batches_are_augmented_by_the_stream_of_seed_run_and_step(views):
     source, block = sources(views)["train"], SETTINGS["augmentation"]
-    reader = loop.Reader(source, SCHEME.columns, block, (3, "seen", "AB"), MACHINE)
+    reader = Reader(source, SCHEME.columns, block, (3, "seen", "AB"), MACHINE)
     numbers = np.array([5, 1, 7])
     found, labels = reader[4, numbers]
     plain = source.views(numbers)
@@ -173,7 +176,7 @@ def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_jud
     rest = np.repeat(((1 - score) / 3)[:, None], 3, 1)
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
     predictions.write(path, predictions.from_facts(found, (0,), np.column_stack([score, rest])))
-    tables.write([tables.Run(path)], ["A:VT"], {}, tmp_path, 1)
+    tables.write([Run(path)], ["A:VT"], {}, tmp_path, 1)
     uav = found.label == 0
     levels = {
         fold: statistics.threshold(score[found.fold == fold], found.label[found.fold == fold], 0.8)
@@ -196,7 +199,7 @@ def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_jud
 
 def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
     one, other = (
-        [tables.Run(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
+        [Run(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
         for name, shares in (("ABC:VRP+TRP+VT", (0.9, 0.6, 0.3)), ("A:VRP+TRP+VT", (0.5, 0.5, 0.5)))
     )
     ((resampled, seeds, difference, low, high),) = tables.comparison_rows(one, other, 1)

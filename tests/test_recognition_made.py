@@ -15,7 +15,7 @@ from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.made import DatasetSamples, opened
-from lowalt.recognition.training import Reader
+from lowalt.recognition.reader import Reader
 from lowalt.recognition.views import ShardSamples
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset

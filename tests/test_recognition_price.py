@@ -14,7 +14,7 @@ from PIL import Image
 from lowalt.common.errors import InputError
 from lowalt.measure import accuracy_cost, network_speed
 from lowalt.recognition import predictions, samples, schemes, statistics
-from lowalt.recognition.tables import Run
+from lowalt.recognition.evaluated import Run
 from lowalt.report.figures.accuracy_cost import draw
 
 SNRS = (3.0, np.inf)

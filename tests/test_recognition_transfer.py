@@ -9,7 +9,7 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition import predictions, samples, transfer
-from lowalt.recognition.tables import Run
+from lowalt.recognition.evaluated import Run
 
 SNRS = (3.0, np.inf)
 

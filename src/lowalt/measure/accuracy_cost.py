@@ -33,10 +33,11 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
 from lowalt.common.network import station_names
 from lowalt.common.streams import stream
+from lowalt.recognition.evaluated import Run
 from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
 from lowalt.recognition.statistics import accuracy_by, pareto
-from lowalt.recognition.tables import Run, snr_text
+from lowalt.recognition.tables import snr_text
 
 COLUMNS = (
     "scheme", "kind", "backbone", "pixels", "stations", "spectra", "steps", "train_samples", "parameters", "snr_db",

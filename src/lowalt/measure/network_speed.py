@@ -22,8 +22,8 @@ from lowalt.common.hardware import describe
 from lowalt.common.timing import least_s
 from lowalt.recognition import network, recipe
 from lowalt.recognition.inference import Machine
+from lowalt.recognition.objective import objective
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, named
-from lowalt.recognition.training import objective
 from lowalt.tiles import colour_map
 
 BATCHES = (1, 64)

@@ -131,6 +131,7 @@ def _evaluate(arguments: list[str]) -> None:
 def _tables(arguments: list[str]) -> None:
     """Write accuracy.csv and its companions from prediction files. Settings: seed."""
     from lowalt.recognition import tables
+    from lowalt.recognition.evaluated import Run
     from lowalt.recognition.orderings import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
@@ -143,14 +144,14 @@ def _tables(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
     published = read_published(given.published) if given.published else {}
-    runs = [tables.Run(path) for path in given.predictions]
+    runs = [Run(path) for path in given.predictions]
     tables.write(runs, names(given.schemes), published, given.out, seed)
 
 
 def _transfer(arguments: list[str]) -> None:
     """Compare models of other runs with this run's own on its test samples. Settings: seed."""
     from lowalt.recognition import transfer
-    from lowalt.recognition.tables import Run
+    from lowalt.recognition.evaluated import Run
 
     line = parser("lowalt.recognition transfer", _transfer.__doc__)
     line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")

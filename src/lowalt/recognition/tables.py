@@ -20,22 +20,19 @@ Files written, each with the columns `protocol, scheme` first:
                      lies above zero), is reversed (below), undecided (zero inside) or not ranked (fewer than 3 seeds)
 """
 
-import json
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import stated, word
+from lowalt.common.classes import word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing
 from lowalt.common.streams import stream
-from lowalt.recognition import predictions
+from lowalt.recognition.evaluated import Run
 from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
-from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import (
     LOOKED_FOR,
     AlarmPart,
@@ -53,32 +50,6 @@ DETECTIONS = (0.9, 0.95, 0.99)
 TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
             "samples_per_s", "precision", "ranks")  # fmt: skip
 """Columns that seeds.csv repeats from a training's record."""
-
-
-class Run:
-    """One trained and evaluated scheme: its predictions and what is known of the run."""
-
-    def __init__(self, path: str | Path) -> None:
-        """path: the prediction file; the JSON file next to it holds protocol, scheme, seed and hardware.
-
-        Raises: InputError where either is missing or the test part is empty.
-        """
-        side = existing(Path(path).with_suffix(".json"), "run record")
-        try:
-            self.about = about = json.loads(side.read_text())
-            self.protocol, self.scheme, self.seed = about["protocol"], about["scheme"], about["seed"]
-            self.hardware, self.trained_on = about["hardware"], about.get("trained_on", "")
-            self.classes = stated(about)
-        except (ValueError, KeyError, TypeError) as error:
-            raise InputError(f"{side}: not a run record ({error!r})") from error
-        self.all = predictions.read(path, self.classes)
-        self.test = self.part("test")
-        if not len(self.test):
-            raise InputError(f"{path}: no predictions for the test part of the {self.protocol} protocol")
-
-    def part(self, name: str) -> Predictions:
-        """Return the predictions of a part of the run's protocol."""
-        return self.all.of(folds(self.protocol, name))
 
 
 def snr_text(snr_db: float) -> str:

@@ -14,18 +14,18 @@ import numpy as np
 import torch
 from timm.utils import ModelEmaV3
 from torch import nn
-from torch.utils.data import DataLoader, Dataset
+from torch.utils.data import DataLoader
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.progress import Reporter
-from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint
-from lowalt.recognition.augment import augment
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.metrics import Metrics
+from lowalt.recognition.objective import objective
 from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.reader import Reader
 from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.statistics import cross_entropy
 
@@ -46,50 +46,6 @@ class Progress:
     since_best: int = 0
     history: list = field(default_factory=list)
     done: bool = False
-
-
-class Reader(Dataset):
-    """Augmented batches by (step, sample numbers): the map that the loader's workers call."""
-
-    def __init__(self, source, columns: list[int], augmentation: dict, keys: tuple, machine: Machine) -> None:
-        """source: samples; columns: their views; augmentation: its settings; keys: seed and names of the stream."""
-        self.source, self.columns, self.augmentation, self.keys = source, columns, augmentation, keys
-        self.rank, self.ranks = machine.rank, machine.ranks
-
-    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return this rank's share of a batch: index images (B, views, S, S) uint8 and labels (B,)."""
-        step, numbers = item
-        mine = numbers[self.rank :: self.ranks]
-        seed, *keys = self.keys
-        generator = stream(seed, "recognition-augment", *keys, step, self.rank)
-        images = augment(self.source.views(mine), self.columns, self.augmentation, generator)
-        return torch.from_numpy(images), torch.from_numpy(self.source.facts.label[mine]).long()
-
-
-def objective(
-    model: nn.Module, images: torch.Tensor, labels: torch.Tensor, block: dict, machine: Machine
-) -> torch.Tensor:
-    """Return the loss of a batch: cross entropy of all views together and, by `alone`, of each station alone.
-
-    images (B, K * V, S, S) uint8, labels (B,); block: the training settings. The two parts are averaged by weight.
-    """
-    criterion = nn.CrossEntropyLoss(label_smoothing=block["label_smoothing"])
-    stations = images.shape[1] // unwrapped(model).shape[1]
-    weight = block["alone"] if stations > 1 else 0
-    with machine.autocast():
-        found = model(images, alone=bool(weight))
-    if not weight:
-        return criterion(found.float(), labels)
-    together, alone = found
-    each = criterion(alone.float(), labels.repeat_interleave(stations))
-    return (criterion(together.float(), labels) + weight * each) / (1 + weight)
-
-
-def unwrapped(model: nn.Module) -> nn.Module:
-    """Return the network inside wrappers of gradient exchange and compilation."""
-    for name in ("module", "_orig_mod"):
-        model = getattr(model, name, model)
-    return model
 
 
 class Trainer:

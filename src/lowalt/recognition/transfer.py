@@ -21,8 +21,9 @@ import numpy as np
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
+from lowalt.recognition.evaluated import Run
 from lowalt.recognition.intervals import paired_difference
-from lowalt.recognition.tables import Run, snr_text
+from lowalt.recognition.tables import snr_text
 
 COLUMNS = (
     "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",

@@ -1,0 +1,69 @@
+"""Augmentation: one draw for all views of a sample, along Doppler but never turned in time, blank at the zero index."""
+
+import numpy as np
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.recognition.augment import KEYS, augment
+
+
+def block(**changes):
+    return {**dict.fromkeys(KEYS, 0.0), **changes}
+
+
+def test_augmentation_without_strength_changes_nothing_and_never_its_input():
+    images = stream(3, "images").integers(0, 256, (4, 9, 12, 12), dtype=np.uint8)
+    before = images.copy()
+    assert (augment(images, list(range(9)), block(), stream(1, "a")) == images).all()
+    strong = block(
+        mirror=0.5, shift_doppler=0.3, shift_time=0.3, contrast=1, mask_time=0.5, mask_doppler=0.5, drop_view=0.5
+    )
+    changed = augment(images, list(range(9)), strong, stream(1, "a"))
+    assert (images == before).all()
+    assert (changed == augment(images, list(range(9)), strong, stream(1, "a"))).all()
+    assert (changed != images).any()
+
+
+def test_all_views_of_a_sample_move_together_and_samples_apart():
+    one = stream(4, "image").integers(0, 256, (1, 1, 16, 16), dtype=np.uint8)
+    images = np.broadcast_to(one, (30, 9, 16, 16))
+    moved = augment(images, list(range(9)), block(mirror=0.5, shift_doppler=0.4, shift_time=0.4), stream(2, "a"))
+    assert (moved == moved[:, :1]).all()
+    assert len(np.unique(moved[:, 0].reshape(30, -1), axis=0)) > 20
+
+
+def test_mirror_turns_doppler_and_never_time():
+    ramp = np.zeros((1, 2, 8, 8), np.uint8)
+    ramp[..., 1, 2] = 200
+    turned = augment(ramp, [0, 2], block(mirror=1.0), stream(1, "a"))
+    assert (np.argwhere(turned[0] == 200)[:, 1:] == [6, 2]).all()
+
+
+def test_contrast_keeps_zero_and_full_scale():
+    images = np.stack([np.tile(np.arange(256, dtype=np.uint8), (256, 1))] * 3)[None]
+    changed = augment(images, [0, 1, 2], block(contrast=1.0), stream(9, "a"))[0, :, 0].astype(int)
+    assert changed[0, 0] == 0 and changed[0, 255] == 255
+    assert changed[2, 128] == 128 and changed[2, 255] == 255
+    assert (np.diff(changed[:, 1:], axis=1) >= 0).all()
+    assert (changed[2, 129:] - 128 == 128 - changed[2, 127:0:-1]).all()
+
+
+def test_masks_and_dropped_views_are_blank_at_the_zero_index():
+    images = np.full((200, 3, 10, 10), 77, np.uint8)
+    dropped = augment(images, [0, 1, 2], block(drop_view=0.5), stream(1, "a"))
+    blank = (dropped == np.array([0, 0, 128])[:, None, None]).all((2, 3))
+    assert 0.3 < blank.mean() < 0.6
+    assert not blank.all(1).any()
+    masked = augment(images, [0, 1, 2], block(mask_time=0.5), stream(1, "a"))
+    columns = (masked[:, 0] == 0).all(1)
+    assert (columns.sum(1) <= 5).all() and columns.any()
+    assert ((masked[:, 2] == 128).all(1) == columns).all()
+
+
+@pytest.mark.parametrize("change", [{"mirror": 1.5}, {"mask_time": "0.1"}, {"flip": 1}])
+def test_wrong_augmentation_is_refused(change):
+    from lowalt.recognition.augment import check
+
+    with pytest.raises(InputError, match=next(iter(change))):
+        check(block(**change))
