@@ -1,7 +1,7 @@
 """`python -m lowalt.recordings import | predict | pairs | compare | recognise | ablate`.
 
-Recordings in, and held against their radars' twins: import and predict are for a user's own recording, the others for
-the measured sets below a folder.
+`import` and `predict` read one recording of a user. The other commands read the folder of measured sets and compare the
+recordings with the simulated twins of their radars.
 """
 
 import argparse
@@ -153,7 +153,8 @@ def recognise(arguments: list[str]) -> None:
     library, block = Library.read(given.twins), settings(given.recognition)
     found = [one for one in _found(given, library) if one.half in given.halves]
     names = list(library.twins)
-    # Each radar is a world of its own, so their order and number at a time change nothing. The costliest comes first.
+    # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
+    # last radar takes longest, so it starts first.
     with ProcessPoolExecutor(min(given.jobs, len(names)), get_context("spawn")) as pool:
         jobs = {
             name: pool.submit(radar, name, found, library, block, given.models, given.reuse) for name in reversed(names)

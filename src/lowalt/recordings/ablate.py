@@ -1,7 +1,8 @@
-"""What each randomisation of a twin adds: networks trained without it, tested on the tuning half of the recordings.
+"""Ablation: networks trained without one randomisation of a twin, tested on the tuning half of the recordings.
 
-measured-ablation.csv: one row a change, class and "balanced"; accuracy is the mean over training seeds and files, the
-interval resamples files within their class and seeds; difference is to the unchanged twin, on the same files and seeds.
+measured-ablation.csv has one row for each change and class, and one row "balanced" for each change: the mean over the
+classes. accuracy_percent is the mean over training seeds and files; its interval resamples seeds, and files within
+their class. difference_percent is this accuracy less that of the unchanged twin on the same files and seeds.
 """
 
 from dataclasses import replace
@@ -35,6 +36,7 @@ def changed(library: Library, name: str, change: dict) -> Library:
         raise InputError(f"ablation: {sorted(change)}, expected some of receiver and drop")
 
     def plainer(scene: dict) -> dict:
+        """Return the scene without the keys `drop` and with the settings `receiver`."""
         unknown = set(receiver) - set(scene["receiver"])
         if unknown:
             raise InputError(
@@ -58,7 +60,8 @@ def shares(rows: list[list]) -> dict[str, np.ndarray]:
 
 
 def _draws(values: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Means (REPEATS,) of values (files, seeds) with files and seeds drawn again."""
+    """Return the bootstrap means (REPEATS,) of values (files, seeds): each repeat draws files and seeds with
+    replacement."""
     files, seeds = (rng.integers(0, count, (REPEATS, count)) for count in values.shape)
     return values[files[:, :, None], seeds[:, None, :]].mean(axis=(1, 2))
 
@@ -68,7 +71,7 @@ def summarised(name: str, change: str, own: dict, full: dict, windows: dict[str,
     rows, means, levels = [], [], []
     for label in own:
         keys = (seed, "measured-ablation", name, label)
-        # The same draws for both, so that the difference is paired.
+        # Both streams have the same keys, so both twins get the same draws and the difference is paired.
         pair = [_draws(values[label], stream(*keys)) for values in (own, full)]
         means.append((own[label].mean(), own[label].mean() - full[label].mean()))
         levels.append((pair[0], pair[0] - pair[1]))

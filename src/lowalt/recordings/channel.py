@@ -3,12 +3,13 @@
 A real channel is one mixer output, Re y(t). Its analytic signal keeps the positive frequencies only, so the sign of the
 Doppler is lost: towards and away look the same, and both sides of a rotor's spectrum lie on top of each other.
 
-The sampling is one of two, by name:
-    anti_aliased   what lies beyond half the symbol rate is filtered out first
+The sampling is one of three, by name:
+    anti_aliased   frequencies beyond half the symbol rate are filtered out first
     one_sided      for a real channel, whose analytic signal has no negative frequencies: the band from 0 to the whole
-                   symbol rate is kept, so speeds up to twice the usual bound show; above half they stand at the bottom
-    bare           every symbol takes the signal as it stands at that time, so faster lines fold, as in a radar that
-                   looks once a symbol (the published network folds every rotor this way)
+                   symbol rate is kept, so speeds up to twice the usual bound stay apart; those above the usual
+                   bound appear as negative speeds
+    bare           every symbol takes the unfiltered value at its time, so faster lines fold, as in a radar that
+                   measures once a symbol (the published network folds every rotor this way)
 All evaluate the recording between its samples by the same windowed sinc kernel, so any rate goes to any rate.
 """
 
@@ -26,9 +27,10 @@ LOBES = 24
 BETA = 8.0
 """Kaiser window of the kernel: side lobes near -80 dB (Kaiser and Schafer 1980)."""
 EDGE = 0.9
-"""Pass band of the anti-aliasing filter, in half symbol rates: the kernel needs the rest to fall off."""
+"""Pass band of the anti-aliasing filter over half the symbol rate. In the last tenth the kernel falls off."""
 PHASES = 1024
-"""Places between two samples at which the kernel is tabulated; between those it is interpolated linearly (1e-6)."""
+"""Number of places between two samples at which the kernel is tabulated. Linear interpolation between them is accurate
+to 1e-6."""
 CHUNK = 4096
 
 
@@ -40,7 +42,7 @@ def analytic(values: np.ndarray) -> np.ndarray:
     if np.iscomplexobj(values):
         return np.asarray(values, np.complex128)
     centred = values - values.mean()
-    # Padding to a length with small factors: a prime length would take minutes.
+    # Pad to a power of two: the FFT of a prime length would take minutes.
     fast = 1 << (len(centred) - 1).bit_length()
     return hilbert(centred, fast)[: len(centred)]
 
@@ -56,7 +58,7 @@ def _kernel(distance: np.ndarray, band: float) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _tabulated(band: float) -> tuple[np.ndarray, np.ndarray]:
-    """Input samples around a place (taps,) and the kernel's weights on them at PHASES + 1 places within a sample."""
+    """Return the offsets (taps,) of the input samples used, and their weights (PHASES + 1, taps) by place."""
     reach = math.ceil(LOBES / band)
     taps = np.arange(-reach + 1, reach + 1)
     table = _kernel(taps - np.arange(PHASES + 1)[:, None] / PHASES, band)
@@ -84,7 +86,7 @@ def symbol_rate(values: np.ndarray, rate_hz: float, symbol_interval_s: float, sa
         if np.iscomplexobj(values):
             raise InputError("sampling is 'one_sided' for a complex channel, which has negative frequencies; expected "
                              "anti_aliased or bare")  # fmt: skip
-        # Down by half a symbol rate, where the band is symmetric about zero, and up again by a sign a symbol.
+        # Shift down by half a symbol rate, so that the band is symmetric about zero; filter; shift back by (-1)^n.
         shifted = signal * np.exp(-1j * np.pi / step * np.arange(len(signal)))
         moved = _resampled(shifted, step, EDGE / step)
         return moved * (-1.0) ** np.arange(len(moved))
@@ -115,7 +117,7 @@ def coherent_intervals(signal: np.ndarray, symbols: int, hop: int | None = None,
     """Return the coherent processing intervals (intervals, symbols) of a signal, each without its mean.
 
     hop: symbols from one interval to the next, by default as many as it has, so that none share a symbol. The mean is
-    what stands still: the static part of a recording is orders of magnitude above the target.
+    the echo of everything that does not move, which is orders of magnitude above the target's.
     Raises: InputError naming the recording where it is shorter than one interval.
     """
     hop = symbols if hop is None else hop
@@ -123,6 +125,6 @@ def coherent_intervals(signal: np.ndarray, symbols: int, hop: int | None = None,
         raise InputError(f"{name}: {len(signal)} symbols, shorter than one window of {symbols}")
     starts = np.arange(0, len(signal) - symbols + 1, hop)
     windows = signal[starts[:, None] + np.arange(symbols)]
-    # Differences to the first symbol first: what stands still is then zero to the last bit.
+    # Subtract the first symbol before the mean: a constant signal then becomes exactly zero.
     moved = windows - windows[:, :1]
     return moved - moved.mean(axis=1, keepdims=True)

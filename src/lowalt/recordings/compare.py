@@ -3,7 +3,7 @@
 measured-figures.csv: figures of whole recordings and of simulated scenes of the same length, one row a pair and figure.
 measured-distances.csv: Wasserstein distances of the figures of coherent intervals, in the figure's unit,
     floor      between the two halves of the measured set (by file)
-    before     measured to simulated without the mends of the model
+    before     measured to simulated without the corrections of the model (`plain`)
     distance   measured to simulated as recorded, low and high its 95 % interval over files
     tuning     the same with the half of the recordings that set the scenes, test with the other half
     learnt     measured to the wider scenes that networks learn from
@@ -37,7 +37,7 @@ REPEATS = 400
 
 
 def plain(scene: dict, mended: list[str]) -> dict:
-    """Return a scene without the keys that mend the model; foil on a blade stays, since it was on the craft."""
+    """Return a scene without the keys `mended`, which correct the model; the foil on blades stays, as it was real."""
     left = {key: item for key, item in scene.items() if key not in mended}
     if "foils" in scene:
         left["strength_db"] = {"foil": scene["strength_db"]["foil"]}
@@ -54,7 +54,7 @@ def summary(values: list[float], rng: np.random.Generator) -> tuple[float, float
 
 
 def figures_of(signal: np.ndarray, twin: Twin, pair: dict) -> dict[str, float]:
-    """Return the figures of a pair's kind of a signal at the symbol rate."""
+    """Return the figures of a signal at the symbol rate, by the function that pair["figures"]["kind"] names."""
     spec = {**pair["figures"], "window": pair["window"], "hop": pair["hop"]}
     wavelength = SPEED_OF_LIGHT / twin.carrier_hz
     return KINDS[spec["kind"]](signal, 1 / twin.symbol_interval_s, wavelength, spec)
@@ -107,7 +107,7 @@ def unmended(library: Library, mended: list[str]) -> Library:
 
 
 def _near(tables: list[np.ndarray], other: np.ndarray, column: int) -> float:
-    """Distance of one figure between files' tables and another table; NaN where there is no file."""
+    """Return the Wasserstein distance of one figure between the joined tables and `other`; NaN without tables."""
     if not tables:
         return float("nan")
     return float(wasserstein_distance(np.concatenate(tables)[:, column], other[:, column]))
@@ -135,6 +135,7 @@ def distances(
     twin = library.twins[name]
 
     def model(scenes: Library, label: str) -> np.ndarray:
+        """Return the figures (intervals, figures) of simulated intervals of one class."""
         intervals = scenes.simulated(name, label, count, "compare")[0]
         return _table(intervals.reshape(-1, intervals.shape[-1]), twin)
 

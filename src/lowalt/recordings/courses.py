@@ -39,10 +39,11 @@ def hover(
     times_s: np.ndarray, place_m: np.ndarray, yaw_rad: float, sway_m: float, sway_hz: float, rock_rad: float,
     rng: np.random.Generator,
 ) -> Course:  # fmt: skip
-    """Return a course about `place_m` (3,): each axis sways by `sway_m` rms at rates up to `sway_hz`, and rocks.
+    """Return a course about `place_m` (3,): each axis sways by `sway_m` rms, pitch and roll rock, at up to `sway_hz`.
 
-    rock_rad: rms of pitch and roll. A sum of sinusoids of random rate and phase, of equal speed each, so that the fast
-    ones are the small ones. The magnitudes are settings: they differ from craft to craft and with the wind.
+    rock_rad: rms of pitch and roll. Each of the five motions is a sum of `SWAYS` sinusoids of random rate and phase.
+    In each sum all have the same peak speed, so the fast ones are small. The magnitudes are settings, since they differ
+    between craft and with the wind.
     """
     rates = rng.uniform(0.1, 1.0, (5, SWAYS)) * sway_hz
     phases = rng.uniform(0, 2 * np.pi, (5, SWAYS))
@@ -62,8 +63,8 @@ def to_and_fro(
 ) -> Course:  # fmt: skip
     """Return a walk between two distances on one bearing, away first: at `speed_mps`, turning back within `turn_s`.
 
-    Around an end the speed follows a cosine through zero while the body turns by half a circle. The steps keep to the
-    ground covered: the clock of the limbs runs at speed / `own_speed_mps`, the speed that the gait was recorded at.
+    Around an end the speed follows a cosine through zero while the body turns by half a circle. The feet do not slide:
+    the limbs' clock runs at speed / `own_speed_mps`, where `own_speed_mps` is the speed at which the gait was recorded.
     bearing_rad: direction of the walk, 0 along +y; height_m: of the body's origin.
     Raises: InputError where the ends are too near for the turns.
     """
@@ -80,7 +81,7 @@ def to_and_fro(
     gone = speed_mps * np.minimum(within, out_s) + speed_mps * turn_s / np.pi * np.sin(np.pi * turn)
     low, high = near_m + speed_mps * turn_s / np.pi, far_m - speed_mps * turn_s / np.pi
     distance = np.where(back, high - gone, low + gone)
-    # Ground covered, for the limbs: the speed's size, summed over all legs so far.
+    # Distance walked so far: the integral of |speed| over time. It sets the limbs' clock.
     covered_a_leg = speed_mps * (out_s + 2 * turn_s / np.pi)
     in_turn = speed_mps * turn_s / np.pi * np.where(turn < 0.5, np.sin(np.pi * turn), 2 - np.sin(np.pi * turn))
     legs = 2 * np.floor(times_s / period) + back

@@ -1,7 +1,7 @@
 """The measured recordings from their public addresses, each with its pinned SHA-256.
 
-Only the vehicle recordings carry a licence (MIT, University of Cape Town 2025); the others are their makers', who state
-none: fetch them for your own comparison and do not pass them on.
+Only the vehicle recordings carry a licence (MIT, University of Cape Town 2025). The makers of the others state none:
+fetch those for your own comparison and do not pass them on.
 Run `python -m lowalt.recordings.download --out FOLDER`; FOLDER is then what `make measured INPUTS=FOLDER` takes.
 """
 
@@ -20,7 +20,7 @@ SOURCES = "config/measured/sources.yaml"
 
 
 def fetch(name: str, places: list[str], pinned: str, folder: Path) -> bool:
-    """Put the file `name` (SET/FILE) from the first of its `places` (addresses) that has it into `folder`.
+    """Download the file `name` (SET/FILE) into `folder` from the first of its addresses `places` that has it.
 
     Return False where it already was there. Nothing is kept unless its SHA-256 is the pinned one.
     Raises: InputError naming the file, every address and what failed there, a download or the checksum.

@@ -1,9 +1,9 @@
 """Faults that make a recording unusable; each has a name and is found before anything is computed.
 
-Swapped channels cannot be told in general: I and Q exchanged is the conjugate signal, which is as good a recording of a
-target that moves the other way, and a hovering or reciprocating target has both signs. Two cases can be told and are:
-both channels hold the same signal (no quadrature at all), and the record knows whether the target moves towards the
-radar or away, and the energy lies on the other side.
+Swapped channels cannot be recognised in general. Exchanging I and Q gives the conjugate signal, which could as well be
+a recording of a target that moves the other way; and a hovering or reciprocating target has Doppler of both signs. Two
+cases are recognised: both channels hold the same signal (there is no quadrature), or the record says whether the target
+moves towards the radar or away and the energy lies on the other side.
 """
 
 from pathlib import Path
@@ -15,7 +15,7 @@ from lowalt.common.errors import InputError
 RATE_SHARE = 1e-3
 """Largest relative difference between the rate of the record and that of the file."""
 CLIPPED_RUN = 3
-"""So many equal samples in a row at the extreme value are a clipped peak."""
+"""Least number of equal samples in a row at the extreme value that count as a clipped peak."""
 CLIPPED_SHARE = 1e-4
 """Share of all samples in clipped peaks from which on a recording is refused."""
 SAME_SHARE = 0.999
@@ -29,7 +29,7 @@ def agreed_rate(
 ) -> float:
     """Return the sampling rate (Hz) on which record, file header and sample times (s) agree.
 
-    stated_hz: the record's rate, or several of which the file has one: the nearest to header or times is taken.
+    stated_hz: the record's rate, or several rates of which the file has one; the nearest to header or times is taken.
     Raises: InputError where nothing says the rate, two sources differ, or the times are not evenly spaced.
     """
     found: dict[str, float | None] = {"record": None, "file": header_hz}
@@ -54,7 +54,7 @@ def agreed_rate(
     if high > low * (1 + RATE_SHARE):
         words = ", ".join(f"{name} {rate:.6g} Hz" for name, rate in known.items())
         raise InputError(f"{path}: wrong rate, {words}, expected one rate")
-    # The record's own digits where it has some: sample times are often rounded.
+    # Prefer the record's rate, then the header's: sample times are often rounded.
     return float(next(iter(known.values())))
 
 

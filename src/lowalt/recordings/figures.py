@@ -15,10 +15,10 @@ EDGE_SHARE = 0.95
 
 
 def speeds_shown(speeds: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the numbers of the speeds that are shown, in order, and the speeds (m/s) that they stand for.
+    """Return the indices of the speeds that are shown, in order of display, and the speeds (m/s) that they mean.
 
-    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", negative ones stand for
-    speeds twice the edge higher.
+    speeds: (n,) m/s, ascending; sides: "both"; "positive", only those above zero; "wrapped", a speed v < 0 means v + 2
+    edge_mps.
     """
     if sides == "positive":
         shown = np.flatnonzero(speeds > 0)
@@ -43,7 +43,7 @@ def spectrum(interval: np.ndarray, edge_mps: float, sides: str) -> tuple[np.ndar
 
 
 FLOOR_MEDIANS = 8.0
-"""Noise floor in medians of the power: of 256 bins of white noise one lies above."""
+"""Noise floor over the median power. White noise exceeds it in one bin of 256 (2^-8)."""
 
 
 def above_floor(power: np.ndarray) -> np.ndarray:
@@ -62,9 +62,9 @@ def quantile(values: np.ndarray, weights: np.ndarray, shares: list[float]) -> np
 def interval_figures(interval: np.ndarray, edge_mps: float, sides: str) -> dict[str, float]:
     """Return the figures `INTERVAL` of a coherent interval (symbols,).
 
-    edge: |speed| below which 95 % of the energy above the floor lies; line: |speed| of the strongest bin; width: from
-    the quarter to the three quarters of that energy (all m/s). kurtosis: of the magnitudes, 3 for a Gaussian; entropy:
-    of the power as a distribution, over its largest value (0 for one line, 1 for white noise).
+    edge: |speed| below which 95 % of the energy above the floor lies; line: |speed| of the strongest bin; width:
+    distance of the speeds below which 25 % and 75 % of that energy lie (all m/s). kurtosis: of the magnitudes, 3 for a
+    Gaussian; entropy: of the power as a distribution, over its largest value (0 for one line, 1 for white noise).
     """
     speeds, power = spectrum(interval, edge_mps, sides)
     shown = above_floor(power)
@@ -96,8 +96,8 @@ def spectrogram(signal: np.ndarray, rate_hz: float, window: int, hop: int) -> tu
 def line_spacing_hz(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: float) -> float:
     """Return the spacing (Hz) of the lines of a comb in a signal's spectrum, searched between two bounds.
 
-    The autocorrelation over frequency of the log spectrum less its running median; of spacings that do almost as well,
-    the smallest, since every multiple of a spacing is one too.
+    The spacing is a peak of the autocorrelation over frequency of the log spectrum less its running median. Multiples
+    of the spacing give peaks too, so the smallest spacing whose peak reaches 70 % of the highest is taken.
     """
     from scipy.ndimage import median_filter
     from scipy.signal import find_peaks, welch
@@ -146,10 +146,10 @@ def cycle_s(shown: np.ndarray, hop_s: float, low_s: float, high_s: float) -> flo
 
 
 def tracks(shown: np.ndarray, speeds: np.ndarray, slowest_mps: float) -> dict[str, np.ndarray]:
-    """Return by time, each (times,), the strongest line (m/s), the edge (m/s) and whether it counts.
+    """Return the speed of the strongest line (m/s), the edge (m/s) and whether the line counts, each (times,).
 
-    shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left out: there stands
-    the static part. edge: 95 % of the energy above the floor lies below it; counts: the line is 15 dB above the frame's
+    shown: magnitudes (speeds, times); speeds: (m/s), ascending. Speeds below `slowest_mps` are left out: they hold the
+    static part. edge: 95 % of the energy above the floor lies below it; counts: the line is 15 dB above the frame's
     median.
     """
     keep = np.abs(speeds) >= slowest_mps
@@ -167,5 +167,5 @@ UNITS = {"mps": "m/s", "hz": "Hz", "s": "s", "db": "dB"}
 
 
 def unit(figure: str) -> str:
-    """Return the unit of a figure, which its name ends on; "" for a number."""
+    """Return the unit that the name of a figure ends in; "" for a figure without unit."""
     return UNITS.get(figure.rpartition("_")[2], "")

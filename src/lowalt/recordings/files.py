@@ -1,6 +1,6 @@
 """Samples of a recording out of WAV, MAT, CSV, NPY and SigMF files, as one checked baseband channel.
 
-Only reading is here: what is wrong with samples that were read well is found by `lowalt.recordings.faults`.
+This module only reads. `lowalt.recordings.faults` finds the faults of samples that could be read.
 """
 
 from collections.abc import Callable
@@ -135,8 +135,8 @@ def read(record: Record) -> Baseband:
     """Return the checked samples of a recording and their rate.
 
     Raises: InputError naming the file where it is missing, of an unknown kind, damaged, has no such column or variable,
-    states another rate than the record, or has samples that are not finite, clipped or silent, or whose quadrature is
-    no quadrature or contradicts the known direction of motion.
+    states another rate than the record, or has samples that are not finite, clipped or silent, whose I and Q are the
+    same signal, or whose Doppler contradicts the known direction of motion.
     """
     path = existing(record.file, "recording")
     kind = path.suffix.lower()

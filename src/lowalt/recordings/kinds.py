@@ -1,7 +1,7 @@
-"""Figures of whole recordings by class: a hovering craft, a flapping bird, what drives past, a walker.
+"""Figures of whole recordings by class: a hovering craft, a flapping bird, a vehicle that drives past, a walker.
 
 Every function takes a signal at the symbol rate, that rate, the wavelength and the pair's block `figures` with window
-and hop in symbols. A figure's name ends on its unit.
+and hop in symbols. The name of a figure ends in its unit.
 """
 
 import numpy as np
@@ -30,8 +30,8 @@ def wing_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: 
     """Return wing-beat rate (Hz) and Doppler edge (m/s) of a flapping bird; spec["cycle_s"] bounds the beat's time.
 
     harmonic_hz: the strongest line of the signal within spec["harmonic_hz"]; harmonic_order: that line over the beat;
-    base_over_harmonic_db: the line at the beat over that line. An order that is whole and a line at the beat itself say
-    that the other line is a harmonic, and not the beat.
+    base_over_harmonic_db: the line at the beat over that line. If the order is a whole number and there is a line at
+    the beat itself, the strongest line is a harmonic of the beat.
     """
     _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
     speeds = frequency * wavelength_m / 2
@@ -60,16 +60,18 @@ def _strongest(signal: np.ndarray, rate_hz: float, low_hz: float, high_hz: float
 
 
 PASSING = (0.3, 0.8)
-"""Line of a car that is passing, in shares of its driving speed: its two ends are seen under unlike angles."""
+"""A car is passing while its line is between these shares of its driving speed: the radar then sees its two ends under
+different angles."""
 SPREAD_SHARES = [0.1, 0.9]
 
 
 def drive_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: dict) -> dict[str, float]:
-    """Return the driving speed (m/s) of what drives away, where its line is fastest, and its spread (m/s) as it passes.
+    """Return the driving speed (m/s) of a vehicle that drives away, and the spread of its speeds (m/s) as it passes.
 
-    spread: speeds between which four fifths of the energy above the floor lie, median over the frames with the line
-    within `PASSING`. It is the body's length at short range: behind, where all of it moves alike, a car is one line as
-    narrow as the transform resolves.
+    speed: 90 % quantile of the line. spread: width of the band of speeds that holds the middle 80 % of the energy above
+    the floor, median over the frames whose line is within `PASSING`. The spread shows the body's length at short range.
+    Far behind the radar all points of a car have the same radial speed, and its line is as narrow as the transform
+    resolves.
     """
     _, frequency, shown = spectrogram(signal - signal.mean(), rate_hz, spec["window"], spec["hop"])
     speeds = frequency * wavelength_m / 2
@@ -95,7 +97,7 @@ def gait_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: 
     track = tracks(shown[keep], speeds[keep], spec["slowest_mps"])
     walks = track["counts"] & (track["line"] > spec["torso_mps"])
     limbs = (speeds >= spec["torso_mps"]) & (speeds <= spec["fastest_mps"])
-    # Frames count alike, near or far: the echo falls by 40 dB along a walk.
+    # Divide each frame by its maximum: the echo falls by 40 dB along a walk, and near frames would outweigh the others.
     level = shown[limbs] / np.maximum(shown[keep].max(axis=0), 1e-300)
     return {
         "torso_mps": float(np.median(track["line"][walks])) if walks.any() else float("nan"),
@@ -105,4 +107,4 @@ def gait_figures(signal: np.ndarray, rate_hz: float, wavelength_m: float, spec: 
 
 
 KINDS = {"rotor": rotor_figures, "wing": wing_figures, "drive": drive_figures, "gait": gait_figures}
-"""Figures of a class by the name that a pair of pictures gives."""
+"""Function of the figures by the name that stands as `kind` in a pair's block `figures`."""

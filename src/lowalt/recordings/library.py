@@ -24,13 +24,14 @@ class Library:
     scenes: dict[str, dict[str, list[dict]]]
     records: dict[str, dict]
     memo: dict | None = None
-    """Echoes that were simulated, where they are kept: libraries that differ in receivers alone share them."""
+    """Cache of simulated echoes, or None to keep none. Libraries that differ only in their receivers may share one."""
 
     @classmethod
     def read(cls, path: str | Path) -> "Library":
         """Return the library in a YAML file such as `config/measured/twins.yaml`.
 
-        A file that names another one as `base` lies over it, key by key; a category's scenes replace those below.
+        A file with the key `base` is merged over the file that it names, key by key; a list of scenes replaces the
+        base's list.
         Raises: InputError naming the key that is missing or wrong.
         """
         block = load_yaml(path, "twins")
@@ -60,9 +61,10 @@ class Library:
         return clouds_of(self.records, list(names), self.seed)
 
     def simulated(self, twin: str, category: str, count: int, purpose: str, receivers: int = 1):
-        """Return simulated intervals (count, receivers, symbols) of a category, its scenes in turn, and their subtypes.
+        """Return simulated intervals (count, receivers, symbols) of a category, and the names of their subtypes.
 
-        `purpose` keys the random streams: equal purposes give equal scenes.
+        The category's scenes share the `count` intervals evenly. `purpose` keys the random streams: equal purposes give
+        equal scenes.
         """
         clouds, scenes = self.clouds(twin, category), self.scenes[twin][category]
         found, names = [], []

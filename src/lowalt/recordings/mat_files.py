@@ -1,4 +1,4 @@
-"""Variables of MATLAB files, read in a process of their own: on some damaged files scipy's reader ends its process.
+"""Variables of MATLAB files, read in a process of their own: scipy's reader crashes on some damaged files.
 
     python -m lowalt.recordings.mat_files FILE.mat OUT.npz
 

@@ -1,4 +1,4 @@
-"""Which windows hold a moving target: a line above the noise floor of the recording itself.
+"""Which windows hold a moving target: those with a line above the recording's own noise floor.
 
 The noise of a cheap receiver is not white: slow noise rises towards zero speed, coupling capacitors cut it off below.
 A line must therefore be compared with the noise at its own speed, and that floor is found in the recording.
@@ -18,7 +18,7 @@ QUIET_SHARE = 0.1
 FLOOR_MPS = 0.5
 """Speeds to either side over which the noise floor is smooth."""
 ENOUGH = 20
-"""Windows from which on a line that stays can be told from a target."""
+"""Least number of windows with which a constant line can be told from a target."""
 
 
 def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
@@ -26,8 +26,8 @@ def noise_floor(power: np.ndarray, step_mps: float) -> np.ndarray:
 
     At each speed the windows with the least power hold noise alone, if a target keeps to one speed for less than nine
     tenths of the time. Of n exponential powers the k-th smallest has the mean 1 / n + ... + 1 / (n - k + 1). A running
-    median over speed makes the floor smooth; of `ENOUGH` windows on, a line that stays in nearly all of them is part of
-    it, since a line that never moves is interference.
+    median over speed makes the floor smooth. With `ENOUGH` windows or more, a line that stays in nearly all of them is
+    added to the floor, since a line that never moves is interference.
     Source: minimum statistics, Martin 2001, IEEE Trans. Speech Audio Processing 9(5).
     """
     count = len(power)
@@ -53,7 +53,8 @@ def present(intervals: np.ndarray, twin: Twin, noise: np.ndarray | None = None) 
     """Return which intervals (n, symbols) of one recording hold a moving target, (n,) bool.
 
     The strongest line at |speed| >= slowest_mps stands `detect_db` above the recording's own noise floor at its speed,
-    Hann window: a constant false alarm rate in noise of any colour. With detect_db 0 all do: the target never left.
+    Hann window: a constant false alarm rate in noise of any colour. With detect_db = 0 all intervals hold one: the
+    target never left.
     noise: intervals (m, symbols) of the receiver's noise alone, where they are known, as in a simulation.
     """
     if not twin.detect_db:

@@ -1,7 +1,7 @@
 """The test of networks on recordings: confusion by file, and balanced accuracy with an interval over files.
 
-measured-recognition.csv: one row a radar, training seed and recording; how many windows got which name. The seed
-    "mean" stands for all networks together, by the mean of their probabilities.
+measured-recognition.csv: one row a radar, training seed and recording, with the number of windows of each name. The
+    seed "mean" stands for all networks together, by the mean of their probabilities.
 measured-accuracy.csv: share of right windows of each class in each half, mean over its files, and balanced accuracy
     over the radar's classes; intervals resample files within their class. One row is for all radars together.
 """
@@ -53,8 +53,8 @@ def radar(
 ) -> list[list]:
     """Train one network a seed on the twin `name` and return the rows of `RECOGNITION` of its recordings.
 
-    folder: where the networks go, one folder a seed; reuse: take those that are
-    there and train none. Recordings without any window that holds a target are left out.
+    folder: where the networks go, one folder a seed; reuse: take the networks that are there and train none. Recordings
+    without any window that holds a target are left out.
     """
     mine = [one for one in found if one.like in library.sets[name]]
     if not mine:
@@ -80,7 +80,7 @@ def _interval(by_class: dict[str, list[float]], rng: np.random.Generator) -> tup
 def accuracy(rows: list[list], seed: int) -> list[list]:
     """Return the rows of `ACCURACY` from those of `RECOGNITION` whose seed is "mean"; a file counts once.
 
-    A class of a set of recordings is one class: the drones at 10 GHz and at 3.3 GHz stand apart.
+    Classes are counted for each radar: drones at 10 GHz and drones at 3.3 GHz are two classes.
     """
     shares: dict[tuple, dict[str, list[float]]] = {}
     windows: dict[str, int] = {}
@@ -93,6 +93,7 @@ def accuracy(rows: list[list], seed: int) -> list[list]:
     found = []
 
     def add(name: str, half: str, title: str, keys: list[tuple]) -> None:
+        """Append the row of the classes `keys`, (radar, half, class), under the name `title`."""
         rng = stream(seed, "measured-accuracy", name, half, title)
         by_class = {str(key): [float(np.mean(values)) for values in shares[key].values()] for key in keys}
         files = [file for key in keys for file in shares[key]]

@@ -3,7 +3,7 @@
 Everything is relative to the echo's own mean power over the stretch, behind the high pass, so that a setting means the
 same near and far.
 The order is that of the parts: antenna and mixer (wander, leak), noise of the mixer, hum that the amplifier picks up,
-the amplifier's coupling capacitors (high pass), its supply rails (clipping). Nothing else of the twin knows of it.
+the amplifier's coupling capacitors (high pass), its supply rails (clipping).
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,10 @@ from lowalt.noise.awgn import add_noise
 class Receiver:
     """snr_db: echo over white noise within the receiver's band; flicker_db and flicker_hz: slow noise with a 1/f^2
     spectrum above its corner, over the white noise's density at the corner; wander_db: rms of a slow change of the
-    amplitude; leak_db: what stands still, over the echo; hum_db and hum_hz: a line, over the echo.
+    amplitude; leak_db: a constant, over the echo; hum_db and hum_hz: a line, over the echo.
 
     May be left out: hum_lines, how many harmonics the line has, each 1 / number as strong; highpass_hz and
-    highpass_order, a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude in rms of all that arrives,
+    highpass_order, a Butterworth high pass, 0 Hz for none; clip_rms, the largest amplitude over the rms of all samples,
     0 for no limit."""
 
     snr_db: float
@@ -70,7 +70,7 @@ def received(
     target: False leaves the echo out; everything else stays as with the echo, except clipping.
     """
     count = len(echo)
-    # A slow target's echo stays in the coupling capacitors; what counts is what passes them.
+    # The coupling capacitors suppress the echo of a slow target, so its power is measured behind them.
     power = rms(highpassed(echo, rate_hz, settings.highpass_hz, settings.highpass_order)) ** 2
     slow = shaped(count, rate_hz, 0.5, rng).real
     spread = slow.std() or 1.0
@@ -91,19 +91,19 @@ def received(
 
 
 def highpassed(values: np.ndarray, rate_hz: float, corner_hz: float, order: float) -> np.ndarray:
-    """Return samples (N,) behind a Butterworth high pass: two coupling capacitors make one of order 2; 0 Hz for none.
+    """Return samples (N,) behind a Butterworth high pass, 0 Hz for none. Two coupling capacitors make order 2.
 
     The noise floors of all tuning recordings at 24 GHz fall off below 100 to 150 Hz (0.6 to 0.9 m/s), as audio
     amplifiers and sound cards with coupling capacitors do (Horowitz and Hill 2015, section 1.7).
     """
     if not corner_hz:
         return values
-    # The first value is subtracted, so that what stands still does not ring at the start.
+    # Subtract the first value, so that a constant part causes no transient at the start.
     return sosfilt(butter(round(order), corner_hz, "highpass", fs=rate_hz, output="sos"), values - values[0])
 
 
 def clipped(values: np.ndarray, limit_rms: float) -> np.ndarray:
-    """Return samples (N,) that no component exceeds `limit_rms` times the rms of all in; 0 for no limit."""
+    """Return samples (N,) with each component limited to `limit_rms` times the rms of all samples; 0 for no limit."""
     if not limit_rms:
         return values
     limit = limit_rms * rms(values)

@@ -22,7 +22,7 @@ from lowalt.tiles.settings import Images
 
 
 class Windows(NamedTuple):
-    """Samples in memory: images (n, 3, size, size) uint8 and what is known of each; what a trainer reads."""
+    """Samples in memory, as a trainer reads them: images (n, 3, size, size) uint8, and the facts of each."""
 
     images: np.ndarray
     facts: Facts
@@ -57,7 +57,9 @@ def rendered(intervals: np.ndarray, twin: Twin, images: Images, size: int) -> np
 
 
 def facts(labels: np.ndarray, names: list[str], models: np.ndarray, snr: np.ndarray, fold: str) -> Facts:
-    """Return what is known of samples: labels (n,), subtypes or file names, model numbers, receivers' numbers."""
+    """Return the facts of n samples.
+
+    labels (n,); names: subtypes or file names; models (n,): their numbers; snr (n,): number of the receiver."""
     count = len(labels)
     unknown = np.full((count, 1), np.nan)
     keys = [f"{name}-{model:06d}-{int(number)}" for name, model, number in zip(names, models, snr, strict=True)]

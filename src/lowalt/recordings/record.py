@@ -1,4 +1,4 @@
-"""The record of a recording: a short YAML file that says what the samples alone cannot.
+"""The record of a recording: a short YAML file with the facts that the samples do not hold.
 
 file         path of the samples, relative to the record (.wav, .mat, .csv, .npy, .sigmf-meta or .sigmf-data)
 carrier_hz   carrier of the radar (Hz)
@@ -44,7 +44,7 @@ class Record:
     label: str | None = None
     moves: str | None = None
     rates_hz: tuple[float, ...] | None = None
-    """Rates of which the file has one, where a set has files of several."""
+    """Possible rates (Hz) where the files of a set have different ones; the file has one of them."""
 
     @property
     def name(self) -> str:

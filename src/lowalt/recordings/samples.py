@@ -43,7 +43,7 @@ def spectra(intervals: np.ndarray, twin: Twin) -> dict[str, np.ndarray]:
 
 
 def _row(record: Record, number: int) -> dict:
-    """The motion row of a window: nobody knows where the target was, so every number is NaN."""
+    """The motion row of a window: every number is NaN, since the target's motion is not known."""
     return {
         "subtype": record.name, "category": record.label, "group": "seen", "model": number,
         **dict.fromkeys(NUMBERS, math.nan),
@@ -98,7 +98,7 @@ def spectra_block(twin: Twin) -> dict:
 
 
 def write_table(path: str | Path, columns: tuple[str, ...], rows: list) -> None:
-    """Write rows as CSV; numbers that are not whole with five significant digits, NaN as an empty cell."""
+    """Write rows as CSV; floats with five significant digits, NaN as an empty cell."""
     write_csv(path, columns, ([_cell(value) for value in row] for row in rows))
 
 
@@ -109,8 +109,10 @@ def _cell(value: object) -> object:
 
 
 def predictions(probabilities: np.ndarray, starts_s: np.ndarray, seen: np.ndarray) -> list[list]:
-    """Return one row a window: its start (s), whether it holds a target (`sets.present`), the class named, and the four
-    probabilities. The class of a window without a target means nothing."""
+    """Return one row a window: its start (s), whether it holds a target (`presence.present`), class and four
+    probabilities.
+
+    The class of a window without a target means nothing."""
     return [
         [float(start), "yes" if target else "no", CATEGORIES[int(row.argmax())], *map(float, row)]
         for start, target, row in zip(starts_s, seen, probabilities, strict=True)

@@ -1,4 +1,4 @@
-"""Scenes of a twin: who stands in front of the radar, on which course, drawn from the ranges of a configuration.
+"""Scenes of a twin: targets in front of the radar and their courses, drawn from the ranges of a configuration.
 
 A value of a scene is a number, or [low, high] for a uniform draw. Keys of a scene:
     subtypes       names of targets, one drawn a sample
@@ -8,7 +8,7 @@ A value of a scene is a number, or [low, high] for a uniform draw. Keys of a sce
                    pass: lateral_m, height_m, speed_mps, ahead_m (place along the road at the first symbol)
                    to_and_fro: near_m, far_m, height_m, speed_mps, turn_s
     rate_hz        of rotors or wings; wheels roll with the speed
-    spread, wander, of the rotors' rates
+    spread, wander of the rotors' rates, as the effect `rotor_spread` has them (both optional)
     strength_db    kind of part -> dB on its cross section; foil: dB of foil on a blade
     texture_db     spread of the points' cross sections; tip: exponent of a blade's growth to its tip (both optional)
     beam           width_deg and floor_db of the antenna, which looks along +y (optional: all directions)
@@ -38,7 +38,7 @@ from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import gait_cloud
 
 MARGIN = 40
-"""Symbols simulated before and behind a stretch: the ends of filters and of the analytic signal lie in them."""
+"""Symbols simulated before and after a stretch; they take the transients of the filters and of the analytic signal."""
 
 
 def value(setting: float | list[float], rng: np.random.Generator) -> float:
@@ -54,7 +54,7 @@ def value(setting: float | list[float], rng: np.random.Generator) -> float:
 
 
 def clouds_of(records: dict[str, dict], names: list[str], seed: int) -> dict[str, Cloud]:
-    """Return the clouds of some subtypes of merged records, built in.
+    """Return the built-in clouds of the subtypes `names`; records: the merged record of each subtype.
 
     Raises: InputError naming a subtype without a built-in record.
     """
@@ -146,7 +146,7 @@ def _one(
 def samples(
     twin: Twin, receiver: dict, signal: np.ndarray, rng: np.random.Generator, target: bool = True
 ) -> np.ndarray:
-    """Return what the receiver records (N,) of an echo (N,), its settings drawn from their ranges.
+    """Return the samples (N,) that the receiver records of an echo (N,); its settings are drawn from their ranges.
 
     target: False for the same receiver and noise without the echo.
     """
@@ -155,17 +155,18 @@ def samples(
 
 
 def stretch(values: np.ndarray, twin: Twin, seconds: float) -> np.ndarray:
-    """Return the signal at the symbol rate of simulated samples, its margins cut off."""
+    """Return simulated samples at the symbol rate, with the margins cut off."""
     signal = symbol_rate(values, twin.rate_hz, twin.symbol_interval_s, twin.sampling)
     return signal[MARGIN : MARGIN + math.floor(seconds / twin.symbol_interval_s + 1e-6)]
 
 
 REDRAWS = 8
-"""Receivers drawn for one echo until its target stands above their noise; the last one counts in any case."""
+"""Largest number of receivers drawn for one echo until its target is above the noise. The last one is kept anyway."""
 
 
 def _interval(twin: Twin, receiver: dict, signal: np.ndarray, keys: tuple) -> np.ndarray:
-    """The coherent interval (1, symbols) that a receiver hears of an echo, drawn again while no target shows."""
+    """Return the coherent interval (1, symbols) of an echo at a receiver, which is drawn again while no target is
+    present."""
     seconds = twin.symbols * twin.symbol_interval_s
     for redraw in range(REDRAWS):
         both = []
@@ -189,7 +190,7 @@ def intervals(
 ) -> tuple[np.ndarray, list[str]]:
     """Return simulated coherent intervals (count, receivers, symbols) and their subtypes' names (count).
 
-    Each of `count` scenes is drawn once, and its echo heard by so many receivers, each drawn from the scene's ranges.
+    Each of `count` scenes is drawn once. Its echo goes to `receivers` receivers, each drawn from the scene's ranges.
     As with recordings, a window counts where its target stands above the noise (`presence.present`).
     memo: echoes of earlier calls, which do not depend on the receiver; new ones are put into it.
     """

@@ -1,13 +1,13 @@
 """The measured sets: which files belong to them, which half each is in, and their intervals that hold a target.
 
-The file of sets holds records whose `file` is a pattern inside the set's folder, the file of the split the two halves
-by file name. Files that came later are in neither half's list: they are test files. A record of its own next to a file
-(any .yaml in the set's folder) goes before the set's pattern, so a file of any name, rate and channel can be added.
+The file of sets holds records whose `file` is a pattern inside the set's folder. The file of the split lists the files
+of both halves by name; a file that is in neither list is a test file. A record next to a file (any .yaml in the set's
+folder) takes precedence over the set's pattern, so a file of any name, rate and channel can be added.
 
-Two keys stand only in records of sets: `rates_hz`, the rates of the set's files, of which each file's own sample times
-choose one; `carrier_ghz_in_name`, a regular expression whose group is the carrier in the file's name (GHz),
-and `carrier_hz` stands for files whose names have none.
-A folder that is no set becomes one by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
+Two keys stand only in records of sets: `rates_hz`, the possible rates of the set's files, of which each file's sample
+times select one; and `carrier_ghz_in_name`, a regular expression whose group is the carrier (GHz) in the file's name.
+`carrier_hz` then serves files without a carrier in their names.
+Another folder becomes a set by its file `set.yaml`: `like`, a set of the same radar, and `files`, its records.
 """
 
 import re
@@ -66,7 +66,7 @@ def halves(path: str | Path) -> dict[str, dict[str, list[str]]]:
 
 
 def _labelled(path: Path) -> Record:
-    """The record in a file of a set's folder; only one with a label can be held against anything."""
+    """Return the record in a file of a set's folder; refuse one without a label, which every comparison needs."""
     one = read_record(path)
     if one.label is None:
         raise InputError(f"{path}: no label, expected one of {CATEGORIES}")
@@ -84,7 +84,7 @@ def _record_of(block: dict, path: Path, where: str) -> Record:
 
 
 def _files(folder: Path, patterns: list[dict], where: str) -> dict[str, Record]:
-    """Records by file name of one set's folder; names on standard error the files that nothing describes."""
+    """Records by file name of one set's folder; files that no record describes are named on standard error."""
     seen: dict[str, Record] = {}
     for number, block in enumerate(patterns):
         for path in sorted(folder.glob("*")):
@@ -142,7 +142,7 @@ def at_carrier(twin: Twin, carrier_hz: float) -> Twin:
 def sampled(one: Record, twin: Twin, baseband: Baseband | None = None) -> np.ndarray:
     """Return a recording's signal (symbols,) complex128 at the twin's symbol rate.
 
-    A radar with one real channel hears the first of a recording's two.
+    Where the radar has one real channel, the first of a recording's two is taken.
     Raises: InputError as `read`, naming the file: for a real recording where the radar has two channels, and for one
     slower than a sample a symbol.
     """

@@ -26,10 +26,10 @@ from lowalt.targets.skeleton import NODES
 
 @dataclass(frozen=True)
 class Twin:
-    """A measured radar: `rate_hz` is its receiver's, `symbol_interval_s` that of the images.
+    """A measured radar: `rate_hz` is the rate of its receiver, `symbol_interval_s` the interval of the images' symbols.
 
-    A window holds a target where a line at or above `slowest_mps` stands `detect_db` over the rest (0: always); the
-    other names are those of a record.
+    A window holds a target where a line at or above `slowest_mps` stands `detect_db` above the noise floor (0: always).
+    The other fields are named as in a record.
     """
 
     carrier_hz: float
@@ -80,7 +80,7 @@ class Twin:
 
 
 TOLERANCE = 1e-4
-"""Error allowed in the echo, of its largest value: 80 dB below, deeper than any of these receivers hears."""
+"""Allowed error of the echo over its largest value: -80 dB, less than the noise of any of these receivers."""
 TORSO = ("root", "hipjoint", "back", "thorax", "neck", "head", "clavicle")
 LEGS = ("femur", "tibia", "foot", "toes")
 
@@ -126,7 +126,7 @@ def textured(cloud: Cloud, texture_db: float, tip: float, rng: np.random.Generat
 
     Equal points smear a car over its whole length; measured cars are a few strong centres (Schuler, Becker and Wiesbeck
     2008, IEEE Trans. Antennas Propag. 56(11), at 24 GHz). On a rotor the cross section grows as (r / R)^tip from the
-    hub. The mean over the points of a part stays.
+    hub. The mean over the points of a part stays the same.
     """
     gain = (
         10 ** (texture_db / 10 * rng.standard_normal(len(cloud.points))) if texture_db else np.ones(len(cloud.points))
@@ -166,7 +166,7 @@ def beam_gain(place_m: np.ndarray, width_deg: float, floor_db: float) -> np.ndar
 
 
 def blade_points(cloud: Cloud) -> list[np.ndarray]:
-    """Return the point numbers of every blade, rotor by rotor, as the built-in craft lay them down."""
+    """Return the point numbers of every blade, rotor by rotor, in the order in which built-in craft store them."""
     blades = int(cloud.record["figures"]["blade_count"]["si"])
     return [part for rotor in cloud.parts_of("rotor") for part in np.split(np.flatnonzero(cloud.part == rotor), blades)]
 
