@@ -1,5 +1,4 @@
 """Recognition: from shards to a trained fusion network, its predictions and the paper's tables.
 
-Only `network`, `training`, `inference` and `export` import torch; everything about samples, tables and
-statistics runs without it.
+Samples, schemes, predictions, tables and statistics do not import torch. Networks and their training do.
 """

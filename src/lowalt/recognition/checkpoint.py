@@ -1,7 +1,7 @@
-"""Checkpoints: written at once or not at all, and refused by name where they are damaged or of another run.
+"""Checkpoints: written atomically; one that is damaged or of another run is refused with an error that names it.
 
-A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity is all that
-decides the weights (settings, scheme, protocol, samples); a file of another identity is never resumed.
+A file holds {"identity": JSON text, "digest": SHA-256 of every tensor, ...state}. The identity holds everything that
+determines the weights (settings, scheme, protocol, samples); a file of another identity is never resumed.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ def _digest(state: object) -> str:
     hasher = hashlib.sha256()
 
     def walk(value: object) -> None:
+        """Feed a value, and all values inside it, to the hasher."""
         if isinstance(value, torch.Tensor):
             raw = value.detach().cpu().contiguous()
             hasher.update(f"{raw.dtype}{tuple(raw.shape)}".encode())
@@ -44,7 +45,7 @@ def identity(**parts: object) -> str:
 
 def save(path: str | Path, name: str, state: dict) -> None:
     """Write `state` (tensors, numbers, text, nested dicts and lists) of the run `name`."""
-    # An open file and not its path: torch writes the path's name, which here holds a process id, into the archive.
+    # Pass an open file: torch would write the name of a path, which here holds a process id, into the archive.
     with replacing(path) as temporary, temporary.open("wb") as file:
         torch.save({"identity": name, "digest": _digest(state), "state": state}, file)
 
@@ -57,7 +58,7 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     """
     existing(path, "checkpoint")
     try:
-        # Only tensors and plain values: a checkpoint from elsewhere runs no code.
+        # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
         found, digest, state = content["identity"], content["digest"], content["state"]
     except (OSError, RuntimeError, ValueError, KeyError, TypeError, EOFError, pickle.UnpicklingError) as error:

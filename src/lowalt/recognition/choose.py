@@ -1,11 +1,11 @@
 """Choosing a recipe for unseen subtypes without looking at one: subtypes of the trained group are held out.
 
 A fold of this protocol takes some subtypes of each category out of the group that the unseen protocol trains on,
-trains on the others and is judged by those taken out. Only the folds "train" and "val" of that group are used: neither
+trains on the others and is tested on those taken out. Only the folds "train" and "val" of that group are used: neither
 a subtype nor a motion model that any table tests on is opened. Every subtype of the group is held out in one fold.
 
-A candidate (of `config/choices/default.yaml`) is a name and what it changes in the block `recognition`. Trained, it
-leaves predictions of both parts (`lowalt.recognition.trial`); two tables are made of them:
+A candidate (of `config/choices/default.yaml`) is a name and what it changes in the block `recognition`. Its trials
+write predictions of both parts (`lowalt.recognition.trial`), from which two tables are made:
     choices.csv            candidate; what it took (folds, seeds, steps, batch, pixels, core_s a training);
                            held_percent: subtypes held out; kept_percent: validation motion models of the trained
                            ones; and the difference of held_percent to the first candidate with its 95 % interval
@@ -33,7 +33,7 @@ from lowalt.recognition.statistics import accuracy_by
 
 TABLE = "config/choices/default.yaml"
 PAIRS = folds("unseen", "train") | folds("unseen", "validation")
-"""The only (group, fold) pairs that choosing opens."""
+"""The only (group, fold) pairs from which choosing reads samples."""
 COLUMNS = (
     "candidate", "folds", "seeds", "steps", "batch", "pixels", "core_s", "held_percent", "kept_percent",
     "difference_points", "low", "high", "hardware",
@@ -88,6 +88,7 @@ def settled(block: dict, changes: dict) -> dict:
     """
 
     def check(known: dict, given: dict, where: str) -> None:
+        """Refuse a key of `given`, at any depth, that `known` does not have."""
         for key, value in given.items():
             if key not in known:
                 raise InputError(f"choices: {where}{key} is no key of the block, expected one of {sorted(known)}")

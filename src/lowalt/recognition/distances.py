@@ -1,11 +1,11 @@
-"""How far the subtypes of a category lie from each other, so that an easy subtype can be told from a copied one.
+"""Distances between the subtypes of a category: whether an easy unseen subtype is nearly a copy of a trained one.
 
-A subtype is taken as the set of points that its cloud sweeps over one cycle (a turn, a beat, a recording) in its own
-frame: shape and own motion together, which is what its micro-Doppler comes from. Two sets are compared as
-distributions by the energy distance, after each is centred and divided by its root mean square radius, so that it
-compares form, and size stands apart as the ratio of these radii. The energy distance is a metric, is zero for equal
-distributions only, needs no correspondence and no grid, and one stray point moves it little, unlike the largest of
-nearest distances (Szekely and Rizzo, J. Stat. Plan. Inference 143, 2013).
+A subtype is represented by the points that its cloud sweeps over one cycle (a turn, a beat, a recording) in its own
+frame: shape and own motion, which together cause the micro-Doppler. Each set of points is centred and divided by its
+root mean square radius; the energy distance of two sets then compares their form, and the ratio of their radii is given
+as the ratio of size. The energy distance is a metric, is zero for equal distributions only, needs no correspondence and
+no grid, and changes little by one stray point, unlike the Hausdorff distance (Szekely and Rizzo, J. Stat. Plan.
+Inference 143, 2013).
 
 distances.csv, one row a subtype:
     category, subtype, group
@@ -63,7 +63,7 @@ def energy_distance(first: np.ndarray, second: np.ndarray) -> float:
 def form(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Return points (n, 3) centred and divided by their root mean square radius, and that radius (m).
 
-    Raises: InputError where all points are one.
+    Raises: InputError where all points coincide.
     """
     centred = points - points.mean(0)
     radius = float(np.sqrt((centred**2).sum(1).mean()))

@@ -1,4 +1,5 @@
-"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and held to after it.
+"""Frozen inputs: the checksums of clouds and motion tables, written before the first training and checked before every
+later use.
 
 The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies it without our code.
 """

@@ -12,7 +12,7 @@ from lowalt.recognition.samples import ViewSamples
 
 
 def arithmetic(precision: str, device: str) -> str:
-    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware multiplies in it.
+    """Return "bf16" or "fp32" for a setting: "auto" is bf16 where the hardware has bf16 multipliers.
 
     device: "cpu" or "cuda". A processor without such units emulates bf16 and takes ten times as long as in fp32.
     """
@@ -64,9 +64,8 @@ def probabilities(
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
-    mirror: average with the probabilities of the same images turned around along Doppler, which are those of the
-    target seen from behind. Whole batches are dealt to the ranks, never parts of one, so that sums do not depend on the
-    number of ranks.
+    mirror: average with the probabilities of the images mirrored along Doppler, which show the target turned by 180
+    degrees. Each rank gets whole batches, so that sums do not depend on the number of ranks.
     """
     model.eval()
     result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)

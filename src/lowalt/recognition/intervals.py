@@ -1,8 +1,8 @@
-"""Intervals of means and differences by resampling what moves them: seeds, subtypes, motion models.
+"""Intervals of means and differences by resampling training seeds, subtypes and motion models.
 
 Motion models, not samples, are the independent units: all SNRs of a motion model share its echo, so intervals
-resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007). What is claimed of
-schemes also resamples training seeds and, of unseen subtypes, the subtypes (`strict_difference`).
+resample whole motion models (cluster bootstrap; Field and Welsh, J. R. Stat. Soc. B 69, 2007). Intervals of differences
+between schemes also resample training seeds and, for unseen subtypes, the subtypes (`strict_difference`).
 """
 
 from typing import NamedTuple
@@ -57,8 +57,11 @@ def model_shares(motion: np.ndarray, correct: list[np.ndarray]) -> tuple[np.ndar
 
 
 def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """How often each of the seeds is drawn, (repeats, seeds), as a share of the draws; deviations are stretched for the
-    few values there are, those of two schemes with as many seeds each."""
+    """Return how often each seed is drawn, (repeats, seeds), as a share of the draws.
+
+    Deviations from 1 / seeds are multiplied by `_stretch`; two schemes of as many seeds each have 2 (seeds - 1) degrees
+    of freedom.
+    """
     if seeds == 1:
         return np.ones((repeats, 1))
     shares = generator.multinomial(seeds, np.full(seeds, 1 / seeds), repeats) / seeds
@@ -66,10 +69,10 @@ def _seed_weights(seeds: int, repeats: int, generator: np.random.Generator) -> n
 
 
 def _stretch(count: int, freedom: int) -> float:
-    """Return how much too narrow the interval is that resampling `count` values gives of their mean.
+    """Return the factor by which resampling `count` values gives too narrow an interval of their mean.
 
-    Resampling n values gives their mean (n - 1) / n of its variance; and an unknown spread that is estimated with few
-    degrees of freedom asks for Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
+    Resampling n values gives (n - 1) / n of the variance of their mean. A spread that is estimated with `freedom`
+    degrees of freedom needs Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
     Methods and their Application, 1997, section 2; Hesterberg, What Teachers Should Know about the Bootstrap, 2015.
     """
     return float(np.sqrt(count / (count - 1)) * student.ppf(0.975, freedom) / normal.ppf(0.975))
@@ -89,10 +92,9 @@ def _subtype_weights(subtypes: np.ndarray, repeats: int, generator: np.random.Ge
 
 
 def model_weights(subtypes: np.ndarray, whole: bool, repeats: int, generator: np.random.Generator) -> np.ndarray:
-    """Return how often each motion model is drawn, (repeats, models): of all, or where `whole` within subtypes that are
-    drawn first.
+    """Return how often each motion model is drawn, (repeats, models).
 
-    subtypes (models,): the subtype each motion model belongs to.
+    subtypes (models,): the subtype each motion model belongs to; whole: draw subtypes first, then models within each.
     """
     if not whole:
         return generator.multinomial(len(subtypes), np.full(len(subtypes), 1 / len(subtypes)), repeats).astype(float)
@@ -113,9 +115,10 @@ def strict_difference(
     """Mean of one - other over seeds and samples, with the 95 % interval that resamples seeds, subtypes and models.
 
     one, other (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of the
-    two are drawn apart, since equal seeds train two schemes from unlike draws. count (models,): samples of each model;
-    subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of motion models, for
-    results that are to hold for other subtypes. With one seed the interval is of these trained networks alone.
+    two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples of
+    each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of motion
+    models, for results that are to hold for other subtypes. With one seed the interval holds for these trained networks
+    alone.
     How often such intervals hold the truth is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
     """
     if whole_subtypes:

@@ -28,7 +28,7 @@ from lowalt.targets.cloud import Cloud
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
-"""Most memory for clean echoes kept; where a training's motion models need more, only the last ones are kept."""
+"""Memory limit for kept clean echoes (bytes); where a training's motion models need more, only the last are kept."""
 
 
 def opened(config: str | Path) -> Dataset:
@@ -107,7 +107,7 @@ class DatasetSamples:
         """Compute the clean echoes of all motion models where they can be kept."""
         maker = self.dataset.maker
         if in_all_cells(maker.echo["effects"]):
-            # Such a scene's echoes hold the noise of one SNR.
+            # The echoes of such a scene hold the noise of one SNR, so other SNRs cannot use them.
             return
         used = sorted({number for number, _ in self.chosen})
         if 8 * len(maker.network.stations) * maker.network.symbols * len(used) <= CLEAN_BYTES:

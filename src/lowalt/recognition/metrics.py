@@ -11,7 +11,7 @@ Metrics = Callable[[int, dict[str, float]], None]
 def tensorboard(folder: str | Path, first: int) -> Metrics:
     """Return a function (step, {name: value}) that appends to event files in `folder`.
 
-    first: the step that the run starts from; what an earlier, killed run wrote after it is purged.
+    first: the step that the run starts from; entries of an earlier, killed run after it are removed.
     Raises: InputError where the package is not installed.
     """
     try:
@@ -24,6 +24,7 @@ def tensorboard(folder: str | Path, first: int) -> Metrics:
     writer = SummaryWriter(str(folder), purge_step=first)
 
     def write(step: int, values: dict[str, float]) -> None:
+        """Append the values of one step and write them to disk."""
         for name, value in values.items():
             writer.add_scalar(name, value, step)
         writer.flush()

@@ -56,9 +56,9 @@ def backbone(name: str, weights: str, size: int) -> nn.Module:
 
 
 class Palettes(nn.Module):
-    """Index images to normalised RGB by one table a spectrum, so that colour never has to be stored.
+    """Turns index images into normalised RGB by one table a spectrum, so that colours are never stored.
 
-    table (spectra, 256, 3) float32: colours in 0..1 less the backbone's channel mean over its deviation.
+    table (spectra, 256, 3) float32: (colour - mean) / deviation, colours in 0..1, both of the backbone's channels.
     """
 
     def __init__(self, palettes: np.ndarray, spectra: tuple[int, ...], mean: tuple, std: tuple) -> None:
@@ -127,7 +127,7 @@ class Recogniser(nn.Module):
         super().__init__()
         pick(block, *KEYS)
         self.backbone = backbone(scheme.backbone or block["backbone"], block["weights"], size)
-        # Features at the place of the classifier: some networks widen their last features once more.
+        # Number of features that enter the classifier: some networks have a wider layer after their last features.
         width = getattr(self.backbone, "head_hidden_size", self.backbone.num_features)
         if scheme.fusion == "attention" and width % block["heads"]:
             raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")

@@ -1,7 +1,7 @@
-"""The prediction file: what a model says of every sample, in a form that other people's models can write too.
+"""The prediction file: class probabilities of every sample, in a format that other people's models can write too.
 
-A CSV table, one row a sample, any order; the first four columns after `key` may be left to `score`, which fills them
-from the data set. Probabilities are not negative and sum to one within 1e-3.
+A CSV table, one row a sample, in any order. The command `score` needs only `key` and the probabilities, and takes the
+rest from the data set. Probabilities are not negative and sum to one within 1e-3.
 
     key            the sample's key in the shards
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)

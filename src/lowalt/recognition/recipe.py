@@ -10,8 +10,8 @@ Settings of this module, the block `recognition.training`:
     warmup           share of the steps in which the rate rises linearly; then it falls as a cosine to 0
     clip             largest norm of the gradient
     label_smoothing  0..1
-    alone            weight of a second loss, on each station as if it were the only one; 0 for none. Several
-                     stations then teach the backbone as often as they are seen, not once a sample
+    alone            weight of a second loss, on each station as if it were the only one; 0 for none. The backbone then
+                     learns from every station of a sample
     ema              decay d of the moving average of the weights: weights of k steps ago count d^k, relative to the
                      latest; 0 for none
     precision        auto (bf16 where the hardware has it, else fp32) | bf16 (autocast) | fp32
@@ -110,14 +110,15 @@ def seeded(seed: int, keys: tuple, threads: int) -> None:
     torch.set_num_threads(threads)
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
     torch.use_deterministic_algorithms(True)
-    # Filling every new tensor is for finding reads of unset memory; this code has none and it costs a tenth.
+    # Filling every new tensor helps to find reads of unset memory. This code has none, and filling costs a tenth of the
+    # time.
     torch.utils.deterministic.fill_uninitialized_memory = False
 
 
 def random_state(device: torch.device, cuda: ModuleType = torch.cuda) -> dict[str, torch.Tensor]:
     """Return the states of the generators that a training on `device` draws from: the processor's, and a GPU's own.
 
-    cuda: what answers for GPUs. All ranks draw alike, so one rank's states stand for all.
+    cuda: the module that reads a GPU's generator. All ranks draw the same numbers, so one rank's states serve all.
     """
     states = {"cpu": torch.get_rng_state()}
     return {**states, "cuda": cuda.get_rng_state(device)} if device.type == "cuda" else states

@@ -48,7 +48,7 @@ def train(
     augment.check(settings["augmentation"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
     machine = Machine.here(block["precision"])
-    # Settings that change no weight are left out; `precision` is the one that this machine computes with.
+    # Leave out settings that change no weight, and name the precision that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
         scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
@@ -134,7 +134,7 @@ def evaluate(
     """Write the predictions for all samples of a source, and the run's record (.json) in the same folder.
 
     settings: {batch, threads, precision, mirror}; trained_on: the run that trained the model, where it is another;
-    more: what else the record is to say.
+    more: further entries of the record.
     Under torchrun the ranks share the work and rank 0 writes.
     """
     batch, threads, precision, mirror = pick(settings, "batch", "threads", "precision", "mirror")

@@ -57,8 +57,8 @@ def joined(parts: list[Facts]) -> Facts:
 def first_models(facts: Facts, share: float) -> np.ndarray:
     """Sample numbers of the first `share` (0..1) of each subtype's motion models, at least one a subtype.
 
-    Models are drawn independently of each other, so the first of them are as good a sample as any; a smaller share lies
-    inside a larger one.
+    Models are drawn independently of each other, so the first ones are a random sample; a smaller share lies inside a
+    larger one.
     """
     chosen = np.zeros(len(facts), dtype=bool)
     for subtype in np.unique(facts.subtype):
@@ -137,9 +137,10 @@ def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
 
 
 def with_extra(own: ViewSamples, extra: ViewSamples) -> ViewSamples:
-    """Return a run's own samples and those of other runs as one; motion models of the latter are counted on.
+    """Return a run's own samples and those of other runs as one.
 
-    So the two never share a motion model, of which an epoch visits few SNRs. Raises: as `joined_views`.
+    The numbers of the others' motion models continue after the run's own, so no two motion models have the same number:
+    an epoch takes only a few SNRs of each number. Raises: as `joined_views`.
     """
     later = copy.copy(extra)
     later.facts = replace(extra.facts, model=extra.facts.model + 1 + own.facts.model.max())

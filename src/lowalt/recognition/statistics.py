@@ -12,13 +12,13 @@ from lowalt.recognition.intervals import model_weights
 LOOKED_FOR = 0
 """Label of the class whose detection and false alarms are counted: the first, of the default the UAVs."""
 FEWEST_MISSED = 10
-"""Validation samples of the class looked for that a threshold must leave undetected: their number varies by a
-third then."""
+"""Least number of validation samples of the class looked for that a threshold leaves undetected; the standard deviation
+of that number is then a third of it."""
 
 
 class AlarmPart(NamedTuple):
-    """Data false alarms are counted from, each (samples,): probability of the class looked for, label, motion model,
-    subtype."""
+    """Data from which false alarms are counted, each (samples,): probability of the class looked for, label, motion
+    model, subtype."""
 
     scores: np.ndarray
     labels: np.ndarray
@@ -78,8 +78,8 @@ def reliability(probabilities: np.ndarray, labels: np.ndarray, bins: int = 15) -
 def threshold(scores: np.ndarray, labels: np.ndarray, detection: float) -> float:
     """Largest threshold on the probability of the class looked for at which at least `detection` of it is detected.
 
-    scores (samples,), labels (samples,); a sample is detected where its score is at least the threshold. To be set on
-    validation samples, never on those it is then judged by.
+    scores (samples,), labels (samples,); a sample is detected where its score is at least the threshold. Set it on
+    validation samples, never on the samples that it is then tested on.
     """
     wanted = np.sort(scores[labels == LOOKED_FOR])[::-1]
     needed = int(np.ceil(detection * len(wanted) - 1e-9))
@@ -90,13 +90,13 @@ def measurable(labels: np.ndarray, detection: float) -> bool:
     """Whether a threshold for `detection` can be set on validation samples: at least `FEWEST_MISSED` samples of the
     class looked for lie below it.
 
-    labels (samples,) of the validation samples. With fewer the threshold is the score of a handful of them.
+    labels (samples,) of the validation samples. With fewer, a handful of samples would decide the threshold.
     """
     return (1 - detection) * np.sum(labels == LOOKED_FOR) >= FEWEST_MISSED - 1e-9
 
 
 def _weighted_threshold(scores: np.ndarray, weights: np.ndarray, detection: float) -> float:
-    """`threshold` of scores (n,) of which the i-th stands weights[i] times."""
+    """Return `threshold` of scores (n,), where the i-th score counts weights[i] times."""
     order = np.argsort(-scores, kind="stable")
     reached = np.cumsum(weights[order])
     return float(scores[order][np.searchsorted(reached, detection * reached[-1] - 1e-9)])
@@ -109,11 +109,13 @@ def alarm_intervals(
     """Bounds (classes, 2) of the 95 % intervals of detection and of the false alarm rates of the other classes.
 
     validation, test: one part for each training seed, samples in the same order. Every repeat draws seeds, motion
-    models of both parts and, where `whole_subtypes`, subtypes of the test part; thresholds are set on what it draws.
+    models of both parts and, where `whole_subtypes`, subtypes of the test part; and sets its thresholds on the
+    validation samples drawn.
     Source: `lowalt.recognition.intervals.strict_difference`.
     """
 
     def sample_weights(part: AlarmPart, whole: bool) -> np.ndarray:
+        """Return how often each sample is drawn in each repeat, (repeats, samples), by its motion model."""
         _, first, place = np.unique(part.motion, return_index=True, return_inverse=True)
         return model_weights(part.subtypes[first], whole, repeats, generator)[:, place]
 
@@ -144,9 +146,10 @@ def alarm_rates(scores: np.ndarray, labels: np.ndarray, level: float, classes: i
 
 
 def pareto(cost: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """Which points (n,) no other beats: none costs at most as much and is worth at least as much, one of them strictly.
+    """Return which points (n,) are on the Pareto front.
 
-    Points whose cost or value is NaN are never on the front.
+    A point is on it if no other point has cost <= its cost and value >= its value with one of them strict. Points whose
+    cost or value is NaN are never on the front.
     """
     cheaper, better = cost[:, None] <= cost, value[:, None] >= value
     strictly = (cost[:, None] < cost) | (value[:, None] > value)

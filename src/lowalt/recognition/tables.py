@@ -1,10 +1,10 @@
-"""From prediction files to the paper's tables and what stands behind them, as CSV; test data chooses nothing.
+"""From prediction files to the paper's tables and further ones, as CSV; no choice is made on test data.
 
 Files written, each with the columns `protocol, scheme` first:
     accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged,
                      seeds says how many and spread_points their standard deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
-    seeds.csv        one row a training: accuracy_percent on average over the SNRs, and what it took, where and how
+    seeds.csv        one row a training: accuracy_percent on average over the SNRs, its network, cost and hardware
     confusion.csv    category, predicted, samples
     subtypes.csv     category, subtype, accuracy_percent, samples
     ranges.csv       band of the distance to the nearest station used, accuracy_percent, samples

@@ -1,7 +1,7 @@
-"""Training in plain torch: deterministic order, exact resume, early stopping on validation, a NaN stopped by name.
+"""Training in plain torch: deterministic order, exact resume, early stopping on validation, an error at the first NaN.
 
-Plain torch because a loop library hides what an exact resume needs (the order of samples and every random state),
-and the loop is one page without it. The settings are those of `lowalt.recognition.recipe`.
+An exact resume needs the order of samples and every random state. A library of training loops would hide them, and the
+loop is one page without it. The settings are those of `lowalt.recognition.recipe`.
 """
 
 import math
@@ -78,6 +78,7 @@ class Trainer:
         self.at = Progress()
 
     def _order(self, epoch: int) -> np.ndarray:
+        """Return the sample numbers of an epoch in training order."""
         return epoch_order(self.train.facts, self.seed, self.keys, epoch, self.block["snrs_per_model"])
 
     def save(self) -> None:
@@ -88,6 +89,7 @@ class Trainer:
             checkpoint.save(self.folder / "checkpoint.pt", self.name, self._state())
 
     def _state(self) -> dict:
+        """Return everything that a resumed training needs."""
         return {
             "model": self.model.state_dict(), "ema": self.ema.module.state_dict(), "best": self.best_weights,
             "optimiser": self.optimiser.state_dict(), "at": vars(self.at),
@@ -95,7 +97,7 @@ class Trainer:
         }  # fmt: skip
 
     def resume(self) -> bool:
-        """Take up the checkpoint of this run, if there is one; says whether there was."""
+        """Continue from the checkpoint of this run, if there is one; return whether there was one."""
         path = self.folder / "checkpoint.pt"
         if not path.exists():
             return False
@@ -109,6 +111,7 @@ class Trainer:
         return True
 
     def _finite(self) -> None:
+        """Refuse a loss that is not finite."""
         if not math.isfinite(self.at.loss_sum):
             raise InputError(
                 f"training: loss is {self.at.loss_sum} in epoch {self.at.epoch} at step {self.at.steps}; "
@@ -116,7 +119,7 @@ class Trainer:
             )
 
     def _finite_weights(self) -> None:
-        # A finite loss and gradient can step to weights beyond the largest number; the next loss tells too late.
+        # A step of finite loss and gradient can overflow a weight; the next loss would show it only after a checkpoint.
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
                 raise InputError(
@@ -131,11 +134,12 @@ class Trainer:
         return DataLoader(
             reader, sampler=numbered, batch_size=None, num_workers=self.block["workers"],
             pin_memory=self.machine.device.type == "cuda",
-            # Of its own: the loader must not draw from the stream that dropout draws from.
+            # A generator of its own: the loader must not draw from the stream that dropout draws from.
             generator=torch.Generator(),
         )  # fmt: skip
 
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
+        """Take one optimiser step on a batch and update the moving average of the weights."""
         self.step_model.train()
         images = images.to(self.machine.device, non_blocking=True)
         labels = labels.to(self.machine.device, non_blocking=True)
@@ -152,7 +156,7 @@ class Trainer:
             self.optimiser.step()
             self.at.skipped = 0
         else:
-            # A gradient can overflow where the loss does not; one is survived, a row of them is not.
+            # A gradient can overflow where the loss does not. Such a step is left out; ten in a row end the training.
             self.at.skipped += 1
             print(f"training: gradient is {float(norm)} at step {self.at.steps}, step left out", file=sys.stderr)
             if self.at.skipped >= 10:
@@ -166,6 +170,7 @@ class Trainer:
             self.ema.set(self.model)
 
     def _validate(self) -> None:
+        """Validate the averaged weights, keep the best, and decide whether to stop early."""
         self._finite_weights()
         facts = self.validation.facts
         everything = np.arange(len(facts))
@@ -212,6 +217,7 @@ class Trainer:
         return self.at
 
     def _say(self, start: float, first: int) -> None:
+        """Print the last validation and the pace; start: when the run began (s), first: the step it began at."""
         if self.machine.rank:
             return
         spent = time.monotonic() - start

@@ -1,6 +1,6 @@
 """Models of other runs on this run's test samples, next to this run's own: how training on other data changes accuracy.
 
-Samples are compared pairwise: the same test samples, once as this run's model sees them and once as the other's does.
+Both models classify the same test samples, and their results are compared sample by sample.
 
 transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over the SNRs):
     trained_on                   the other run
@@ -9,8 +9,8 @@ transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over th
     difference_points, low, high other less own, with the 95 % interval that resamples whole motion models
     samples, hardware            of this run's test part
     seeds, spread_points         training seeds of the other's model, and the standard deviation of accuracy between the
-                                 seeds of a model, pooled over both models (empty for one seed): what another training
-                                 moves, which the interval does not hold
+                                 seeds of a model, pooled over both models (empty for one seed): the effect of another
+                                 training, which the interval leaves out
 """
 
 from collections.abc import Iterable
@@ -34,8 +34,8 @@ COLUMNS = (
 def check_folds(own: dict, other: dict) -> None:
     """Refuse a pair of configurations in which a motion model may train in the other run and test in this one.
 
-    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds, only equal splits put
-    the same motion models apart; with other seeds the motion models themselves are others.
+    Folds follow from (seed, subtype, number of the motion model) and the split: with equal seeds, only equal splits
+    test the same motion models; with other seeds, all motion models are different.
     Raises: InputError naming both splits.
     """
     if own["seed"] == other["seed"] and own["split"] != other["split"]:
@@ -59,7 +59,7 @@ def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterab
             raise InputError(f"transfer: {run.scheme} of {name} was tested on other samples than this run's own")
     mine, theirs = (np.mean([run.test.correct for run in runs], axis=0) for runs in (own, other))
     snrs = np.unique(test.snr_db).tolist()
-    # Averages are means over the SNRs, as everywhere; every SNR has the same samples here.
+    # The mean over all samples is the mean over the SNRs, since every SNR has as many samples.
     for snr in (*snrs, None):
         rows = slice(None) if snr is None else test.snr_db == snr
         word = "avg" if snr is None else snr_text(snr)

@@ -1,8 +1,8 @@
 """From shards to index images at the training size: sample by sample, or a whole shard into a cache file.
 
 Decoding and shrinking 256 x 256 images costs more than a small network's step, so a cache pays as soon as two
-runs share it; at scale a training run reads the shards themselves, and sees the same pixels. A cache of the sizes that
-the tiles stage reduces its images to needs no decoding either.
+runs share it; at scale a training run reads the shards themselves, and sees the same pixels. For sizes to which the
+tiles stage has reduced its images, a cache is made without decoding.
 """
 
 import json
@@ -38,7 +38,7 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
     ranges, aspects = [], []
     for station in network.stations:
         distance = record["geometry"][station.name]["range_m"]
-        # A recording does not know where its target was.
+        # The place of a recording's target is not known.
         if distance is None:
             ranges.append(math.nan)
             aspects.append(math.nan)
@@ -54,8 +54,8 @@ def geometry(record: dict, network: Network) -> tuple[list[float], list[float]]:
 def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Facts:
     """Return what the shards say of the samples `numbers`.
 
-    placed: read ranges and aspects from the records too; without it they are NaN and no record but one a subtype is
-    read, which is what a training run over a million samples wants.
+    placed: read ranges and aspects from the records too; without it they are NaN and only one record of each subtype is
+    read, which is enough for a training on a million samples.
     """
     ends = np.cumsum([shard["samples"] for shard in shards.shards])
     owner = np.searchsorted(ends, numbers, side="right")
@@ -88,7 +88,7 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
 
 @dataclass(frozen=True)
 class Reduced:
-    """Images of a whole chunk that the tiles stage has reduced already, and what says where each sample stands there.
+    """Images of a whole chunk that the tiles stage has already reduced, and the data that locate each sample in them.
 
     path: file of `lowalt.tiles.reduced`; motion: the chunk's motion table; snrs_db: the noise levels of every motion
     model, in the order of the chunk's signals.
@@ -130,7 +130,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     place = names.index(name)
     start = sum(shard["samples"] for shard in shards.shards[:place])
     numbers = np.arange(start, start + shards.shards[place]["samples"])
-    # Images are checked as they are decoded; the records then need no second look.
+    # Decoding checks the images, so the records are read without a second check.
     facts = facts_of(ShardSet(index, check=False), numbers)
     if source:
         views = source.images(facts, size)
