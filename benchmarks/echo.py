@@ -121,6 +121,7 @@ def inside(config: dict, clouds: list[Cloud], rows: list[dict]) -> dict:
     spent = {"poses_s": 0.0, "signals_s": 0.0, "kernel_s": 0.0, "rounding_s": 0.0, "again": 0, "symbols": 0}
 
     def timed(name: str, call: Callable, *arguments):
+        """Return the call's result and add its wall time to spent[name]."""
         start = time.perf_counter()
         result = call(*arguments)
         spent[name] += time.perf_counter() - start

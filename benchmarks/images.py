@@ -4,7 +4,7 @@
 
 One core, one process, processor time: the least of five passes over a sample, averaged over the samples (other work
 on the machine only ever adds). Samples are drawn evenly from all noisy signals of the run. Every method's PNG is
-decoded by Pillow and its RGB pixels held against the tile it came from; bytes are held against a second encoding.
+decoded by Pillow and its RGB pixels compared with the tile it came from; bytes are compared with a second encoding.
 """
 
 import argparse
@@ -145,6 +145,7 @@ def into_tar(folder: Path, usual: bool):
     archive = tarfile.open(folder / "usual.tar", "w")  # noqa: SIM115
 
     def add(png: bytes) -> None:
+        """Append the record and the PNG to the archive."""
         for name, data in (("sample.json", record), ("sample.png", png)):
             info = tarfile.TarInfo(name)
             info.size = len(data)

@@ -56,9 +56,10 @@ def processor_ms(call: Callable[[int], object], numbers: list[int], passes: int 
 
 
 def fresh(dataset: Dataset, call: Callable[[int], object]) -> Callable[[int], object]:
-    """The call as at the first sample of a motion model: nothing is kept."""
+    """Return the call with the kept echoes cleared before it, as at the first sample of a motion model."""
 
     def run(number: int) -> object:
+        """Clear the kept echoes, then make the call."""
         dataset.maker.kept = 1
         dataset.maker._received.clear()
         return call(number)

@@ -105,7 +105,7 @@ def pack(run: Path, folder: Path, models: int) -> dict[str, Path]:
 def rate(data: Dataset, workers: int, batch: int = 16) -> float:
     """Samples a second through a shuffled loader, the best of five epochs, once every worker has begun."""
     best = 0.0
-    # What the first sample compiles or opens, the workers inherit.
+    # Read one sample first: the workers inherit everything that it compiles or opens.
     data[0]
     for epoch in range(5):
         order = stream(1, "loader", epoch).permutation(len(data))

@@ -95,6 +95,7 @@ def entries(
 
 
 def _what(entry: Entry) -> dict:
+    """The columns that describe a scheme and its network, whatever the SNR."""
     scheme, stations, speed, shard_bytes = entry
     spectra = "+".join(SPECTRA[number] for number in scheme.spectra)
     return {
@@ -108,6 +109,7 @@ def _what(entry: Entry) -> dict:
 
 
 def _shares(run: Run, part: str) -> dict[str, float]:
+    """Accuracy in percent by SNR label, and their mean "avg"; empty where the part has no samples."""
     found = run.part(part)
     table = {snr_text(snr): 100 * share for snr, (share, _) in accuracy_by(found.snr_db, found.correct).items()}
     return {**table, "avg": float(np.mean(list(table.values())))} if table else {}
@@ -136,7 +138,7 @@ def trained_rows(run: Run, base: Run, entry: Entry, seed: int) -> list[dict]:
 
 
 def timed_row(entry: Entry) -> dict:
-    """Return the row of a network that was timed and not trained; a whole training is that of its settings."""
+    """Return the row of a network that was timed and not trained; core_s_training counts all steps of its settings."""
     return {
         **_what(entry), "kind": "timed", "snr_db": "avg",
         "core_s_training": entry.speed["train_ms"] / 1e3 * entry.speed["steps"] * entry.speed["batch"],
@@ -144,7 +146,7 @@ def timed_row(entry: Entry) -> dict:
 
 
 def fidelity_rows(path: str | Path) -> list[dict]:
-    """Return rows of the models in a transfer table, trained on other data and tested on this: its unseen protocol."""
+    """Return the rows of a transfer table's unseen protocol: models of other data, tested on this run's data."""
     rows = [row for row in read_csv(path, *TRANSFER) if row["protocol"] == "unseen"]
     return [
         {"scheme": f"{row['scheme']} trained on {row['trained_on']}", "kind": "fidelity", "snr_db": row["snr_db"],

@@ -1,4 +1,4 @@
-"""Other ways to the same signal, for measuring against: none of them is used to make data.
+"""Other methods for the same signal, for comparison: none of them is used to make data.
 
 Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and does the same work, geometry and gains
 included: the direct sum over subcarriers, the same sum factored for matrix products, one FINUFFT a symbol, and the
@@ -117,6 +117,7 @@ def judge(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, n: i
     sine, cosine = np.sin(wide(station.normal_rad)), np.cos(wide(station.normal_rad))
 
     def look(d):
+        """Return range and both direction cosines of vectors d (..., 3) from the station."""
         r = np.sqrt((d * d).sum(axis=-1))
         return r, (cosine * d[..., 1] - sine * d[..., 0]) / r, d[..., 2] / r
 

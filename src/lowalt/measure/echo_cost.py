@@ -98,7 +98,7 @@ def rows_of(network: Network, cloud: Cloud, given: tuple, distance_m: float, see
             call()
         except BelowFloor:
             continue
-        # Calls of a millisecond: one interrupt would be a quarter of five of them.
+        # A call takes about a millisecond: with only five calls, one interrupt would be a quarter of the time.
         methods.append(("engine", tolerance or "exact", call, repeats, 8))
     rows = []
     found = in_turn([(call, rounds, calls) for _, _, call, rounds, calls in methods])

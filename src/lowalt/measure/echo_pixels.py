@@ -3,9 +3,8 @@
     python -m lowalt.measure.echo_pixels --settings JSON --table cost.csv --clouds a.npz ...
         --targets config/targets.csv --out cost_pixels.csv
 
-Settings: network, motion, spectra, images and cost blocks of the configuration, and its seed. `--table` is what
-`lowalt.measure.echo_cost` measured on the same clouds; its rows with a cloud's own number of points tell the time
-saved.
+Settings: network, motion, spectra, images and cost blocks of the configuration, and its seed. `--table` is the table of
+`lowalt.measure.echo_cost` for the same clouds; its rows with a cloud's own number of points give the time saved.
 """
 
 import sys
@@ -35,7 +34,7 @@ NEEDED = ("method", "subtype", "points", "range_m", "tolerance", "seconds")
 def signals(network: Network, given: tuple, tolerance: float | None) -> np.ndarray:
     """Return clean signals (stations, N) complex64 as the echo stage stores them; None is the exact mode.
 
-    A station at which float64 cannot promise the tolerance keeps the exact signal, as a user would have to.
+    Where float64 cannot guarantee the tolerance at a station, the exact signal stays, as it would for a user.
     """
     result = np.empty((len(network.stations), network.symbols), np.complex64)
     for place, station in enumerate(network.stations):

@@ -4,8 +4,8 @@
         --model model.pt --out effects.csv
 
 Settings: seed, and evaluation of the configuration's recognition block. The files are those of
-`lowalt.measure.effects_samples`, any number a call; the call without effects gives the accuracies that all others are
-held against.
+`lowalt.measure.effects_samples`, any number a call; the accuracies of all others are compared with those of the call
+without effects.
 """
 
 import sys
@@ -31,8 +31,8 @@ COLUMNS = (
 base_ms, added_ms: processor time a sample and station, medians of each subtype's, averaged; parts_ms: sum of the added
 times that a scene's effects have alone; signal_change: root mean square of Y_bin's change over Y_bin's, averaged;
 pixels_changed_percent: of all spectra's pixels, by more than 8 of 255, without noise; pixel_difference: mean absolute
-change, of 255; cells_changed_percent: OFDM symbols whose range cell is another; snr_db: at which the network was asked,
-with a blank between them; difference_points: accuracy with less accuracy without, on the same samples and noise, and
+change, of 255; cells_changed_percent: OFDM symbols whose range cell is another; snr_db: the SNRs of the network's
+samples, separated by blanks; difference_points: accuracy with less accuracy without, on the same samples and noise, and
 its 95 % interval, which resamples whole motion models.
 """
 NONE = "none"

@@ -33,7 +33,7 @@ from lowalt.targets.cloud import Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
 
 STEP = 8
-"""Steps of the 256 by which a pixel must move to count as changed: about the smallest that an eye sees side by side."""
+"""A pixel counts as changed if its index (0..255) changes by more: about the least that an eye sees side by side."""
 ARRAYS = (
     "subtype", "model", "label", "snr_db", "base_ms", "total_ms", "signal_change", "cells_changed", "pixels_changed",
     "pixel_difference", "views", "example", "example_subtype", "spectra",
@@ -96,7 +96,7 @@ def takes(scenes: list[Scene], clouds: dict[str, Cloud], rows: list[dict], occlu
         given = (cloud_of(clouds, row), row, occluders.get(row["subtype"]))
         for place, station in enumerate(network.stations):
             pairs = list(zip(scenes, found, strict=True))
-            # In turns, since whoever comes second finds the target's data in the processor's caches.
+            # Alternate the order, since the second scene finds the target's data in the processor's caches.
             for scene, take in pairs if (index + place) % 2 else pairs[::-1]:
                 if index == place == 0:
                     # The first call compiles and fills tables once; its time is not that of a sample.

@@ -1,7 +1,7 @@
 """The echo's truth: cells of one symbol in fifty decimal digits, by sums over array elements and subcarriers.
 
-No line and no idea is shared with the closed form in `lowalt.echo`: the steering vectors and the inverse DFT of Eqs. 8
-to 24 of the paper are summed as geometric sums, one point at a time. Needs mpmath (extra `cost`).
+Neither code nor formulas are shared with the closed form in `lowalt.echo`: the steering vectors and the inverse DFT of
+Eqs. 8 to 24 of the paper are summed as geometric sums, one point at a time. Needs mpmath (extra `cost`).
 """
 
 import mpmath
@@ -24,11 +24,13 @@ def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
         normal = mpf(station.normal_rad)
 
         def look(position):
+            """Return range and both direction cosines of a position, seen from the station."""
             d = [mpf(a) - mpf(b) for a, b in zip(position, station.position_m, strict=True)]
             r = mpmath.sqrt(sum(v * v for v in d))
             return r, (-mpmath.sin(normal) * d[0] + mpmath.cos(normal) * d[1]) / r, d[2] / r
 
         def run(step, length):
+            """Return the sum of step^k over k = 0..length - 1 by Horner's rule."""
             total = mpmath.mpc(0)
             for _ in range(length):
                 total = total * step + 1

@@ -60,6 +60,8 @@ def naive(net: Network, station: Station, points_m: np.ndarray, rcs_m2: np.ndarr
         warnings.simplefilter("ignore")
 
         def look(p):
+            """Return range and both direction cosines of points p (..., 3) by their angles, as the paper writes
+            them."""
             d = np.asarray(p, float) - np.array(station.position_m)
             r, flat = np.sqrt((d * d).sum(-1)), np.sqrt(d[..., 0] ** 2 + d[..., 1] ** 2)
             theta = np.pi / 2 - np.angle((d[..., 0] + 1j * d[..., 1]) / flat * np.exp(-1j * station.normal_rad))
@@ -95,7 +97,7 @@ def cluster(distance: float, count: int = 5, size: float = 0.5, seed: int = 3) -
 
 
 def _grating() -> tuple:
-    # kappa = 1.02 puts the first grating lobe, 2 / kappa away from the beam, within sight.
+    # kappa = 1.02 makes the first grating lobe visible: it is 2 / kappa away from the beam in direction cosine.
     net = network()
     station = dataclasses.replace(net.stations[0], frequency_hz=1.02 * net.carrier_hz)
     psi0, psi = -0.985, -0.985 + 2 / 1.02
@@ -143,7 +145,7 @@ CASES = {name: Case(*values) for name, values in _LISTED.items()}
 
 
 def judged(name: str) -> Judged:
-    """Return what the engine, the naive formula and fifty digits say of one case.
+    """Return the values of one case by the engine, by the naive formula and in fifty digits.
 
     Raises: InputError where mpmath is not installed.
     """

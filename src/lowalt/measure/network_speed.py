@@ -30,10 +30,11 @@ BATCHES = (1, 64)
 
 
 def _clock(machine: Machine, threads: int) -> Callable[[], float]:
-    """Processor time of one thread; else time that passed, a GPU's work finished."""
+    """Return the clock (s): processor time on one thread, else wall time, on a GPU after its work has finished."""
     if machine.device.type == "cuda":
 
         def finished() -> float:
+            """Return the wall time (s) once the GPU has finished its work."""
             torch.cuda.synchronize()
             return time.perf_counter()
 
@@ -86,12 +87,13 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
     trained = torch.compile(model) if block["compile"] else model
 
     def step() -> None:
+        """Make one training step on the batch."""
         objective(trained, images, labels, block, machine).backward()
         steps.step()
         steps.zero_grad(set_to_none=True)
 
     if block["compile"]:
-        # The first call compiles, once a training: its time is not that of a step.
+        # The first call compiles, once a training, so it is not timed.
         step()
     return {
         "scheme": scheme.name, "size": settings["size"], "parameters": network.parameters(model), **times,

@@ -38,7 +38,7 @@ def samples_of(config: dict) -> tuple[int, int]:
 
 
 def _images(row: dict[str, str]) -> int:
-    """Images of a sample that the network of a row takes in, a byte a pixel."""
+    """Number of images of a sample that the network of a row takes in: bytes over pixels, a byte a pixel."""
     return int(row["network_bytes"]) // int(row["pixels"]) ** 2
 
 

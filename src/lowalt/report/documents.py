@@ -2,7 +2,7 @@
 
     python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
 
-replaces what stands between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes` (accuracy of every scheme
+replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes` (accuracy of every scheme
 next to the paper's, and which orderings hold) or `cost` (accuracy and its times).
 """
 

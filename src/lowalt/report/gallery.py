@@ -1,4 +1,4 @@
-"""The gallery of runs: one self-contained page that links them all and holds any two of them side by side."""
+"""The gallery of runs: one self-contained page that links them all and shows any two of them side by side."""
 
 import json
 

@@ -53,7 +53,7 @@ PARTS = (
     Part("stages", "Stage times", (stages,)),
     Part("provenance", "Provenance", (made_with,)),
 )
-"""The parts in the order of the page. All are in every page: one without values says so."""
+"""The parts in the order of the page. Every page has all of them; a part without values says so."""
 SECTIONS = tuple(section for part in PARTS for section in part.sections)
 """The sections in the order of the page.
 

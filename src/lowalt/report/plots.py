@@ -17,7 +17,7 @@ from lowalt.common.csv_tables import write_csv
 from lowalt.common.files import replacing
 
 VEGA_LITE = "6.4"
-"""Of the versions that the converter brings, the one whose scripts the page holds."""
+"""Version of Vega-Lite whose scripts the page holds, one of those that the converter brings."""
 _LOOK = {
     "background": None, "font": "system-ui, sans-serif", "axis": {"gridOpacity": 0.4, "labelFontSize": 11},
     "view": {"stroke": None}, "legend": {"labelLimit": 400, "symbolLimit": 60}, "header": {"labelFontSize": 13},

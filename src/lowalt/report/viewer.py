@@ -1,4 +1,4 @@
-"""The samples that the page lets its reader look at: which, their tiles with axes, probabilities, and motion.
+"""The samples in the viewer of the page: their choice, tiles with axes, probabilities and motion.
 
 All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants of one cycle.
 """
@@ -28,11 +28,11 @@ from lowalt.tiles.render import Renderer, join, split
 
 PIXELS = 80
 MODELS = 2
-"""Motion models of a subtype."""
+"""Number of motion models of a subtype."""
 SNRS = 3
-"""SNRs of a motion model: the lowest, the highest, and between them."""
+"""Number of SNRs of a motion model: the lowest, the highest, and those between them."""
 BUDGET = 3_500_000
-"""Bytes of all tiles as the page holds them; samples after that are left out."""
+"""Limit for the bytes of all tiles as the page holds them; samples beyond it are left out."""
 FRAMES = 24
 POINTS = 160
 KEY = re.compile(r"(.+)-(\d{6,})-snr.+")

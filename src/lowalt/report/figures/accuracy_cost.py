@@ -23,7 +23,8 @@ TOO_CLOSE = 1.6
 
 
 def _timed(panel, rows: list[dict], column: str, low: float) -> None:
-    """A line where each network without accuracy would stand; neighbours share one label, from the height `low` up."""
+    """Draw a line at the cost of each network that was only timed. Neighbouring lines share one label, which begins at
+    height `low`."""
     times = [(row[column] or row.get("inference_ms_1"), row["scheme"]) for row in rows]
     found = sorted((float(time), name) for time, name in times if time)
     labels: list[tuple[float, list[str]]] = []

@@ -103,7 +103,7 @@ def over_bands(bands: dict[str, list[dict[str, str]]]) -> Plot:
 
 
 def over_confidence(bands: list[dict[str, str]]) -> Plot:
-    """Return accuracy over confidence, a panel a protocol, a line a scheme; on the diagonal a probability is true.
+    """Return accuracy over confidence, a panel a protocol, a line a scheme; the diagonal is where both are equal.
 
     bands: rows {protocol, scheme, confidence_percent, accuracy_percent, samples}.
     """

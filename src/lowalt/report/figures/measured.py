@@ -1,6 +1,6 @@
 """Measured next to simulated: pictures of the same stretch on the same axes and scale, measured above.
 
-Here is only drawing: what is drawn comes as files `pair-NAME.npz` of `python -m lowalt.recordings pairs`.
+This module only draws; its input are the files `pair-NAME.npz` of `python -m lowalt.recordings pairs`.
 """
 
 import zipfile

@@ -16,7 +16,7 @@ SNR_LABELS = {"inf": "∞"}
 def png(figure: Figure, colours: int = 0) -> bytes:
     """Return the figure as PNG bytes and close it; no dates inside, so equal figures are equal bytes.
 
-    colours: so many at most, for figures full of spectra, which take half the bytes then (0: all).
+    colours: largest number of colours (0: no limit); a limit halves the bytes of figures full of spectra.
     """
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
@@ -29,5 +29,5 @@ def png(figure: Figure, colours: int = 0) -> bytes:
 
 
 def embedded(data: bytes) -> str:
-    """Return PNG bytes as the address of a picture that is part of the page."""
+    """Return PNG bytes as a data URL, so that the page holds the picture itself."""
     return "data:image/png;base64," + base64.b64encode(data).decode()

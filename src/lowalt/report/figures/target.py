@@ -1,4 +1,4 @@
-"""One target for the eye: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
+"""Pictures of one target: points by part with hinges, axes and normals, motion over a cycle, the three spectra."""
 
 import io
 import math

@@ -14,5 +14,5 @@ def values(run: Run) -> dict:
     try:
         return {"text": explained(run.config, inputs and Path(inputs), [], None, False)}
     except InputError as error:
-        # A page of finished results is worth more than this section, for example where the recordings have been moved.
+        # Show the page without the explanation where, for example, the recordings have been moved.
         return {"text": f"not explained: {error}"}
