@@ -9,6 +9,7 @@ import pytest
 from lowalt.common import portable
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
+from lowalt.common.rotations import nearest_rotations, thinnest
 
 RNG = np.random.default_rng(5)
 WIDE = RNG.uniform(-1e5, 1e5, 300)
@@ -135,11 +136,11 @@ def test_the_thinnest_direction_is_the_library_s_eigenvector():
         points = RNG.normal(size=(300, 3)) * scales @ np.linalg.qr(RNG.normal(size=(3, 3)))[0]
         points -= points.mean(axis=0)
         expected = np.linalg.eigh(points.T @ points)[1][:, 0]
-        assert abs(abs(portable.thinnest(points) @ expected) - 1) < 1e-14
+        assert abs(abs(thinnest(points) @ expected) - 1) < 1e-14
 
 
 def test_the_nearest_rotation_is_the_library_s_polar_factor():
     blends = np.eye(3) + 0.3 * RNG.normal(size=(50, 3, 3))
     blends = blends[np.linalg.det(blends) > 0.1]
     left, _, right = np.linalg.svd(blends)
-    assert np.allclose(portable.nearest_rotations(blends), left @ right, atol=1e-14)
+    assert np.allclose(nearest_rotations(blends), left @ right, atol=1e-14)

@@ -10,7 +10,7 @@ from dataset import build
 from lowalt.common.errors import InputError
 from lowalt.shards import ShardSet, upload
 from lowalt.shards.card import main as card
-from lowalt.shards.card import size_category
+from lowalt.shards.hub import size_category
 from lowalt.shards.sigmf import main as sigmf
 from test_shards_card import CONFIG
 

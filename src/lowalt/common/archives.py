@@ -1,4 +1,4 @@
-"""Archives of arrays (.npz) whose bytes follow from the arrays alone.
+"""Archives of arrays (.npz) whose bytes depend on the arrays alone.
 
 Python's zipfile writes another version number and another length into a member's header since 3.11.4, so `np.savez`
 gives other bytes with another Python. Here every byte is written by hand: members are stored as they are, dated 1980.

@@ -1,4 +1,4 @@
-"""Files of arrays (.npy, .npz) from anywhere: the errors of damaged ones, and limits on the size they may claim."""
+"""Files of arrays (.npy, .npz) from users: the errors that damaged files raise, and limits of their stated size."""
 
 import struct
 import tokenize
@@ -22,7 +22,7 @@ MOST_EXPANSION = 16
 
 
 def checked_archive(path: str | Path, what: str) -> Path:
-    """Return the path of a .npz whose members can be what they say; nothing is unpacked.
+    """Return the path of a .npz whose members state plausible sizes; nothing is unpacked.
 
     Raises: InputError naming the file where it is missing, no archive, or has a member that would fill the memory.
     """

@@ -2,13 +2,13 @@
 
 The classes stand in the order in which the table names them first, and a class's place in that order is its label. The
 order travels with the data: in the settings of the stages, in the index of the shards, in a trained model and in the
-record next to a prediction file. Where one of these says nothing of classes, it has the published four.
+record next to a prediction file. Where one of these names no classes, it has the published four.
 
-The first class is the one that a detector looks for; false alarms are samples of the other classes that are given its
-name.
+The first class is the one that a detector looks for; false alarms are samples of other classes that the detector
+gives its name.
 
-How a target is built, moves and reflects follows from what it is `like`, one of the published four. A class of these
-names needs no more; a record of a user's own class names one of the four in its key `like`.
+A target is built, moves and reflects like one of the published four classes, which a record names in its key `like`.
+The key is needed for a user's own class only.
 """
 
 import re
@@ -41,7 +41,7 @@ def classes_of(table: Mapping[str, dict]) -> tuple[str, ...]:
 
 
 def stated(content: Mapping) -> tuple[str, ...]:
-    """Return the classes that an index, a trained model or a run's record states: the published four where none."""
+    """Return the classes that an index, a trained model or a run's record states, or the published four."""
     return tuple(content.get("classes", CATEGORIES))
 
 
@@ -61,12 +61,12 @@ def word(name: str) -> str:
 
 
 def plural(name: str) -> str:
-    """Return a class's name for several targets: that of a published class in plural, others as they are written."""
+    """Return a class's name for several targets: the plural of a published class, any other name as it is written."""
     return _PLURALS.get(name, name)
 
 
 def like(record: Mapping) -> str:
-    """Return what a record's or a cloud's target is built, moves and reflects like: one of CATEGORIES.
+    """Return the published class that the target of a record or cloud is built, moves and reflects like.
 
     Raises: InputError naming the subtype where neither its key `like` nor its category says it.
     """

@@ -1,4 +1,4 @@
-"""Shared by the command lines of all stages: the settings argument, clear failure, the peak memory.
+"""Parts of all stages' command lines: the argument with the settings, errors in one line, the peak memory.
 
 A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
 The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.
@@ -85,6 +85,6 @@ def run(main: Callable[[list[str]], None]) -> None:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         raise SystemExit(2) from None
-    # ru_maxrss sees short peaks that sampling misses; KiB on Linux.
+    # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{Path(sys.argv[0]).parent.name}: done, peak memory {peak:.0f} MiB", file=sys.stderr)

@@ -1,6 +1,6 @@
 """The configuration: merged from files, checked against the schema, cut into the stages' settings.
 
-Nothing here knows what a stage computes; faults are found before any job starts and named by key and value.
+This module does not depend on any stage. Faults are found before any job starts and named by key and value.
 """
 
 import json
@@ -87,8 +87,8 @@ def faults(config: dict, schema: dict) -> list[str]:
 def check(config: dict, schema_path: str | Path) -> dict:
     """Return the configuration if it fits the schema, without the stations and spectra that are null.
 
-    Layers of configuration can only add keys to a mapping; a null takes a station or a spectrum of a lower layer out,
-    in place. Raises: InputError with one line a fault.
+    A layer of configuration can only add keys to a mapping, so a null removes a station or spectrum of a lower layer.
+    The configuration is changed in place. Raises: InputError with one line a fault.
     """
     network = config.get("network")
     for block in (network.get("stations") if isinstance(network, dict) else None, config.get("spectra")):

@@ -38,6 +38,7 @@ def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping |
 
 
 def _cells(path: str | Path, columns: Sequence[str], row: Mapping) -> list:
+    """Cells of a row given as a dict, in the order of the columns."""
     unknown = [key for key in row if key not in columns]
     if unknown:
         raise InputError(f"{path}: keys {unknown}, expected only the columns {list(columns)}")

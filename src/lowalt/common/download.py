@@ -1,4 +1,4 @@
-"""One file from a public address, kept only if its content is the pinned one. No stage is known here."""
+"""One file from a public address, kept only if its content has the pinned checksum."""
 
 import shutil
 import sys
@@ -30,9 +30,9 @@ def download(address: str, target: Path, pinned: str, checksum: Callable[[Path],
 
 
 def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:
-    """Call `fetch` for each file's name and print what became of it; a file that fails does not stop the others.
+    """Call `fetch` for each file's name and print the result; a file that fails does not stop the others.
 
-    fetch: returns False where the file was there already. Failures go to standard error.
+    fetch: returns False if the file existed already. Failures go to standard error.
     Raises: InputError with the count of files that failed.
     """
     names, failed = list(names), 0

@@ -29,6 +29,7 @@ COMPILED = 4096
 
 
 def _count(size: Size) -> int:
+    """How many numbers an array of this size has; None means one number."""
     return 1 if size is None else math.prod(size) if isinstance(size, tuple) else int(size)
 
 
@@ -38,7 +39,7 @@ def _shaped(values: np.ndarray, size: Size):
 
 
 class Draws(np.random.Generator):
-    """A generator whose common draws are those of the module's table; arguments are as NumPy's."""
+    """A generator whose draws are those of the module's table; arguments are as in NumPy's `Generator`."""
 
     def __init__(self, bit_generator: np.random.BitGenerator) -> None:
         super().__init__(bit_generator)
@@ -92,11 +93,11 @@ class Draws(np.random.Generator):
         return _shaped(taken.astype(np.int64) + first, size)
 
     def _below(self, width: int, count: int) -> np.ndarray:
-        """`count` whole numbers below `width`, uint64; halves that Lemire's method refuses are passed over."""
+        """`count` whole numbers below `width`, uint64; halves that Lemire's method rejects are skipped."""
         parts, missing = [], count
         while missing:
             scaled = self._halves(missing) * np.uint64(width)
-            # 2^32 modulo the width: products whose lower half is less would favour some numbers.
+            # Reject products whose lower half is below 2^32 modulo the width: they would favour some numbers.
             accepted = scaled[(scaled & _HALF) >= np.uint64(2**32 % width)] >> np.uint64(32)
             parts.append(accepted)
             missing -= len(accepted)
@@ -142,7 +143,7 @@ class Draws(np.random.Generator):
             raise InputError(f"standard_normal: arguments {sorted(kwargs)}, expected none besides size")
         count = _count(size)
         if count >= COMPILED:
-            # Loaded here: most commands draw few numbers, and loading the compiler would take longer than the draws.
+            # Import here: most commands draw few numbers, and loading the compiler takes longer than these draws.
             from lowalt.common.normals import interleaved
 
             return _shaped(interleaved(self.words(count + count % 2))[:count], size)
@@ -167,6 +168,7 @@ class Draws(np.random.Generator):
 
 
 def _restored(bit_generator: np.random.BitGenerator, kept: int | None) -> Draws:
+    """A generator as it was before it was pickled."""
     draws = Draws(bit_generator)
     draws._kept = kept
     return draws

@@ -1,4 +1,4 @@
-"""Files at the edges of the stages: nothing half-written stays behind, every file has a checksum and a plain name."""
+"""Files at the edges of the stages: no file stays half-written; checksums; plain file names."""
 
 import contextlib
 import csv
@@ -26,7 +26,7 @@ def replacing(path: str | Path, size: int | None = None) -> Iterator[Path]:
     Raises: SpaceError naming the file, what it needs and what is free where the disk is too small or becomes full.
     """
     path = Path(path)
-    # The suffix stays, since many writers choose the format by it.
+    # Keep the suffix: many writers choose the format by it.
     temporary = path.with_name(f".{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -61,7 +61,7 @@ def _sweep(path: Path) -> None:
 
 
 def _lives(process: int) -> bool:
-    """Whether this machine has a process of that id."""
+    """Whether this machine runs a process of that id."""
     try:
         os.kill(process, 0)
     except (ProcessLookupError, OverflowError):
@@ -80,6 +80,7 @@ def free_bytes(path: str | Path) -> int:
 
 
 def _is_full(error: Exception, path: Path) -> bool:
+    """Whether an error of a writer means that the disk is full."""
     if isinstance(error, OSError) and error.errno is not None:
         return error.errno in FULL
     # numpy's "N requested and M written" has no number of its own, torch's writer raises a RuntimeError.
@@ -87,6 +88,7 @@ def _is_full(error: Exception, path: Path) -> bool:
 
 
 def _megabytes(size: int) -> str:
+    """A size in MB, as text."""
     return f"{size / 1e6:.1f} MB"
 
 

@@ -1,4 +1,4 @@
-"""How kernels are compiled: once a machine, kept on disk, and again whenever the code that a kernel runs changes.
+"""How kernels are compiled: once on each machine, kept on disk, and again if the code that a kernel runs changes.
 
 numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
@@ -47,7 +47,7 @@ def _used(function: FunctionType) -> Iterator[tuple[str, object]]:
 
 
 def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
-    """Yield as text everything that the machine code of `function` is made from, each kernel that it calls once."""
+    """Yield as text everything that determines the machine code of `function`; each kernel that it calls comes once."""
     name = f"{function.__module__}.{function.__qualname__}"
     if name in seen:
         return
@@ -84,6 +84,8 @@ def digest(function: FunctionType) -> str:
 
 
 class _DigestCache(FunctionCache):
+    """Numba's cache on disk, with the digest of everything compiled in its keys, and turns between processes."""
+
     counted = True
     """Whether the function may use counted references, and so allocate."""
 
@@ -93,6 +95,7 @@ class _DigestCache(FunctionCache):
         self._turn = Turn(Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock")
 
     def _index_key(self, sig, codegen):
+        """Numba's key, the digest of the code, and the fields of named tuples among the arguments."""
         return (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
 
     def load_overload(self, sig, target_context):
@@ -104,7 +107,7 @@ class _DigestCache(FunctionCache):
         found = self._kept(sig, target_context)
         if found is None and self._enabled:
             # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
-            # nobody waits for a process that waits for him.
+            # no two processes wait for each other.
             self._turn.take()
             found = self._kept(sig, target_context)
             if found is not None:
@@ -119,15 +122,17 @@ class _DigestCache(FunctionCache):
             self._turn.give()
 
     def _kept(self, sig, target_context):
-        # numba's method first loads everything that a compilation may need, scipy.linalg included: a third of a
-        # job's start. Finished machine code needs the counted references' runtime at most; compilation loads the rest.
+        """Finished machine code for a signature, None where none is kept."""
+        # numba's method first loads everything that a compilation may need, scipy.linalg included, which takes a third
+        # of a job's start. Finished machine code needs at most the runtime of counted references; compilation loads
+        # the rest.
         if self.counted:
             rtsys.initialize(target_context)
         with self._guard_against_spurious_io_errors():
             try:
                 return self._load_overload(sig, target_context)
             except (ImportError, AttributeError):
-                # The list of kept code names types of arguments: one that has moved since makes it unreadable.
+                # The list of kept code names types of arguments; it is unreadable once one of them has moved.
                 self.flush()
         return None
 
@@ -136,6 +141,7 @@ def kernel(**options) -> Callable:
     """Return a decorator like `numba.njit(**options)` whose on-disk cache follows everything that is compiled."""
 
     def wrap(function: Callable) -> Callable:
+        """Compile a function and give it a cache of this module."""
         compiled = njit(**options)(function)
         compiled._cache = _DigestCache(function)
         compiled._cache.counted = options.get("_nrt", True)
@@ -147,8 +153,8 @@ def kernel(**options) -> Callable:
 PLAIN = kernel()
 """Every operation is done as written."""
 LEAN = kernel(error_model="numpy", _nrt=False)
-"""As written, without counted references: they took a quarter of the time. Such a function cannot allocate."""
+"""As PLAIN, but without counted references, which took a quarter of the time. Such a function cannot allocate."""
 INLINED = kernel(error_model="numpy", _nrt=False, forceinline=True)
-"""As LEAN, and copied into its callers, so that bundles of arrays are not copied at each call."""
+"""As LEAN, and copied into its callers, so that named tuples of arrays are not copied at each call."""
 VECTOR = kernel(error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""

@@ -7,8 +7,8 @@ import ctypes
 def keep_freed_memory() -> None:
     """Let the C library keep large freed blocks instead of returning each to the system.
 
-    A stage frees arrays of the same sizes sample after sample, training its activations step after step; mapping them
-    afresh costs page faults. Only where the C library is glibc; elsewhere nothing changes.
+    A stage frees arrays of the same sizes for each sample, and training frees its activations in each step; mapping
+    them again costs page faults. This works with glibc; with other C libraries nothing changes.
     """
     with contextlib.suppress(OSError, AttributeError):
         mallopt = ctypes.CDLL(None).mallopt

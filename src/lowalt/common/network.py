@@ -1,6 +1,6 @@
 """The network of base stations: carrier, subcarriers, symbols, arrays and where each station stands.
 
-Only facts about the radar live here; its signals are computed in `lowalt.echo`.
+This module states facts about the radar; `lowalt.echo` computes its signals.
 Axes: x and y horizontal, z up, metres, global frame. Angles in degrees only in the configuration.
 """
 
@@ -17,6 +17,7 @@ SPEED_OF_LIGHT = 299_792_458.0
 
 
 def _positive(name: str, value: float, *, whole: bool = False) -> None:
+    """Raise InputError unless the value is a positive finite number, an integer where `whole` is set."""
     good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     good = good and math.isfinite(value) and value > 0 and (not whole or float(value).is_integer())
     if not good:
@@ -60,9 +61,9 @@ def station_names(block: dict) -> list[str]:
 
 
 def as_far_as(block: dict, name: str) -> dict:
-    """Return a `network` block with the stations that decide what a station of it hears, and no others.
+    """Return a `network` block with only those stations on which the echo at the station `name` depends.
 
-    Its sub-band follows from how many stations stand before it; a link needs the stations that it connects.
+    The number of stations before it decides its sub-band; a link needs the two stations that it connects.
     """
     stations = block["stations"]
     last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))

@@ -1,4 +1,4 @@
-"""Complex normal numbers from raw random words, compiled: the transform of `lowalt.common.draws`, the same bits faster.
+"""Complex normal numbers from raw random words, compiled: the bits of `lowalt.common.draws` in less time.
 
 Only additions, products, divisions, square roots and comparisons of float64 in one written order, never fused.
 """
@@ -66,7 +66,7 @@ def fill(words, scale, out):
 
 def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
-    # Parts that lie together become vector instructions, parts that alternate do not.
+    # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
     out = np.empty((len(words) // 2, 2))
     out[:, 0], out[:, 1] = circular(words)
     return out.ravel()

@@ -1,8 +1,9 @@
 """The plan of a run: its subtypes, chunks and shards, all known from the configuration before any job starts.
 
-A data set grows without being made again: what the configuration names under `added` gets chunks of its own. The step
-t (1, 2, ...) of that list that adds subtypes makes chunks {group}-{part}t{t} with motion models of these alone; a step
-that adds SNRs makes a chunk {chunk}s{t} for every earlier one, with the same motion models and echoes.
+A data set can grow without being made again: subtypes and SNRs that the configuration names under `added` get chunks of
+their own. The step t (1, 2, ...) of that list that adds subtypes makes chunks {group}-{part}t{t} with motion models of
+these alone; a step that adds SNRs makes a chunk {chunk}s{t} for every earlier one, with the same motion models and
+echoes.
 """
 
 from dataclasses import dataclass
@@ -111,6 +112,7 @@ class Plan:
 
     @property
     def _parts(self) -> int:
+        """Number of chunks that hold the motion models of one group, the last one possibly smaller."""
         return -(-self.models // self.models_per_chunk)
 
     @property

@@ -1,7 +1,7 @@
 """Elementary functions, products and sums whose last bit is the same on every processor and with every library.
 
-A library's sine may be another one on a processor with wider registers, a BLAS adds in another order, and fused
-operations round once where two round twice. Here everything is additions, products, divisions and square roots of
+A library may compute a sine by other polynomials with wider registers, a BLAS may add in another order, and a
+fused multiply-add rounds once instead of twice. Here everything is additions, products, divisions and square roots of
 float64 arrays in one written order, which IEEE 754 fixes: NumPy does each of them as an operation of its own. Results
 are within a few units in the last place of the true values. Arguments are arrays of float64 or numbers; shapes
 broadcast; NaN and infinity are not expected.
@@ -78,7 +78,7 @@ def _turned(quarter: np.ndarray, sine: np.ndarray, cosine: np.ndarray) -> tuple[
 def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
     """Return sine and cosine of angles of any shape, each of that shape.
 
-    Raises: ValueError where an angle is beyond 10^6 rad, for which the reduction is not made.
+    Raises: ValueError for an angle beyond 10^6 rad, where the reduction would lose digits.
     """
     angle = np.asarray(angle_rad, np.float64)
     if angle.size and not np.abs(angle).max() <= _LARGEST_ANGLE:
@@ -93,7 +93,7 @@ def sine_cosine(angle_rad: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def sine_cosine_turns(turns: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape; quarter turns come out as exact 0 and +-1."""
+    """Return sine and cosine of 2 pi `turns`, below 2^50, of any shape; quarter turns give exactly 0 and +-1."""
     turns = np.asarray(turns, np.float64)
     quarter = np.rint(4.0 * turns)
     return _turned(quarter, *_eighth((turns - 0.25 * quarter) * (2 * np.pi), np.zeros_like(turns)))
@@ -154,7 +154,7 @@ def arctan(x: np.ndarray | float) -> np.ndarray:
     size = np.abs(x)
     limits = (0.4375, 0.6875, 1.1875, 2.4375)
     place = sum((size >= limit).astype(np.int64) for limit in limits)
-    # Each branch is computed for all; divisors are kept from zero where a branch is not taken.
+    # Every branch is computed for all numbers, so a divisor of a branch that is not used may not be zero.
     choices = [
         size, (2 * size - 1) / (2 + size), (size - 1) / (size + 1), (size - 1.5) / (1 + 1.5 * size),
         -1 / np.where(size > 0, size, 1.0),
@@ -180,7 +180,7 @@ def arctan2(y: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
 
 def total(values: np.ndarray, axis: int = -1) -> np.ndarray:
     """Return the sum along an axis that is not empty, added one by one from the first value on."""
-    # Each value of a running sum needs the one before it, so no library can take another order.
+    # Each value of a running sum needs the one before it, so every library adds in this order.
     return np.add.accumulate(np.asarray(values, np.float64), axis=axis).take(-1, axis=axis)
 
 
@@ -215,43 +215,3 @@ def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def applied(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return matrix @ vector for each vector: (..., I, K) and (..., K) -> (..., I)."""
     return dot(matrix, np.asarray(vectors, np.float64)[..., None, :])
-
-
-def thinnest(vectors: np.ndarray) -> np.ndarray:
-    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its largest part is positive.
-
-    Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
-    """
-    columns = np.asarray(vectors, np.float64).T
-    moments = np.array([[total(a * b) for b in columns] for a in columns])
-    axes = np.eye(3)
-    # Each sweep squares what is left off the diagonal.
-    for _ in range(12):
-        for p, q in ((0, 1), (0, 2), (1, 2)):
-            if abs(moments[p, q]) <= 1e-30 * np.diagonal(moments).max():
-                continue
-            slope = (moments[q, q] - moments[p, p]) / (2 * moments[p, q])
-            tangent = (1.0 if slope >= 0 else -1.0) / (abs(slope) + np.sqrt(slope * slope + 1))
-            cosine = 1 / np.sqrt(tangent * tangent + 1)
-            turn = np.eye(3)
-            turn[p, p] = turn[q, q] = cosine
-            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
-            moments = product(product(turn.T, moments), turn)
-            moments[p, q] = moments[q, p] = 0.0
-            axes = product(axes, turn)
-    axis = axes[:, np.argmin(np.diagonal(moments))]
-    return axis * np.sign(axis[np.argmax(np.abs(axis))]) + 0.0
-
-
-def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
-    """Return the rotations (..., 3, 3) nearest to matrices (..., 3, 3) of positive determinant.
-
-    Source: Newton's iteration for the polar decomposition, Higham 1986.
-    """
-    result = np.asarray(matrices, np.float64)
-    # It squares its error in each step; blends of like rotations need five.
-    for _ in range(10):
-        rows = [np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)]
-        cofactors = np.stack(rows, axis=-2)
-        result = 0.5 * (result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None])
-    return result

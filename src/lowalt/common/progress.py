@@ -1,4 +1,4 @@
-"""How far a long command is, as lines of its log that a person and the workflow's display can read.
+"""The progress of a long command, as lines of its log that a person and the workflow's display can read.
 
 A line is `progress 340/2000 steps`; the last one counts. Commands write to their log (standard error) at most every two
 seconds, so short ones write none.
@@ -19,7 +19,7 @@ Item = TypeVar("Item")
 
 
 class Progress(NamedTuple):
-    """Parts of a command's work done, of all parts, and their unit's name."""
+    """Number of parts of a command's work that are done, of how many, and the name of a part."""
 
     done: int
     total: int
@@ -36,7 +36,7 @@ class Reporter:
         self._last = clock()
 
     def __call__(self, done: int) -> None:
-        """Say that `done` parts are done, if it is time to."""
+        """Write that `done` parts are done, unless the last line is less than EVERY_S seconds old."""
         now = self._clock()
         if now - self._last >= EVERY_S:
             self._last = now

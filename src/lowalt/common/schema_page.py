@@ -38,7 +38,7 @@ def kind(entry: dict) -> str:
 
 
 def bounds(entry: dict) -> str:
-    """Return the range of a number in words, empty for none."""
+    """Return the range of a number in words, an empty text if it has none."""
     return ", ".join(f"{word} {entry[key]:g}" for key, word in LIMITS.items() if key in entry)
 
 

@@ -1,4 +1,4 @@
-"""Where the files that come with the package lie: Snakefile, rules, schema, configurations, profiles.
+"""The place of the files that come with the package: Snakefile, rules, schema, configurations, profiles.
 
 In a checkout they stand at its root. An installation from a wheel has them inside the package.
 """
@@ -39,6 +39,7 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
 
 def _found(value: Any, folder: Path) -> Any:
+    """The value with every text in it that names a file of `folder` alone replaced by that file's path."""
     if isinstance(value, dict):
         return {name: _found(item, folder) for name, item in value.items()}
     if isinstance(value, list):

@@ -1,6 +1,6 @@
-"""Which fold a sample belongs to: train, val or test, by the sample's own name and nothing else.
+"""Which fold a sample belongs to: train, val or test, by the sample's name alone.
 
-Models are dealt in blocks: every block of `train + val + test` consecutive model numbers of a subtype is
+Models are assigned in blocks: every block of `train + val + test` consecutive model numbers of a subtype is
 shuffled by its own stream and cut into the three shares. Full blocks therefore have exact shares, and adding
 models, subtypes or SNRs moves no fold.
 """
@@ -16,6 +16,7 @@ WAYS = ("motion", "sample")
 
 @functools.lru_cache(maxsize=65536)
 def _block(shares: tuple[int, int, int], seed: int, keys: tuple, number: int) -> tuple[str, ...]:
+    """Folds of the models in one block, by their place in it."""
     names = [name for name, share in zip(FOLDS, shares, strict=True) for _ in range(share)]
     order = stream(seed, "fold", *keys, number).permutation(len(names))
     return tuple(names[index] for index in order)
@@ -25,9 +26,9 @@ def fold(split: dict, seed: int, subtype: str, model: int, snr_db: float | None 
     """Return the fold ("train", "val" or "test") of one sample.
 
     split: the configuration's block, `by` ("motion": all SNRs of a motion model share its fold, nothing leaks;
-    "sample": the paper's way, each SNR dealt apart) and the whole-number shares `train`, `val`, `test` of a block.
-    snr_db matters only for "sample".
-    Raises: InputError naming the key that is wrong. Source: paper, section V-A.
+    "sample": the paper's way, each SNR assigned separately) and the whole-number shares `train`, `val`, `test` of a
+    block. snr_db matters only for "sample". Raises: InputError naming the key that is wrong. Source: paper, section
+    V-A.
     """
     shares = tuple(split[name] for name in FOLDS)
     if any(not isinstance(share, int) or share < 0 for share in shares) or shares[0] < 1:

@@ -1,4 +1,4 @@
-"""Random streams: one independent generator for every named purpose, never an index in a list.
+"""Random streams: one independent generator for each named purpose; none is known by its number in a list.
 
 A stream is keyed by what it is for (root seed, purpose, subtype, model, ...), so adding a subtype, an
 SNR or an effect moves no other stream, and no result depends on shards, jobs or workers.
@@ -40,7 +40,7 @@ def stream(seed: int, purpose: str, *keys: Key) -> Draws:
     """Return the generator of the stream (seed, purpose, *keys): NumPy's PCG64 seeded by SHA-256, read by `Draws`.
 
     Raises: TypeError for a key that is no str, int or float.
-    Source: NumPy's SeedSequence takes entropy of any size; 256 bits make collisions a non-event.
+    Source: NumPy's SeedSequence takes entropy of any size; with 256 bits, two equal streams do not occur.
     """
     entropy = int.from_bytes(digest(seed, purpose, *keys), "little")
     return Draws(np.random.PCG64(np.random.SeedSequence(entropy)))

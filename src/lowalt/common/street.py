@@ -20,7 +20,7 @@ def modules(room: str) -> list[Path]:
 
 
 def rooms_imported(path: Path) -> set[str]:
-    """Return the rooms that the imports of one file name, its own included where it imports from there."""
+    """Return the rooms that the imports of one file name; its own room is one of them if it imports from there."""
     names = []
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):

@@ -1,4 +1,4 @@
-"""One timer for every measured time: calls that take turns, and the least of several passes. No numbers of its own."""
+"""Timers of all measured times: the median of calls that take turns, and the least time of several calls."""
 
 import statistics
 import time
@@ -31,7 +31,7 @@ def median_s(work: Callable[[], object], repeats: int) -> float:
 def least_s(work: Callable[[], object], limit_s: float, clock: Callable[[], float], repeats: int = 30) -> float:
     """Return the least time (s) by `clock` of up to `repeats` calls, after one that warms up.
 
-    Calls stop once they took `limit_s` together; a first call that alone takes that long is the measurement.
+    Calls stop once they took `limit_s` together. If the first call alone takes that long, its time is the result.
     """
     spent, _ = once(work, clock)
     if spent > limit_s:

@@ -1,4 +1,4 @@
-"""One process at a time does what all need once: a lock file that the system lets go of when its holder dies."""
+"""A lock file, so that one process at a time does work that all need once; the system frees it when its holder dies."""
 
 import contextlib
 import fcntl
@@ -39,6 +39,6 @@ class Turn:
         """Let the next process have the turn; without a turn nothing happens."""
         self._depth = max(0, self._depth - 1)
         if not self._depth and self._descriptor >= 0:
-            # Closing lets go of the lock.
+            # Closing the file frees the lock.
             os.close(self._descriptor)
             self._descriptor = -1

@@ -12,7 +12,11 @@ class _UniqueKeyLoader(yaml.SafeLoader):
     """Safe YAML in which a key given twice is an error, not a silent overwrite."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        # A list, not a set: a key that cannot be hashed is left to YAML's own message.
+        """Return the mapping as the library does.
+
+        Raises: InputError naming the line where a key stands twice.
+        """
+        # A list, not a set: for a key that cannot be hashed, YAML has its own message.
         seen = []
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
@@ -28,14 +32,15 @@ MOST_NODES = 1_000_000
 
 
 def _check_size(root: yaml.Node | None, path: str | Path) -> None:
-    """Refuse a document whose anchors repeat it beyond measure or lead back into itself."""
+    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain itself."""
     sizes: dict[int, int] = {}
 
     def size(node: yaml.Node | None) -> int:
+        """Number of values in a node, counted as often as anchors repeat them; it stops beyond MOST_NODES."""
         if not isinstance(node, yaml.CollectionNode):
             return 1
         if id(node) not in sizes:
-            sizes[id(node)] = MOST_NODES + 1  # stands for the node until it is counted: one inside itself is endless
+            sizes[id(node)] = MOST_NODES + 1  # until the node is counted; a node inside itself is endless
             pairs = node.value if isinstance(node, yaml.MappingNode) else [(entry,) for entry in node.value]
             sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
         return sizes[id(node)]
@@ -58,7 +63,7 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         value = None if root is None else loader.construct_document(root)
     except InputError:
         raise
-    # Besides its own errors, the library raises those of its converters: a date of month 99, a number of 5000 digits.
+    # The library also raises errors of its converters, as for a date of month 99 or a number of 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(f"{path}: not YAML ({error})") from error
     except RecursionError:

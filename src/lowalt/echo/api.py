@@ -152,10 +152,12 @@ def echo_matrix(
 
 
 def _named(sample: str) -> str:
+    """The sample's name as the start of a message."""
     return f"{sample}: " if sample else ""
 
 
 def _check_tolerance(tolerance, sample: str) -> None:
+    """Raise InputError unless the tolerance is None or a number between 0 and 1."""
     good = tolerance is None or (isinstance(tolerance, (int, float)) and 0 < tolerance < 1)
     if not good:
         raise InputError(f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
@@ -201,6 +203,7 @@ def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) ->
 
 
 def _check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
+    """Raise InputError for a point in the station, which a kernel reports as `fault` = 1 + n L + l."""
     if fault:
         points = len(scene.part) or scene.translation.shape[1]
         n, l = divmod(fault - 1, points)  # noqa: E741

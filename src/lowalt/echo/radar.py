@@ -44,6 +44,7 @@ def constants(rows: np.ndarray) -> Exact:
 
 
 def _exact(network: Network, station: Station) -> Exact:
+    """The radar's numbers as double-doubles, rounded once from exact fractions."""
     low, spacing = Fraction(station.frequency_hz), Fraction(network.subcarrier_spacing_hz)
     carrier = Fraction(network.carrier_hz)
     kappa = low / carrier

@@ -144,4 +144,5 @@ def check_station(network: Network, station: Station) -> None:
 
 
 def _no_rotation() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Empty rotations, points and parts: the points are given by their places alone."""
     return np.zeros((0, 0, 3, 3)), np.zeros((0, 3)), np.zeros(0, np.int64)

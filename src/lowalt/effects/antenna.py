@@ -40,7 +40,7 @@ def local_gain(element: Element, ahead: np.ndarray, side: np.ndarray, up: np.nda
 
 
 def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
-    """Return the power gain (...) toward places (..., 3) m, to rounding that of `local_gain`."""
+    """Return the power gain (...) toward places (..., 3) m; it equals `local_gain` to rounding."""
     places = np.ascontiguousarray(places, np.float64)
     out = np.empty(places.shape[:-1])
     tilt, nepers = math.radians(element.downtilt_deg), math.log(10) / 10

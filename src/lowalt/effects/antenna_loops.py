@@ -30,7 +30,7 @@ def _over(x: np.ndarray) -> np.ndarray:
     return np.arctan(root) / root
 
 
-# An arctangent's series in t^2 falls by (1 + sqrt 2)^-2 an order on the whole of [0, 1], by 0.04 up to tan(pi / 8).
+# Each order of arctan's series in t^2 is (1 + sqrt 2)^-2 times the one before on [0, 1], 0.04 times up to tan(pi / 8).
 EIGHTH = math.tan(math.pi / 8)
 TURNS = 11
 """Degree of ARCTANGENT."""
@@ -53,7 +53,7 @@ def arctangent(below, above, square, turn, angle, size):
     """Fill angle[:size] with the arctangent of below / above, both at least 0; zero where both are 0."""
     for i in range(size):
         small, large = min(below[i], above[i]), max(max(below[i], above[i]), 1e-300)
-        # From tan(pi / 8) on, what the angle lacks to pi / 4.
+        # From tan(pi / 8) on, compute pi / 4 minus the angle.
         far = small > EIGHTH * large
         one, other = (large - small, large + small) if far else (small, large)
         turn[i] = one / other

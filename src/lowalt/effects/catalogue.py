@@ -143,5 +143,5 @@ def providing(effects: Iterable[NamedEffect], protocol: type) -> list[NamedEffec
 
 @lru_cache(maxsize=256)
 def _satisfies(module: ModuleType, protocol: type) -> bool:
-    """Whether a module satisfies a protocol; asking Python each time took a third of a millisecond a sample."""
+    """Whether a module satisfies a protocol. Answers are kept: asking again took 0.3 ms a sample."""
     return isinstance(module, protocol)

@@ -38,7 +38,7 @@ EXACT = 1e-13
 
 
 class Outcome(NamedTuple):
-    """Signal (N,), chosen cells (N,), and by how much the strongest cell leads (N,)."""
+    """Signal (N,), chosen cells (N,), and magnitude of the strongest cell minus that of the second (N,)."""
 
     signal: np.ndarray
     cell: np.ndarray
@@ -82,7 +82,7 @@ class Chain:
 
     @property
     def bent(self) -> bool:
-        """Whether the echo goes other ways than the direct path of Eq. 7, so that `direct` is no part of the result."""
+        """Whether `direct` is not the whole echo: the scene has further paths or physics by need."""
         return bool(self.by_need or providing(self.channel, AddsPaths))
 
     @cached_property
@@ -111,11 +111,14 @@ class Chain:
         return steering.echo(self.view, factor=self.factor, error=EXACT)
 
     def interpolation(self) -> float:
-        """Return how far interpolation over frequencies and instants may put a range cell off (units of the signal)."""
+        """Return a bound of a range cell's error by interpolation in frequency and time (units of the signal)."""
         return (2.0 if "symbol_motion" in self.by_need else 1.0) * self.error * float(self.peaks.sum(axis=1).max())
 
     def limit(self, allowed: float) -> None:
-        """Set the error of interpolation so that no range cell errs by more than `allowed`, or by rounding alone."""
+        """Set the error of interpolation so that no range cell errs by more than `allowed` (units of the signal).
+
+        Where `allowed` is below rounding, the error is that of rounding.
+        """
         self.error = EXACT
         self.error = min(max(EXACT, EXACT * allowed / self.interpolation()), COARSEST)
 
@@ -162,7 +165,7 @@ class Chain:
         return self.sending.cells(self.sending.received(samples, rows))
 
     def _responded(self, spectrum: np.ndarray) -> tuple[np.ndarray, list[NamedEffect]]:
-        """The response (N, M) after the receiver's first effects, as far as they act on responses, and the others."""
+        """The response (N, M) after the receiver's leading effects that act on responses, and the remaining effects."""
         for place, effect in enumerate(self.receiver):
             changed = None
             if providing([effect], ChangesResponse):
@@ -175,12 +178,12 @@ class Chain:
 
     @cached_property
     def own_response(self) -> np.ndarray:
-        """Subcarriers (N, M) of this target, everything asked for computed to rounding."""
+        """Subcarriers (N, M) of this target with every effect of the scene, to rounding."""
         return self._echo(self.view, frozenset(self.by_need), self.routes)
 
     @cached_property
     def own_samples(self) -> np.ndarray:
-        """Time samples (N, M) of this target, likewise."""
+        """Time samples (N, M) of this target with every effect of the scene, to rounding."""
         return self._samples(self.view, frozenset(self.by_need), self.routes, slice(None))
 
     @property
@@ -203,16 +206,16 @@ class Chain:
         return outcome if self.timing is None else self._evenly(outcome)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
-        """The outcome of the received symbols, as all N evenly spaced ones; cell -1 where none was received."""
+        """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""
         view, effect = self.view, self.timing
         cell, gap = np.full(len(view.times_s), -1), np.full(len(view.times_s), np.inf)
         cell[view.sampling.present], gap[view.sampling.present] = outcome.cell, outcome.gap
         return Outcome(effect.module.regridded(effect.settings, outcome.signal, view.sampling, view.network), cell, gap)
 
     def patched(self, outcome: Outcome, contested: np.ndarray, everything: frozenset[str]) -> Outcome:
-        """Return the outcome with contested symbols computed with everything on.
+        """Return the outcome with contested symbols computed again with all physics in `everything`.
 
-        Interpolation is then to rounding. Transmitter, receiver and detection effects reach over symbols, so with any
+        Interpolation is then to rounding. Transmitter, receiver and detection effects connect symbols, so with any
         of them the whole sample is computed again.
         """
         self.error = EXACT

@@ -79,6 +79,7 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
     station = scene.network.station(station_name)
 
     def mean(effects: tuple[NamedEffect, ...]) -> float:
+        """Mean milliseconds of the chosen samples with these effects."""
         part = Scene(scene.network, scene.seed, scene.tolerance, effects)
         times = [
             1e3 * median_s(lambda s=s: received_signal(part, station, s.cloud, s.row, s.occluders), REPEATS)
@@ -92,7 +93,7 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
 
 
 def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
-    """Return lines that say what is computed for one sample at one station, and by which bounds."""
+    """Return lines that name the effects computed for one sample at one station, with their bounds."""
     station = scene.network.station(station_name)
     cloud = with_cross_sections(scene, sample.cloud)
     view = observe(scene, station, cloud, sample.row, sample.occluders)

@@ -106,7 +106,7 @@ def received_signal(
     # Noise that an effect sets by this power must not depend on the engine's approximations.
     weighed = weighed or "cell_noise" in chain.names
     own = None
-    # The engine is asked only where the chain does not compute the same echo anyway.
+    # Call the engine only where the chain would not compute the same echo itself.
     if not link and (not exact or (chain.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
@@ -123,7 +123,7 @@ def received_signal(
     # Where the scene names only physics by need, the engine's echo is the outcome without any of it.
     alone = len(asked) == len(beyond)
     trial = Outcome(own.signal, own.cell, own.gap) if alone else chain.run(frozenset())
-    # A canceller may leave much less than the echo before it: the tolerance holds against what is left.
+    # A canceller may remove most of the echo; the tolerance is relative to the signal behind it.
     while not alone and chain.error > EXACT and chain.interpolation() > INTERPOLATION * share * largest_of(trial):
         chain.limit(0.5 * INTERPOLATION * share * largest_of(trial))
         trial = chain.run(frozenset())
@@ -173,6 +173,7 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
 
 
 def _drawn(scene: Scene, row: dict, station: str, name: str) -> np.random.Generator:
+    """Return an effect's stream: one for all stations if its draws belong to the whole look, else one a station."""
     return scene.stream(name, row) if name in LOOK_WIDE else scene.stream(name, row, station)
 
 
@@ -211,14 +212,15 @@ def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tupl
     """Return the outcome with the physics `asked` for computed by need, and the decisions.
 
     share: largest change allowed by leaving physics out, relative to the sample's largest value; trial: the outcome
-    with none of it computed. Symbols whose strongest cell the physics left out could change are computed with all.
+    with none of it computed. Where the physics that is left out could change a symbol's strongest cell, that symbol is
+    computed with all of it.
     """
     everything = frozenset(asked)
     largest = largest_of(trial)
     bounds = chain.bounds(everything)
     left, spent = need.leave_out(bounds, share, largest)
     outcome = trial if len(left) == len(asked) else chain.run(everything - set(left))
-    # The choice of cell is safe where its lead exceeds twice all that a cell may be off.
+    # The strongest cell is certain where it exceeds the second by more than twice the largest error of a cell.
     contested = outcome.gap <= 2.0 * (spent + chain.interpolation())
     if contested.any():
         outcome = chain.patched(outcome, contested, everything)

@@ -6,18 +6,17 @@ exp(-j B x u) = sum eps_p (-j)^p J_p(B x) T_p(u), |u| <= 1. No array of symbols 
 """
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import factorial, jv
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.effects import interpolation, moment_loops, near_field, response_loops
+from lowalt.effects import moment_loops, near_field, response_loops
+from lowalt.effects import response_tables as tables
 
 
 class ImagePath(NamedTuple):
@@ -63,7 +62,7 @@ def response(
 class Rays:
     """All points' one-way factors over every path at given instants, from which responses to any strengths follow.
 
-    Arguments as of `response`.
+    The arguments are those of `response`.
     """
 
     def __init__(
@@ -82,7 +81,7 @@ class Rays:
                 self.refs = _range_sum(network, station, places[:, 0])
         # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
         # tables. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
-        self.nodes = kappas = _frequencies(network, radio, squint, error / 2)
+        self.nodes = kappas = tables.frequencies(network, radio, squint, error / 2)
         self.rest = 10.0 ** np.floor(np.log10(error / 10))
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
@@ -94,8 +93,9 @@ class Rays:
     def summed(self, strength: np.ndarray) -> np.ndarray:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
 
-        strength: also (R, N, L), factors of their own for each path there and back; out by one path and back by another
-        they are the geometric means. Symbols without any strength are zero.
+        strength: also (R, N, L), factors of their own for each path there and back; for a way
+        out by path a and back by path b, the factor is the geometric mean of those of a and b. Symbols without any
+        strength are zero.
         """
         radio, refs = self.radio, self.refs
         strength = radio.scale * np.atleast_2d(strength)
@@ -106,8 +106,8 @@ class Rays:
             there, home = self.out[a], self.back[b]
             # Each pair's ranges are measured from their own middle, so that few orders of its moments matter.
             middle = 0.5 * radio.cells * (there.middle + home.middle)
-            reach = _round_up(0.5 * radio.cells * (there.reach + home.reach))
-            bessel = _table(reach, radio.subcarriers, self.rest)
+            reach = tables.round_up(0.5 * radio.cells * (there.reach + home.reach))
+            bessel = tables.table(reach, radio.subcarriers, self.rest)
             orders = np.empty((len(refs), 2, len(self.nodes), len(bessel)))
             paired = strength
             if own_routes:
@@ -118,7 +118,7 @@ class Rays:
             )  # fmt: skip
             planes, table = orders.reshape(2 * len(refs), -1), bessel
             if len(self.nodes) > 1:
-                mix, table = _joined(reach, len(self.nodes), radio.subcarriers, self.rest)
+                mix, table = tables.joined(reach, len(self.nodes), radio.subcarriers, self.rest)
                 planes = planes @ mix
             planes = (planes @ table).reshape(len(refs), 2, -1)
             moment_loops.delayed(planes, own, whole, refs[:, 6] + middle, result)
@@ -157,7 +157,7 @@ def _range_sum(network: Network, station: Station, origin: np.ndarray) -> np.nda
 
 
 def _one_way(network: Network, station: Station, origin: np.ndarray) -> np.ndarray:
-    """Reference ranges with the turns and range cells of one way. Halves of doubles are exact, and so are these."""
+    """Reference ranges with half of the two-way turns and range cells. Halving a double is exact."""
     radio = radar(network, station)
     halves = {name: 0.5 * getattr(radio, name) for name in ("turns", "turns_lo", "cells", "cells_lo")}
     return reference(origin, radio._replace(**halves))
@@ -186,7 +186,9 @@ class _PathFactors:
         if wavefront:
             gains = np.empty_like(out)
             centre = 0.5 * (kappas.min() + kappas.max())
-            series = _series(np.pi * (kappas - centre) / spacing, spacing * _half_diagonal(shape), error / 40)
+            series = tables.series(
+                np.pi * (kappas - centre) / spacing, spacing * tables.half_diagonal(shape), error / 40
+            )
             array = near_field.Arrays(
                 radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
                 response_loops.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
@@ -205,98 +207,8 @@ class _PathFactors:
         return _OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
 
 
-def _half_diagonal(shape: tuple[int, int]) -> float:
-    """Distance of an array's corner from its middle, in spacings: the largest difference of an element's path."""
-    return 0.5 * float(np.hypot(shape[0] - 1, shape[1] - 1))
-
-
-def _series(rates: np.ndarray, longest: float, error: float) -> np.ndarray:
-    """Coefficients (Q, K) of exp(-j rate s) as a series in s, |s| <= `longest`; K keeps the rest below `error`."""
-    band = float(abs(rates).max()) * longest
-    count, term = 1, band
-    # The terms left out sum to at most e^band times the first of them.
-    while term * np.exp(band) > error:
-        count += 1
-        term *= band / count
-    order = np.arange(count)
-    return (-1j * rates[:, None]) ** order / factorial(order)
-
-
 def _pairs(paths: int, symmetric: bool) -> list[tuple[int, int, float]]:
-    """Paths out and back, and how often each pair counts: with equal arrays, (a, b) and (b, a) are the same."""
+    """Pairs (path out, path back) and their weights; with equal arrays, (a, b) stands for (b, a) too."""
     if symmetric:
         return [(a, b, 1.0 if a == b else 2.0) for a in range(paths) for b in range(a, paths)]
     return [(a, b, 1.0) for a in range(paths) for b in range(paths)]
-
-
-def _round_up(value: float) -> float:
-    """Return the next power of sqrt(2), so that a few tables serve all samples."""
-    return 2.0 ** (np.ceil(2 * np.log2(max(value * (1 + 1e-12), 2.0**-5))) / 2)
-
-
-@lru_cache(maxsize=64)
-def _table(reach: float, count: int, error: float) -> np.ndarray:
-    """Matrix (P, M): eps_p J_p(2 pi (m - (M-1)/2) reach / M), the terms left out sum to less than `error`.
-
-    P is a multiple of moment_loops.BLOCK.
-    """
-    return _bessel(_orders(reach, error), 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count)
-
-
-def _orders(reach: float, error: float) -> int:
-    """Number of orders of the expansion over `reach` cells, rounded up to a whole block."""
-    band = np.pi * reach
-    order = int(band) + 1
-    # From this order on, J_p falls by more than a factor of two from order to order.
-    while 4.0 * abs(jv(order + 1, band)) > error:
-        order += 1
-    return _whole_blocks(order + 1)
-
-
-def _whole_blocks(count: int) -> int:
-    return -(-count // moment_loops.BLOCK) * moment_loops.BLOCK
-
-
-def _bessel(orders: int, x: np.ndarray) -> np.ndarray:
-    """Matrix (orders, len(x)): eps_p J_p(x)."""
-    p = np.arange(orders)
-    return np.where(p == 0, 1.0, 2.0)[:, None] * jv(p[:, None], x)
-
-
-@lru_cache(maxsize=64)
-def _joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
-    """Matrix (nodes x P, K) from moments at `nodes` frequencies to Chebyshev orders over the band, and these orders'
-    values (K, M) at the subcarriers.
-
-    An entry of the moments is at most the sum of amplitudes, so the orders left out change a response by at most the
-    sum of their coefficients, which is below `error`.
-    """
-    band = np.pi * reach * (count - 1) / count
-    orders = _orders(reach, error)
-    # The products are entire functions: four times as many points as orders leave nothing to fold.
-    fine = 4 * (nodes + orders)
-    x = interpolation.points(fine)
-    weights, bessel = interpolation.weights(nodes, x), _bessel(orders, band * x)
-    values = (weights.T[:, None] * bessel).reshape(nodes * orders, fine)
-    mix = values @ interpolation.coefficients(fine).T
-    kept = 1 + int(np.flatnonzero(abs(mix).sum(axis=0)[::-1].cumsum()[::-1] > error)[-1])
-    place = np.arccos(np.linspace(-1.0, 1.0, count))
-    return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
-
-
-def _frequencies(network: Network, radio: Radar, squint: bool, error: float) -> np.ndarray:
-    """Frequencies (Q,) over the carrier at which the arrays are evaluated: Chebyshev points of the band.
-
-    The phase of an array's middle counts as range. Only the elements' paths relative to the middle's remain, so they
-    alone decide how many frequencies are needed.
-    """
-    count = radio.subcarriers
-    if not squint or count == 1:
-        return np.array([radio.kappa])
-    half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
-    band = np.pi * half * (_half_diagonal(network.transmit) + _half_diagonal(network.receive))
-    # Interpolation of exp(j B x) errs by at most 4 sum over p >= nodes of |J_p(B)|; each J_p is below half the last.
-    nodes = int(band) + 2
-    while 8.0 * abs(jv(nodes, band)) > error:
-        nodes += 1
-    return radio.kappa + half + half * interpolation.points(nodes)

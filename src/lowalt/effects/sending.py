@@ -59,26 +59,29 @@ class Sending:
         return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) / self.known[rows]
 
     def still(self, spectrum: np.ndarray, prefix: NamedEffect | None, offset_cells: float = 0.0) -> np.ndarray:
-        """Return time samples (N, M) of responses (N, M); beyond a `prefix` cells begin with the previous symbol.
+        """Return time samples (N, M) of responses (N, M). With a `prefix`, later cells begin with the previous symbol.
 
-        offset_cells: how far the echoes stand beyond their cells' centres; the symbols are then so much later.
+        offset_cells: distance of the echoes beyond their cells' centres; the symbols arrive later by as much.
         """
         if prefix is None:
             return waveform.transmit(spectrum, self.aired)
         later = np.exp(-2j * np.pi * offset_cells * np.arange(spectrum.shape[1]) / spectrum.shape[1])
         whole, spectrum = np.broadcast_to(later, self.aired.shape), spectrum * later.conj()
         symbols = waveform.transmit(whole, self.aired), waveform.transmit(whole, self.aired_before)
-        # Range cells start at the lowest subcarrier, samples at the oscillator's, so that cells turn by pi each.
+        # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2 higher, in samples:
+        # the phase turns by pi from cell to cell.
         cells = np.fft.ifft(np.fft.ifftshift(spectrum, axes=1), axis=1)
         return prefix.module.convolved(prefix.settings, self.network, cells, symbols)
 
     def _drawn(self, name: str) -> np.ndarray:
+        """The data (N, M) of one look, drawn: QPSK unless an effect chooses them."""
         shape = self.network.symbols, self.network.subcarriers
         if self.source is None:
             return waveform.sent(self.draws(name), *shape)
         return self.source.module.data(self.source.settings, *shape, self.draws(name))
 
     def _amplified(self, data: np.ndarray) -> np.ndarray:
+        """The subcarriers (N, M) on the air for these data, after all amplifier effects."""
         for effect in self.amplifiers:
             data = effect.module.aired(effect.settings, data)
         return data

@@ -42,13 +42,13 @@ def summed(places, middle, half, terms, work, out):
 def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
     """Return the complex values of a smooth function at real places (any shape), to rounding; `function` is pointwise.
 
-    Terms are doubled until the last quarter of them no longer counts. Source: Aurentz & Trefethen, Chopping a Chebyshev
-    series, ACM Trans. Math. Softw. 43(4), 2017, whose plateau is this quarter.
+    The number of terms is doubled until the last quarter of them is below rounding. Source: Aurentz & Trefethen,
+    Chopping a Chebyshev series, ACM Trans. Math. Softw. 43(4), 2017, whose plateau is this quarter.
     """
     low, high = float(places.min()), float(places.max())
     middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1e-12)
     count = 8
-    # A few places cost less than the series.
+    # For few places, calling the function itself costs less than the series.
     while count <= LONGEST and 4 * count < places.size:
         nodes = middle + half * np.cos(np.pi * (np.arange(count) + 0.5) / count)
         found = np.asarray(function(nodes), np.complex128)

@@ -37,7 +37,10 @@ class Steered:
             self.beams.append((rows, _kept_phase(view, aim), Rays(*given, view.places[rows], aim, some, **asked)))
 
     def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
-        """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`, zero where it is."""
+        """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`.
+
+        Symbols in which the factor is zero for all points are zero.
+        """
         view, roots = self.view, np.sqrt(self.view.cloud.rcs_m2)
         if view.beams is None or len(view.beams.starts_s) == 1:
             return self.beams[0][2].summed(roots * factor)
@@ -53,7 +56,7 @@ def _rows_of(values: np.ndarray | complex, rows: np.ndarray) -> np.ndarray | com
 
 
 def _kept_phase(view: View, aim_m: np.ndarray) -> complex:
-    """Phase that undoes the turn of both arrays' middles from the first beam to one at `aim_m`."""
+    """Phase factor that cancels the phase change of both arrays' middles from the first beam to the beam at `aim_m`."""
     radio = radar(view.network, view.station)
     (h0, v0), (h1, v1) = (
         aim_cosines(np.asarray(aim, np.float64), radio.station, radio.sine, radio.cosine) for aim in (view.aim_m, aim_m)

@@ -1,4 +1,4 @@
-"""How exactly a signal must be computed before a converter, where no bound holds but a mean square does."""
+"""The error allowed before a converter: its steps leave no bound of the largest error, only of the mean square."""
 
 import math
 
@@ -8,7 +8,7 @@ from lowalt.effects.interface import Amplifies, ChoosesCells, Quantises
 
 
 def steps_alone(chain: Chain) -> bool:
-    """Return whether converters alone keep errors of range cells from staying small; choices of cells do not count."""
+    """Return whether converters are the only effects without a bound of an error, apart from choices of cells."""
     named = providing((*chain.transmitter, *chain.receiver, *chain.detection), Amplifies)
     sudden = [effect for effect in named if math.isinf(effect.module.amplifies(effect.settings))]
     steps, choices = providing(sudden, Quantises), providing(sudden, ChoosesCells)
@@ -31,5 +31,5 @@ def error_before(chain: Chain, allowed: float) -> float:
     fits = allowed
     if chain.step > 0:
         fits = min(allowed, allowed**2 * math.sqrt(0.5 * chain.view.network.subcarriers) / chain.step)
-    # Where nothing reaches the converter, any error fits.
+    # Without an echo, any error is small enough.
     return min(max(EXACT, fits / strongest), COARSEST) if strongest > 0 else COARSEST

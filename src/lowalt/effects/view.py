@@ -135,6 +135,7 @@ class View:
 
     @cached_property
     def _boxes(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Lowest and highest corner (3,) of each part's points (m), in the part's own frame; zeros without points."""
         mine = [self.cloud.points[self.cloud.part == part] for part in range(len(self.cloud.kinds))]
         return [(p.min(axis=0), p.max(axis=0)) if len(p) else (np.zeros(3), np.zeros(3)) for p in mine]
 
@@ -153,6 +154,7 @@ def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturba
     """A perturbation at other times: linear between the symbols, exact on them."""
 
     def table(values: np.ndarray | None) -> np.ndarray | None:
+        """Values (G, 3) at the times (K,): (K, 3)."""
         if values is None:
             return None
         return np.stack([np.interp(times_s, grid_s, values[:, axis]) for axis in range(3)], axis=1)

@@ -55,6 +55,7 @@ def naive(net: Network, station: Station, points_m: np.ndarray, rcs_m2: np.ndarr
     """Return the strongest cell's value of one symbol by the closed form as first written down (paper, Eq. 24).
 
     points_m (L, 3), rcs_m2 (L,), aim_m (3,). Angles, sin(N u) / sin(u) and one phase in float64: NaN at 0/0.
+    `terms.dirichlet` has the limits at 0/0; this formula leaves them out, because the table shows where it fails.
     """
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")

@@ -19,8 +19,8 @@ from lowalt.shards.write import write_shard
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
-    Settings: seed, network, snr_db, split, shards {kind}; in a scene with these effects also companions, and for recipe
-    shards canceller: their settings.
+    Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions in a scene that has them, and
+    those of canceller for recipe shards.
     """
     options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     options.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -75,6 +75,7 @@ def index(arguments: list[str]) -> None:
 
 
 def _clouds_option(options: argparse.ArgumentParser) -> None:
+    """Add the options that name the folders of clouds and surfaces."""
     options.add_argument("--clouds", help="folder of the run's cloud files (default: ../clouds)")
     options.add_argument("--occluders", help="folder of the run's surface files (default: occluders next to clouds)")
 
@@ -105,7 +106,7 @@ def verify(arguments: list[str]) -> None:
 
 
 def remake(arguments: list[str]) -> None:
-    """Make samples again from their records; print what differs and end with status 1 where anything does."""
+    """Make samples again from their records; print each difference, and end with status 1 if there is one."""
     options = argparse.ArgumentParser(prog="python -m lowalt.shards remake", description=remake.__doc__)
     options.add_argument("--index", required=True, help="the data set's index")
     options.add_argument("--sample", required=True, nargs="+", metavar="KEY", help="keys of the samples")

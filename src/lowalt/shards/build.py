@@ -61,10 +61,11 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     group, _, part = chunk.partition("-")
     if chunk in plan.sources:
         write_table(folder / "motion" / f"{chunk}.csv", rows)
-    # A shard's samples are shuffled, so the echoes of all its motion models are kept meanwhile.
+    # A shard's samples are shuffled, so the echoes of all its motion models are kept until it is written.
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> bytes:
+        """Bytes of the data member of one sample: row `number` at SNR `level` of the chunk."""
         if kind == "recipe":
             return npy(maker.received(rows[number])[0])
         signal = maker.signal(rows[number], levels[level])

@@ -20,10 +20,10 @@ from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, sha256, text_of
 from lowalt.common.network import station_names
-from lowalt.common.splits import FOLDS
 from lowalt.shards import sums
 from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
+from lowalt.shards.hub import TAGS, front
 from lowalt.shards.read import ShardSet
 
 SLUG = re.compile(r"(.+)-\d{6}-snr")
@@ -31,7 +31,6 @@ PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Al
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
 
 AUTHORS = "The lowalt authors"
-TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
 
 ODDITIES = """\
 - Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
@@ -53,6 +52,7 @@ LIMITS = """\
 
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
+    """Return a Markdown table."""
     lines = [header, tuple("---" for _ in header), *rows]
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
 
@@ -103,6 +103,7 @@ def write_samples(shards: ShardSet, path: Path) -> None:
     owners = np.repeat(np.arange(len(shards.shards)), [entry["samples"] for entry in shards.shards])
 
     def rows() -> Iterator[tuple]:
+        """One row of the table for each sample."""
         for key, label, number, model, snr_db, owner in zip(*columns, owners, strict=True):
             entry, record = shards.shards[owner], records[number]
             row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
@@ -120,57 +121,6 @@ def description(shards: ShardSet) -> str:
         "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
         "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
     )
-
-
-def size_category(samples: int) -> str:
-    """Return the hub's word for a number of samples, such as "10K<n<100K"."""
-    steps = ["1K", "10K", "100K", "1M", "10M", "100M", "1B"]
-    place = sum(samples >= 10 ** (index + 3) for index in range(len(steps)))
-    if place in (0, len(steps)):
-        return f"n<{steps[0]}" if place == 0 else f"n>{steps[-1]}"
-    return f"{steps[place - 1]}<n<{steps[place]}"
-
-
-def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
-    """Return a pattern that matches the shards of a group and fold, or else the names themselves."""
-    names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
-    usual = f"{group}-{fold}-"
-    return [f"{usual}*.tar"] if all(name.startswith(usual) for name in names) else names
-
-
-def configs(shards: ShardSet) -> list[dict]:
-    """Return the protocols as a hub's configurations: for each its splits and the shards of each split.
-
-    Shards are matched by group and fold in their names, so the list stays short for thousands of them.
-    """
-    present = {(entry["group"], entry["fold"]) for entry in shards.shards}
-    hub = {"train": "train", "val": "validation", "test": "test"}
-    result: list[dict] = []
-    for protocol in ("seen", "unseen"):
-        files: dict[str, list[str]] = {}
-        for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):
-            # In the unseen protocol all folds of the unseen group are tests, and the seen group has no test.
-            both = protocol == "seen" or group == "seen"
-            if protocol == "unseen" and group == "seen" and fold == "test":
-                continue
-            files.setdefault(hub[fold] if both else "test", []).extend(patterns(shards, group, fold))
-        if protocol == "unseen" and not any(group == "unseen" for group, _ in present):
-            continue
-        splits = [{"split": split, "path": files[split]} for split in hub.values() if split in files]
-        result.append({"config_name": protocol, "data_files": splits})
-    if result:
-        result[0]["default"] = True
-    return result
-
-
-def front(shards: ShardSet, name: str, license_name: str) -> dict:
-    """Return the metadata block at the head of the data card, as dataset hubs read it."""
-    return {
-        "pretty_name": name, "license": license_name.lower(), "language": ["en"],
-        "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
-        "configs": configs(shards),
-        "tags": TAGS,
-    }  # fmt: skip
 
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
@@ -247,7 +197,7 @@ def zenodo(shards: ShardSet, name: str, license_name: str) -> dict:
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
     """Write README.md, samples.csv, croissant.json and .zenodo.json next to an index, and the checksums of all of it.
 
-    facts: what Croissant should say besides, such as `url` and `datePublished`.
+    facts: further properties of the Croissant description, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
     """
     if license_name not in LICENSES:

@@ -2,8 +2,8 @@
 
 A sample of such a shard has two members: {subtype}-{model}.clean.npy holds the echoes without noise, and the record of
 the same key has lists at `snr_db` and `noise`. In a scene with effects the record also names the powers that the SNRs
-refer to, and the canceller that the noise passes. From these follow record and signals of each sample, equal in every
-byte to those of a shard of signals.
+refer to, and the canceller that the noise passes. Record and signals of each sample follow from these, byte for byte
+as in a shard of signals.
 """
 
 import functools

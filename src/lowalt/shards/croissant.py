@@ -84,8 +84,8 @@ OF = {"image": "sample", "signal": "sample", "recipe": "motion model"}
 def metadata(index: dict, table: dict, facts: dict) -> dict:
     """Return the Croissant description (JSON-LD) of a data set by its index.
 
-    table: path, bytes and sha256 of the table of samples; facts: name, description, version, license, and what else
-    is known (url, datePublished). Paths are relative to the folder of the description.
+    table: path, bytes and sha256 of the table of samples; facts: name, description, version, license, and further
+    properties that are known (url, datePublished). Paths are relative to the folder of the description.
     """
     kind = index["kind"]
     files = [
@@ -117,6 +117,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
 
 
 def _file(entry: dict, mime: str, meaning: str) -> dict:
+    """One file, with its size and checksum."""
     return {
         "@type": "cr:FileObject", "@id": entry["name"], "name": entry["name"], "contentUrl": entry["path"],
         "contentSize": f"{entry['bytes']} B", "encodingFormat": mime, "sha256": entry["sha256"], "description": meaning,
@@ -124,6 +125,7 @@ def _file(entry: dict, mime: str, meaning: str) -> dict:
 
 
 def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str) -> dict:
+    """All files that match `pattern` in the files or sets `inside`."""
     return {
         "@type": "cr:FileSet", "@id": name, "name": name, "containedIn": inside, "encodingFormat": mime,
         "includes": pattern, "description": meaning,

@@ -1,6 +1,6 @@
-"""A data set as a function: every sample is made when it is asked for, the same bytes as in the shards.
+"""A data set that makes each sample when it is asked for, with the same bytes as in the shards.
 
-No torch here: `Dataset` has a length and numbered samples, which is what `torch.utils.data.DataLoader` takes, and
+Torch is not imported: `Dataset` has a length and numbered samples, as `torch.utils.data.DataLoader` expects, and
 `Endless` is an iterable; both can be pickled, so workers of any framework make samples of their own.
 """
 
@@ -101,13 +101,14 @@ class Dataset:
 
     @functools.cached_property
     def _numbers(self) -> np.ndarray | None:
-        """Numbers, counted over all folds, of the samples of the chosen folds; None where all are chosen."""
+        """Numbers of the chosen folds' samples, counted over all folds; None if all folds are chosen."""
         if set(self.folds) == set(FOLDS):
             return None
         return np.array([n for n in range(self._all) if self._fold(self._place(n)) in self.folds], np.int64)
 
     @property
     def _all(self) -> int:
+        """Number of samples of the chosen groups in all folds."""
         subtypes = sum(len(self.plan.groups[group]) for group in self.groups)
         return subtypes * self.plan.models * len(self.plan.snrs)
 
@@ -115,7 +116,7 @@ class Dataset:
         return self._all if self._numbers is None else len(self._numbers)
 
     def _place(self, number: int) -> Place:
-        """Return the sample that a number, counted over all folds, stands for."""
+        """Return the place of the sample with this number, counted over all folds."""
         rest, level = divmod(number, len(self.plan.snrs))
         for group in self.groups:
             names = self.plan.groups[group]
@@ -136,6 +137,7 @@ class Dataset:
         return self._place(number if self._numbers is None else int(self._numbers[number]))
 
     def _fold(self, place: Place) -> str:
+        """Fold of a sample."""
         return fold(self.plan.split, self.plan.seed, place.subtype, place.model, place.snr_db)
 
     def row(self, place: Place) -> dict:
@@ -199,13 +201,13 @@ class Dataset:
 
 
 class Endless:
-    """Samples without end: motion models from a first number on, each at all SNRs, every subtype once a model number.
+    """An endless sequence of samples: from a first motion model on, each model number of every subtype at all SNRs.
 
     `part` of `parts` (a worker, a rank) takes every `parts`-th motion model, so no two parts make the same sample.
     """
 
     def __init__(self, dataset: Dataset, first: int | None = None, part: int = 0, parts: int = 1) -> None:
-        """Begin at model `first`, by default at the first that the configuration does not count.
+        """Begin at model `first`; the default is the first model after those of the configuration.
 
         Raises: InputError where the part is not below the number of parts.
         """

@@ -67,6 +67,10 @@ def _checksum(index: dict) -> str:
 
 
 def _relative(shard: Path, index: Path) -> str:
+    """Path of a shard relative to the folder of the index.
+
+    Raises: InputError where the shard is not below that folder.
+    """
     try:
         return shard.resolve().relative_to(index.resolve().parent).as_posix()
     except ValueError:

@@ -1,4 +1,4 @@
-"""One sample made on the spot, from a row of the motion table and the target's cloud: echo, noise, image.
+"""One sample, made from a row of the motion table and the target's cloud: echo, noise, image.
 
 It runs the stages' own functions on one row, so its bytes are those that the stages write.
 """
@@ -51,7 +51,8 @@ class Maker:
 
     def received(self, row: dict, snr_db: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
         """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
-        refer to, None where they are the echoes' own. With an SNR (dB), echoes hold noise in all range cells.
+        refer to, None where these are the echoes' powers. With an SNR (dB), the echoes include noise of all range
+        cells.
 
         Raises: InputError naming the sample that cannot be computed.
         """
@@ -63,6 +64,7 @@ class Maker:
         return self._received[key]
 
     def _listen(self, row: dict, snr_db: float | None) -> tuple[np.ndarray, np.ndarray | None]:
+        """Compute `received` for a motion model whose echoes are not kept."""
         names = [station.name for station in self.network.stations]
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:

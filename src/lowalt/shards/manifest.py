@@ -1,7 +1,7 @@
-"""The manifest of a run: the SHA-256 of every file that follows from configuration and version alone.
+"""The manifest of a run: the SHA-256 of every file that configuration and version determine.
 
 One line a file, as `sha256sum` writes and checks it, in the order of the stages; a rebuilt run is compared with it, and
-the first stage that differs is named: the stages after it differ because it does.
+the first stage that differs is named, since all stages after it then differ too.
 """
 
 import argparse

@@ -1,6 +1,6 @@
-"""Map-style access to the samples of shards: any sample at any time, checked on every access.
+"""Access to the samples of shards by number, in any order; each access checks the sample.
 
-No torch here: a data set of any framework is `len` and one of the methods below.
+Torch is not imported: `len` and one of the methods below make a data set of any framework.
 """
 
 import functools
@@ -60,6 +60,7 @@ class ShardSet:
         return {**kept, "_tables": {}}
 
     def _path(self, shard: int) -> Path:
+        """Path of a shard by its place in the index."""
         return self.index_path.parent / self.shards[shard]["path"]
 
     def _table(self, shard: int) -> np.ndarray:
@@ -73,6 +74,7 @@ class ShardSet:
         return self._tables[shard]
 
     def _locate(self, number: int) -> tuple[int, int]:
+        """A sample's shard and its row in the table of that shard."""
         number = int(number)
         if not 0 <= number < len(self):
             raise IndexError(f"sample {number}: expected 0 to {len(self) - 1}")
@@ -84,10 +86,10 @@ class ShardSet:
         shard, place = self._locate(number)
         row, path = self._table(shard)[place], existing(self._path(shard), "shard")
         first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
-        # Without a check the member alone is read: a record is a hundredth of its sample's bytes.
+        # Without a check, read the member alone: a record has a hundredth of its sample's bytes.
         offset, size = (int(row["offset"]), int(row["size"])) if self.check else (first, length)
-        # Opened for each sample: a data set may have more shards than a process may have open files, and a memory map
-        # of a file cut short would end the process.
+        # Open the shard for each sample: a data set may have more shards than a process may have open files, and a
+        # memory map of a file cut short would end the process.
         with path.open("rb") as file:
             file.seek(offset)
             span = file.read(size)
@@ -96,6 +98,7 @@ class ShardSet:
         return span[first - offset : first - offset + length]
 
     def _column(self, name: str) -> np.ndarray:
+        """One column of the tables of all shards, (n,)."""
         parts = [self._table(shard)[name] for shard in range(len(self.shards))]
         return np.concatenate(parts) if parts else np.zeros(0)
 
@@ -135,7 +138,7 @@ class ShardSet:
         return self._column("snr_db").astype(float)
 
     def members(self, number: int) -> tuple[bytes, bytes]:
-        """Return record and data of a sample as they are stored; of recipe shards, as signal shards would store them.
+        """Return record and data of a sample as stored; for recipe shards, as a signal shard would store them.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
@@ -144,6 +147,7 @@ class ShardSet:
         return self._bytes(number, "record"), self._bytes(number, "data")
 
     def _snr_db(self, number: int) -> float:
+        """SNR of a sample (dB)."""
         shard, place = self._locate(number)
         return float(self._table(shard)[place]["snr_db"])
 
@@ -180,7 +184,7 @@ class ShardSet:
         return noisy(json.loads(self._bytes(number, "record")), stored, stations, self._snr_db(number))
 
     def tile(self, number: int) -> np.ndarray:
-        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered: the same pixels from all kinds.
+        """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered; all kinds of shards give the same pixels.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
@@ -221,6 +225,7 @@ class ShardSet:
         return [len(spectra) * known.index(station) + spectra.index(view) for station in stations for view in views]
 
     def _need(self, *kinds: str) -> None:
+        """Raise InputError unless the shards are of one of these kinds."""
         if self.kind not in kinds:
             wanted = " or ".join(map(repr, kinds))
             raise InputError(f"{self.index_path}: shards of kind {self.kind!r}, expected {wanted}")

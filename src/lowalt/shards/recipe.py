@@ -1,4 +1,4 @@
-"""A data set that travels as a recipe: clouds, configuration, version and checksums in one tar of a few megabytes.
+"""A recipe of a data set: clouds, configuration, version and checksums in one tar of a few megabytes.
 
     python -m lowalt.shards.recipe pack --run results/default --out default.recipe.tar
     python -m lowalt.shards.recipe unpack default.recipe.tar --out folder
@@ -37,7 +37,7 @@ def pack(folder: str | Path, path: str | Path) -> int:
     """
     folder = Path(folder)
     config = load_yaml(folder / "config.yaml")
-    # Opened for its checks: a configuration that no data set follows from makes no recipe.
+    # Open the data set for its checks: a configuration that makes no data set makes no recipe.
     dataset = Dataset(config, CloudFolder(folder / "clouds"))
     lines = manifest.text(folder).splitlines(keepends=True)
     kept = [line for line in lines if manifest.stage_of(line.partition("  ")[2]) in COVERED]
@@ -45,7 +45,7 @@ def pack(folder: str | Path, path: str | Path) -> int:
         raise InputError(f"{folder}: has no shards, expected the folder of a finished run")
     head = {"format": FORMAT, "lowalt": __version__, "config": plain(config), "published": dataset.published}
     members = {
-        # The order of the published rows is that of the classes, so keys are not sorted.
+        # The order of the published rows decides the order of the classes, so keys are not sorted.
         "recipe.json": json.dumps(head, indent=1).encode(),
         "manifest.sha256": "".join(kept).encode(),
         **{f"clouds/{file.name}": file.read_bytes() for file in sorted((folder / "clouds").glob("*.npz"))},
@@ -61,7 +61,7 @@ def pack(folder: str | Path, path: str | Path) -> int:
 def _extracted(path: Path, folder: Path) -> dict:
     """The recipe's head; its other members are unpacked into `folder`."""
     try:
-        # Not compressed and no sparse members, so what is unpacked is never larger than the file.
+        # Refuse compression and sparse members: the unpacked files are then never larger than the tar.
         with tarfile.open(existing(path, "recipe"), "r:") as archive:
             if any(not (member.isfile() or member.isdir()) or member.issparse() for member in archive):
                 raise InputError(f"{path}: has members that are no plain files, expected a recipe")

@@ -39,7 +39,7 @@ def sample_key(subtype: str, model: int, snr_db: float) -> str:
 
 
 def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
-    """Return the digest that orders the samples of a shard: a shuffle that depends on each sample's name alone."""
+    """Return the digest that orders a shard's samples: a shuffle by each sample's name alone."""
     return digest(seed, "order", subtype, model, "inf" if math.isinf(snr_db) else float(snr_db))
 
 
@@ -48,12 +48,12 @@ NO_NOISE_DB = 300.0
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of all that decides a sample's bytes: this package alone."""
+    """Return the versions that decide a sample's bytes: that of this package alone."""
     return {"lowalt": __version__}
 
 
 def geometry(row: dict, network: Network) -> dict[str, dict[str, float]]:
-    """Return what each station sees of the target's reference point at the first symbol.
+    """Return range, direction and speed of the target's reference point from each station at the first symbol.
 
     range_m; psi and omega, the direction cosines along the array's horizontal and vertical axis; radial_mps,
     positive receding; NaN where the row has no place, as a measured target's. A link has the means of both stations'
@@ -86,14 +86,13 @@ def _seen(row: dict, station: Station) -> dict[str, float]:
 def record(
     row: dict, snr_db: float, fold: str, seed: int, network: Network, classes: tuple[str, ...] = CATEGORIES
 ) -> bytes:
-    """Return the JSON record of one sample: who it is, how it moves, what each station sees, what made it.
+    """Return the JSON record of one sample: name, class, motion, geometry for each station, seed and versions.
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
-    whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Of a recorded target whose place nobody knows,
-    unknown numbers are null. Where `row` has the key `companions`, the subtypes of the other targets in the beam, the
-    record has it too; the label is the row's own target's. classes: in the order of their
-    labels.
-    Raises: InputError where the row's category is no class.
+    whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Numbers that are unknown are null, as for a
+    recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
+    targets in the beam, the record has it too; the label is the row's own target's. classes: in the order of their
+    labels. Raises: InputError where the row's category is no class.
     """
     names = ("subtype", "category", "group", "model")
     motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
@@ -122,14 +121,14 @@ def accompanied(row: dict, effects: dict, seed: int) -> dict:
     """Return the row and the subtypes that the scene's effects put next to its target, or the row alone."""
     if "companions" not in effects:
         return row
-    # Most runs have no companions and must not pay for the module.
+    # Most runs have no companions, so the module is loaded only for those that have.
     from lowalt.effects.channel.companions import listed
 
     return {**row, "companions": listed(effects["companions"] or {}, seed, row)}
 
 
 def row_of(entry: dict) -> tuple[dict, float]:
-    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a record tells.
+    """Return the motion table's row (0 where a number does not apply) and the SNR (dB) that a record holds.
 
     Raises: InputError naming the sample where the record is of an older format.
     """

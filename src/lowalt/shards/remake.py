@@ -59,7 +59,7 @@ class Remaker:
         self._makers: dict[int, Maker] = {}
 
     def made(self, entry: dict) -> tuple[bytes, bytes]:
-        """Return record and data (PNG or .npy) of the sample that a record tells of.
+        """Return record and data (PNG or .npy) of the sample that a record describes.
 
         Raises: InputError naming the sample whose record is too old or whose cloud is missing.
         """
@@ -75,7 +75,7 @@ class Remaker:
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data
 
     def faults(self, number: int) -> list[str]:
-        """Return one line for each member of a sample that comes out otherwise than it is stored.
+        """Return one line for each member of a sample that differs from the stored one.
 
         Raises: InputError as `made`, or where the stored sample is damaged.
         """
@@ -101,7 +101,7 @@ def number_of(shards: ShardSet, key: str) -> int:
 
 
 def some(shards: ShardSet, count: int) -> list[int]:
-    """Return the numbers of `count` samples drawn by the index's own checksum, or of all where there are no more."""
+    """Return the numbers of `count` samples drawn with the index's checksum as seed, or of all if there are fewer."""
     draws = stream(0, "remake", shards.index["sha256"])
     return sorted(draws.choice(len(shards), min(count, len(shards)), replace=False).tolist())
 

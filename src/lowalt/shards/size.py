@@ -1,4 +1,4 @@
-"""How large a chunk must be for shards of a wanted size, known before anything is made."""
+"""The size of a chunk for shards of a wanted size, computed before anything is made."""
 
 import argparse
 
@@ -17,7 +17,7 @@ IMAGE_BYTES = 300_000
 
 
 def sample_bytes(kind: str, stations: int, symbols: int, snrs: int = 1) -> int:
-    """Return about how many bytes a sample takes in a shard of a kind, all padding included.
+    """Return the approximate bytes of a sample in a shard of a kind, padding included.
 
     kind: "image", "signal" or "recipe"; snrs: SNRs of each motion model, which share one echo in a recipe shard.
     """

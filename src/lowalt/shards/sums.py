@@ -1,8 +1,8 @@
 """SHA256SUMS in the folder of the index: one line for every other file of a data set, in the form of `sha256sum`.
 
 Each checksum stands in a file that is written later: a sample's in its shard's table, the tables' and shards' in the
-index, the index's and the data card's here. SHA256SUMS itself needs none: its text follows from the files it names,
-so a changed byte of it contradicts one of them.
+index, the index's and the data card's here. SHA256SUMS itself needs none: its text follows from the files that it
+names, so a changed byte of it contradicts one of them.
 """
 
 import re
@@ -27,6 +27,7 @@ def _of_index(index: dict) -> dict[str, str]:
 
 
 def _text(sums: dict[str, str]) -> str:
+    """Text of SHA256SUMS, sorted by file name."""
     return "".join(f"{checksum}  {name}\n" for name, checksum in sorted(sums.items()))
 
 

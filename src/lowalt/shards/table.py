@@ -3,7 +3,7 @@
     header    str, JSON: name, kind, group, fold, samples, bytes, sha256
     samples   (n,) structured, in the order of the tar (offsets and sizes in bytes)
 
-The table is stored uncompressed, so that a loader maps it into memory and a million samples cost it nothing.
+The table is stored uncompressed, so that a loader maps it into memory instead of reading it.
 """
 
 import json

@@ -46,6 +46,7 @@ class Writer:
         self._file, self._hash, self.size = file, hashlib.sha256(), 0
 
     def _put(self, data: bytes) -> None:
+        """Write bytes and count them in size and SHA-256."""
         self._file.write(data)
         self._hash.update(data)
         self.size += len(data)

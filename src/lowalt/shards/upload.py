@@ -32,7 +32,7 @@ def published_files(index_path: str | Path) -> list[str]:
 def upload(index_path: str | Path, repository: str, client: Any, private: bool = True) -> int:
     """Create the repository where there is none, upload every file of the data set and return their number.
 
-    client: a `huggingface_hub.HfApi` with its token, or what stands in for one.
+    client: a `huggingface_hub.HfApi` with its token, or an object with the same methods.
     Raises: InputError where the data set is damaged or the repository's name is not USER/NAME.
     """
     if repository.count("/") != 1 or not all(repository.split("/")):

@@ -1,4 +1,4 @@
-"""Finding damage: every byte of every file of a data set, each fault named."""
+"""The check of every byte of every file of a data set; each fault is named."""
 
 import hashlib
 from collections.abc import Iterator
@@ -53,7 +53,7 @@ def shard_faults(path: Path, entry: dict) -> Iterator[str]:
 
 
 def _locate(path: Path, samples: np.ndarray, expected: int, found: int) -> Iterator[str]:
-    """Faults of a shard known to be damaged, sample by sample, then what is left over."""
+    """Faults of a shard known to be damaged, sample by sample, then those of the remaining bytes."""
     if found != expected:
         yield f"{found} bytes, expected {expected}"
     end, named = 0, found != expected

@@ -22,7 +22,7 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
     chosen = []
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
-            # A measured sample brings its fold; a simulated one is dealt.
+            # A measured sample's row names its fold; a simulated sample's fold is drawn.
             dealt = row.get("fold") or fold(split, seed, row["subtype"], row["model"], snr_db)
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
@@ -44,8 +44,8 @@ def write_shard(
 
     rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
     sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); classes: in
-    the order of their labels; powers (stations, rows) W: what SNRs refer to, where not to the echoes' own power, and
-    canceller: settings of the one that noise passes (both kind "recipe").
+    the order of their labels; powers (stations, rows) W: the powers that SNRs refer to, None for the
+    echoes' own; canceller: settings of the canceller that the noise passes (both for kind "recipe").
     A recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """

@@ -11,6 +11,7 @@ import numpy as np
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
+from lowalt.common.rotations import thinnest
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation
@@ -141,7 +142,7 @@ def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str
     if isinstance(axis, str):
         if len(pool.points) < 4:
             raise InputError(f"{where}: {len(pool.points)} samples, expected enough to find an axis")
-        axis = portable.thinnest(pool.points - centre)
+        axis = thinnest(pool.points - centre)
     axis = np.array(axis, float)
     axis = axis / portable.norm(axis)
     if part["kind"] == "rotor":

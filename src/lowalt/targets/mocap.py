@@ -15,6 +15,7 @@ from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
 from lowalt.common.portable import applied, product
+from lowalt.common.rotations import nearest_rotations
 from lowalt.targets import record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
@@ -177,7 +178,7 @@ def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.
     looped = root[start:end].copy()
     looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
     weight = weight[:, None, None, None]
-    turned[:fade] = portable.nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
+    turned[:fade] = nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
     return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz
 
 

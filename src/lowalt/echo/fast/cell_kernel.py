@@ -49,6 +49,7 @@ def cell_polynomials(count: int, deep: float, error: float) -> CellPolynomials |
 
 @lru_cache(maxsize=256)
 def _cell_polynomials(count: int, half: float, degree: int) -> CellPolynomials:
+    """Compute the polynomials of `degree` for targets within `half` cells of a grid place."""
     weights, rates = cell_rule(count)
     places = np.arange(PLACES + 1) / PLACES - 0.5
     away = places[:, None] - np.arange(-SIDE, SIDE + 1)

@@ -86,6 +86,7 @@ def echo_plan(radar: Radar, spread: float, size_m: float, points: int, error: fl
 
 @lru_cache(maxsize=4096)
 def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> EchoPlan:
+    """Compute the plan for rounded sizes, so that many samples share it."""
     wave = 2 * np.pi * turns * 2 * size_m
     array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
     unit = 2.0**-53

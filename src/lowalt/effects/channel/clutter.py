@@ -1,8 +1,8 @@
 """Echoes of the ground: a patch of land in every range cell, still as a whole and stirred by the wind.
 
 A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle). Its amplitude
-is compound Gaussian: a texture drawn once, like that of its neighbours, times speckle whose still part stays and whose
-moving part has Billingsley's exponential Doppler spectrum. Each patch has range side lobes (`patches`).
+is compound Gaussian: a texture, drawn once and correlated between neighbours, times speckle whose still part stays and
+whose moving part has Billingsley's exponential Doppler spectrum. Each patch has range side lobes (`patches`).
 """
 
 from functools import lru_cache
@@ -56,7 +56,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def cell_power(
     settings: dict, network: Network, station: Station, aim_m: np.ndarray, element: Element | None = None
 ) -> np.ndarray:
-    """Return the mean power (cells,) (W) of the land in the ring of every slant-range cell to `reach_m`, beyond M too.
+    """Return the mean power (cells,) (W) of the land in the ring of every slant-range cell up to `reach_m`.
+
+    Cells beyond the M unambiguous ones are included.
 
     element: the antenna elements' pattern, None for isotropic ones. The integral of G_T G_R sigma0 / r^4 over the
     cell's ring: Gauss-Legendre over its range, and over azimuth the trapezoidal rule, exact for the arrays'
@@ -77,7 +79,7 @@ def cell_power(
 def _rings(
     height: float, reach_m: float, cells_per_m: float, kappa: float, wide: tuple[int, int], element: Element | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return what all aims share: weights and ranges (cells, 6) of the rings' nodes, and across (K, nodes) complex.
+    """Return weights and ranges (cells, 6) of the rings' nodes, and across (K, nodes) complex; none depends on the aim.
 
     Along its line the arrays' pattern is a trigonometric polynomial, sum over k of c_k exp(j pi k kappa (Psi - Psi0)):
     across holds its terms without Psi0, integrated over azimuth; negative k are the others' conjugates.
@@ -114,10 +116,14 @@ def _element_gain(element: Element, height: float, ranges: np.ndarray, azimuth: 
 
 
 def _pattern(x: np.ndarray, transmit: int, receive: int) -> np.ndarray:
-    """Squared product of both arrays' sums at direction cosines x (times kappa) off the beam."""
+    """Squared product of both arrays' sums at direction cosines x (times kappa) off the beam.
+
+    Unlike the compiled `terms.dirichlet`, it takes whole arrays; it drops the sums' signs, as only squares are needed.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
 
         def one(count: int) -> np.ndarray:
+            """Sum of `count` elements, sin(count v) / sin(v) with v = pi x / 2."""
             below = np.sin(0.5 * np.pi * x)
             return np.where(abs(below) < 1e-12, float(count), np.sin(0.5 * np.pi * count * x) / below)
 
@@ -126,7 +132,7 @@ def _pattern(x: np.ndarray, transmit: int, receive: int) -> np.ndarray:
 
 
 def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
-    """Return positive textures (cells,) of mean 1 from uniforms (2, cells): their root times speckle has the law.
+    """Return positive textures (cells,) of mean 1 from uniforms (2, cells); sqrt(texture) times speckle has the law.
 
     rayleigh: 1; k: gamma variates of order `shape`; weibull: a Weibull power of shape c/2 is an exponential over a
     positive stable variate of index c/2 (Kanter 1975). Amplitudes, not powers, have the Weibull shape c.
@@ -145,7 +151,7 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
 def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
     """Return the ratio of still to moving power and the exponential spectrum's slope beta (s/m).
 
-    Below a wind of one mile an hour, where the formula for the slope ends, its value there.
+    The formula for the slope ends at a wind of one mile an hour; below, the slope keeps its value there.
     Source: Billingsley 2002, chapter 6 (wind in miles per hour, frequency in GHz).
     """
     miles = wind_mps / MPH
@@ -157,7 +163,7 @@ def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
 
 @lru_cache(maxsize=32)
 def _shape(count: int, step_s: float, beta: float, wavelength_m: float) -> np.ndarray:
-    """Root of the power (K,) in each of K >= count frequencies of the moving part, folded as sampling folds it."""
+    """Root of the moving part's power (K,) in each of K >= count frequencies, aliased by sampling every `step_s`."""
     decay = beta * wavelength_m / (4 * np.pi)
     long = next_fast_len(count + int(decay / np.sqrt(TAIL) / step_s))
     frequency = np.fft.fftfreq(long, step_s)
@@ -176,7 +182,7 @@ def _normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
 def speckle(
     rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float
 ) -> np.ndarray:
-    """Return unit-power speckle (cells, count): a part that stays, and one with a two-sided exponential spectrum.
+    """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided exponential spectrum.
 
     still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m).
     """
@@ -185,7 +191,7 @@ def speckle(
         return np.repeat(kept, count, axis=1)
     shape = _shape(count, step_s, beta, wavelength_m)
     lines = np.zeros((cells, len(shape)), np.complex128)
-    # Two blocks of lines, at low frequencies and at negative ones; between them the spectrum is too faint to matter.
+    # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
     strong = shape > np.sqrt(FAINT)
     drawn = _normal(rng, cells, int(strong.sum()))
     drawn *= np.sqrt(1 / (1 + still)) * shape[strong]

@@ -92,13 +92,14 @@ def companions(
                 f"{row['subtype']}, model {row['model']}, expected more"
             )
         taken.append((place, reach))
-        # A name of its own gives a companion streams of its own.
+        # Random streams are keyed by this name, so each companion has its own.
         mine["model"] = f"{row['subtype']} {row['model']} companion {number}"
         result.append((other, mine))
     return result
 
 
 def _place(row: dict) -> np.ndarray:
+    """Place (3,) of a row's target at the first symbol (m)."""
     return np.array([row["x_m"], row["y_m"], row["z_m"]])
 
 
@@ -109,7 +110,7 @@ def _reach(cloud: Cloud) -> float:
 
 
 def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:
-    """A companion's row without its place: in a flock nearly the target's motion, else its own subtype's."""
+    """A companion's row without its place: in a flock nearly the target's motion, otherwise its subtype's own."""
     mine = {**dict.fromkeys(NUMBERS, math.nan), "subtype": other.subtype, "category": other.category}
     published, flying = other.record["published"], other.like in AIRBORNE
     flock = other.category == row["category"]

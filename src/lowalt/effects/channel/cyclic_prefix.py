@@ -58,7 +58,7 @@ def first_samples(settings: dict, view: View) -> np.ndarray:
 
 
 def turn(settings: dict, network: Network, baseband_hz: np.ndarray) -> np.ndarray:
-    """Return the phase (M,) by which the previous symbol's end continues in the window: it ends a prefix earlier."""
+    """Return the factor (M,) exp(j 2 pi f T_cp) of the previous symbol, which ends a prefix before the window."""
     return np.exp(2j * np.pi * baseband_hz * length_s(settings, network))
 
 

@@ -162,7 +162,7 @@ def large_scale(environment: str, link: Link, rng: np.random.Generator) -> Large
 
 
 def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, clusters: int | None = None) -> Rays:
-    """Return a link's rays of total power one less that of the faintest clusters.
+    """Return a link's rays. Their powers sum to one before the faintest clusters are left out.
 
     clusters: as many clusters of one ray each instead of the table's of 20 rays. Source: clause 7.5, steps 5 to 8,
     Eqs. 7.5-1, 7.5-5, 7.5-9, 7.5-11, 7.5-13, 7.5-14, 7.5-19, 7.5-20 and 7.5-26.

@@ -1,6 +1,6 @@
 """A second path by the ground: the wave reflected by a flat, possibly rough plane z = 0 (two-ray model).
 
-The station sees every point's image below the ground, by the Fresnel coefficient weaker and turned in phase. There and
+The station sees every point's image below the ground, weighted with the complex Fresnel coefficient. There and
 back by either path gives four echoes; the response forms them. Points are taken to be above the ground.
 """
 
@@ -92,11 +92,12 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     (mirrored,) = images(settings, view)
     away = mirrored - np.asarray(view.station.position_m)
     sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
-    # The middle of the station's band stands for all of it.
+    # The coefficient at the middle of the station's band is used for the whole band.
     frequency = radar(view.network, view.station).centre_hz
     properties = (*ground(settings, frequency), frequency, settings["polarisation"])
 
     def reflected(sine: np.ndarray) -> np.ndarray:
+        """Coefficient of the rough ground at grazing angles of this sine."""
         found = fresnel(sine, *properties)
         return found * roughness(sine, settings["roughness_m"], frequency) if settings["roughness_m"] > 0 else found
 

@@ -1,7 +1,7 @@
 """Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP environment.
 
-One draw a sample and station decides for the whole look. A blocked echo is weaker by `blocked_db` out and again back.
-Set SNRs refer to the echo as it arrives: against noise at a set SNR a blocked echo is as strong as any.
+One draw a sample and station decides for the whole look. A blocked echo loses `blocked_db` on the way out and again on
+the way back. Set SNRs refer to the echo as it arrives: against noise at a set SNR a blocked echo is as strong as any.
 """
 
 import math
@@ -58,14 +58,14 @@ def probability(environment: str, flat_m: float, height_m: float) -> float:
 
 
 def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
-    """One out to `near_m`, then d / D + exp(-D / p) (1 - d / D)."""
+    """1 up to the distance d = `near_m`; beyond it d / D + exp(-D / p) (1 - d / D), D = `flat_m`, p = `decay_m`."""
     if flat_m <= near_m:
         return 1.0
     return near_m / flat_m + math.exp(-flat_m / decay_m) * (1 - near_m / flat_m)
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: 1, or that of the loss out and back; one draw."""
+    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) if blocked; one draw."""
     x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
     flat = math.hypot(x - view.station.position_m[0], y - view.station.position_m[1])
     seen = float(rng.random()) < probability(settings["environment"], flat, height)

@@ -1,7 +1,7 @@
 """Self-occlusion: points that the target's own surfaces hide from a station do not echo.
 
 Straight rays, point by point and symbol by symbol, against the surfaces of all parts as they turn; shadows are sharp.
-Waves bend around blades, which pass the share that a strip of their width leaves on its axis.
+Waves bend around blades: a hidden point keeps the power share on the axis of the shadow of a strip of a blade's width.
 Waves on other paths (a ground reflection) are taken to be hidden where the direct one is.
 """
 
@@ -95,7 +95,7 @@ def hidden(view: View, by: str = "all") -> np.ndarray:
     faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
     owner = surfaces["vertex_part"]
     closed = surfaces["closed"][owner[faces[:, 0]]]
-    # Corners of other surfaces are not wanted on the screen.
+    # Project only the corners of the surfaces that count.
     wanted = np.zeros(len(owner), np.bool_)
     wanted[faces] = True
     triangles(

@@ -27,12 +27,12 @@ FOLLOWED = tuple(DEFAULTS["follow"])
 
 
 def idle(settings: dict) -> bool:
-    """Return whether nothing follows the reflected routes."""
+    """Return whether no effect is evaluated along the reflected routes."""
     return not settings["follow"]
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError where the scene has no reflected route, or nothing that could follow it."""
+    """Raise InputError where the scene has no reflected route, or none of the effects in `follow`."""
     if not {"ground_reflection", "walls"} & set(scene.effects):
         raise InputError(
             "effects.reflected_aspect: there is no reflected route, expected ground_reflection or walls in the same "

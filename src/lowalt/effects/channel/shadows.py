@@ -3,7 +3,7 @@
 A straight line from the station through a point is a place on a screen. A triangle hides the point if its image holds
 that place and it is nearer there, where one over the depth is linear on the screen. Points are sorted into a grid on
 the screen, so each triangle meets only the points about it. A point is compared first with the triangle that hid it a
-symbol ago, which most often hides it still; what is hidden so is not asked again.
+symbol ago, which in most cases still hides it; it then needs no other comparison.
 """
 
 import math

@@ -18,10 +18,10 @@ def idle(settings: dict) -> bool:
 def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> np.ndarray:
     """Return a bound (N, P) of squint's change of any range cell, relative to each part's peak amplitudes.
 
-    Element i of a row sees pi i x (kappa_m - kappa_k) more phase; averaged over elements that is half the row's end,
-    and out and back add. Direction cosines are bounded by the target's own and its extent. Where elements see spherical
-    waves, the path of one at distance D from the corner is up to D^2 / (2 (r - D)) longer than the plane wave's, and
-    squint acts on that too; amplitudes are then up to 1 + D / (r - D) times the plane wave's.
+    At element i of a row the phase grows by pi i x (kappa_m - kappa_k). Its mean over the elements is half that of the
+    last one, and the ways out and back add. Direction cosines are bounded by the target's own and its extent. Where
+    elements see spherical waves, the path to one at distance D from the corner is up to D^2 / (2 (r - D)) longer than
+    the plane wave's, and squint acts on that too; amplitudes are then up to 1 + D / (r - D) times the plane wave's.
     """
     network = view.network
     band = (network.subcarriers - 1) * network.subcarrier_spacing_hz

@@ -69,7 +69,7 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
     for facade in settings["facades"]:
         station_m = np.asarray(view.station.position_m)
         images, sine, reflected = mirrored(facade, view.places, station_m)
-        # Antennas are vertically polarised, so the field is parallel to an upright wall, as a horizontal one to ground.
+        # Vertical polarisation is parallel to an upright wall, as horizontal polarisation is to the ground.
         mirror = fresnel(
             np.clip(sine, 0.0, 1.0), settings["permittivity"], settings["conductivity_s_m"], frequency, "horizontal"
         )

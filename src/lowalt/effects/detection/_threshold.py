@@ -12,7 +12,9 @@ LOOPS = kernel(error_model="numpy")
 
 @lru_cache(maxsize=64)
 def factor(kind: str, count: int, rank: int, false_alarm: float) -> float:
-    """Return the factor on the noise estimate from `count` cells that false alarms of one cell exceed this rarely.
+    """Return the threshold of a cell over the noise estimate of `count` cells.
+
+    A cell of noise exceeds it with the probability `false_alarm`.
 
     kind: ca, where the estimate is the cells' mean power, or os, where it is the power of rank `rank` (1 the smallest).
     Noise is complex Gaussian. Source: Finn & Johnson 1968 (ca); Rohling 1983, Eq. 12 (os).

@@ -66,9 +66,9 @@ def amplifies(settings: dict) -> float:
 def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return range cells (N, M) without echoes that stand still.
 
-    mean: less the look's mean. pulse: `order` first differences over symbols. exponential: less a mean that forgets
-    as memory^n. The last two start as if the first symbol had lasted forever: their first output is zero, and clutter
-    leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
+    mean: subtracts the look's mean. pulse: `order` first differences over symbols. exponential: subtracts a running
+    mean with weights memory^n. The last two start as if the first symbol had lasted forever: their first output is
+    zero, and clutter leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
     """
     if settings["kind"] == "mean":
         # Subtract the first symbol before the mean: an echo that stands still then cancels to the last bit.

@@ -26,7 +26,7 @@ DEFAULTS = {
 
 
 def idle(settings: dict) -> bool:
-    """Return True without threshold and gate: the strongest of all cells is the one chosen before."""
+    """Return True without threshold and gate: the strongest of all cells is then chosen, as without this effect."""
     return settings["cfar"] == "none" and settings["gate_cells"] is None
 
 

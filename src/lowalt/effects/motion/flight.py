@@ -56,7 +56,7 @@ def response_s(cloud: Cloud, airspeed_mps: float) -> tuple[float, float]:
     """Return the time constants (s) with which the air carries a target along: horizontally, and vertically.
 
     A body's drag, linear in small gusts, accelerates it by rho C_D A V / m times the gust. Rotors add theirs. A bird's
-    drag is its weight over its lift to drag; upwards its wing's lift answers, by rho S V C_L' / (2 m).
+    drag is its weight over its lift-to-drag ratio; vertically its wing's lift acts, with the rate rho S V C_L' / (2 m).
     """
     mass = mass_kg(cloud)
     if cloud.like == "Bird":

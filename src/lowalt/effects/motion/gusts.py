@@ -95,7 +95,7 @@ def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple
 def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:
     """Return a flying target's offset (N, 3) m and tilt (N, 3) rad at `times_s` (N,) s, equally spaced.
 
-    The motion table's place is where the target is at the first of the times, wherever the wind has pushed it from.
+    The motion table's place is the target's place at the first of the times.
     The wind's direction is drawn. Nothing for targets on the ground.
     """
     if cloud.like not in ("UAV", "Bird"):

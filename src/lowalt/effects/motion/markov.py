@@ -71,7 +71,7 @@ def steps(drift: np.ndarray, noise: np.ndarray) -> Steps:
     Source: Van Loan 1978, "Computing integrals involving the matrix exponential", IEEE Trans. Automatic Control 23.
     """
     count = len(drift)
-    # Short enough a part of the step that its exponentials neither grow nor cancel, then doubled.
+    # Compute a part of the step so short that its exponentials neither grow nor cancel, then double it repeatedly.
     halvings = max(0, int(np.frexp(portable.total(np.abs(drift), axis=0).max())[1]))
     block = np.zeros((2 * count, 2 * count))
     block[:count, :count] = -drift

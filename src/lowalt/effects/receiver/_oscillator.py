@@ -94,7 +94,7 @@ def grid(symbols: int, subcarriers: int, interval_s: float, sample_s: float) -> 
 def correlated(frequency_hz: np.ndarray, width_hz: np.ndarray | float, delay_s: float | None) -> np.ndarray | float:
     """Return the factor on the density of phi(t) - phi(t - delay): 4 sin^2(pi f delay), mean over each node's width.
 
-    None for an oscillator that is not shared, which leaves the density alone. Source: M. C. Budge, M. P. Burt, Range
+    1 for delay None, an oscillator that is not shared. Source: M. C. Budge, M. P. Burt, Range
     correlation effects on phase and amplitude noise, IEEE Southeastcon 1993.
     """
     if delay_s is None:
@@ -123,6 +123,7 @@ def covariance(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarra
 
 @lru_cache(maxsize=2)
 def _lines(points: tuple, at_key: tuple) -> np.ndarray:
+    """Amplitudes (J,) in rad of the slow part's lines."""
     at = grid(*at_key)
     return np.sqrt(2 * density(points, at.slow_hz) * at.slow_weight)
 
@@ -142,7 +143,7 @@ def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | N
         return None
     index = np.arange(len(lags))
     matrix = lags[np.abs(index[:, None] - index)]
-    # A floor far below any oscillator's keeps a spectrum without one positive definite in double precision.
+    # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
     matrix[index, index] += 4 * np.finfo(float).eps * len(lags) ** 2 * lags[0]
     return np.linalg.cholesky(matrix)
 
@@ -154,7 +155,7 @@ def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.rand
     if delay_s is not None:
         amplitude = amplitude * 2 * np.abs(np.sin(np.pi * at.slow_hz * delay_s))
     drawn = rng.standard_normal((len(amplitude), 2)).view(np.complex128)[:, 0] * amplitude
-    # Lines 2 N apart are one and the same at the symbols' starts: fold them, then one short transform a node.
+    # Lines 2 N apart have equal phases at the symbols' starts: add them, then do one short transform a node.
     turns = 2 * symbols
     padded = np.zeros((len(at.node_s), -(-(len(drawn) + 1) // turns) * turns), np.complex128)
     np.multiply(_twist(at_key), drawn, out=padded[:, 1 : len(drawn) + 1])

@@ -24,10 +24,10 @@ def amplifies(settings: dict) -> float:
 
 
 def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = True) -> tuple[np.ndarray, int]:
-    """Return complex samples, I and Q rounded to the middles of 2^bits steps of [-full_scale, full_scale], and clips.
+    """Return samples with I and Q at the middles of 2^bits steps of [-full_scale, full_scale], and the number clipped.
 
-    The second value counts components outside the range; they end in the outermost step, or, with clip False, in a
-    step of their own. Source: Gersho and Gray 1992, ch. 5.
+    A component outside the range is put in the outermost step or, with clip False, in a step of its own. Source: Gersho
+    and Gray 1992, ch. 5.
     """
     step = full_scale * 2.0 ** (1 - bits)
     parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)

@@ -37,7 +37,7 @@ def offset_hz(settings: dict, frame: Frame, rng: np.random.Generator) -> float:
 def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return samples (N, M) turned by exp(j 2 pi F t) at their absolute times t = n T_r + i / (M df).
 
-    A positive F is a receiver's oscillator that is too low: lines rise by F, folded at half the symbol rate.
+    F > 0 if the receiver's oscillator is too low: lines rise by F and fold at half the symbol rate.
     Source: Moose 1994; two draws a sample and station.
     """
     shift = offset_hz(settings, frame, rng)

@@ -42,7 +42,7 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """Return samples (N, M) plus circular white Gaussian noise, in each range cell `snr_db` below the target's echo.
 
     A range cell is the mean of M subcarriers and each of these the sum of M samples, so a cell has a sample's noise.
-    Nothing is added while snr_db is null: `hear.Scene.at_snr` gives each of noise.snr_db in turn.
+    Nothing is added while snr_db is null: `received.Scene.at_snr` gives each of noise.snr_db in turn.
     """
     if settings["snr_db"] is None:
         return samples

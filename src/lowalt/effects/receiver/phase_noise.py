@@ -55,8 +55,9 @@ def check(settings: dict, scene: CheckedScene) -> None:
 def disciplined(settings: dict) -> tuple[tuple[float, float], ...]:
     """Return the spectrum as (offset Hz, dBc/Hz) pairs of the oscillator locked to its reference.
 
-    A second-order loop passes the reference's noise by 1 / (1 + (f / loop)^4) and the oscillator's own by the rest, so
-    that slow wander is the reference's. Free-running (loop_hz 0), the given points alone. Source: Gardner 2005.
+    A second-order loop passes the reference's noise by 1 / (1 + (f / loop)^4) and the oscillator's own by
+    1 minus that, so that slow wander is the reference's. Free-running (loop_hz 0), the given points alone. Source:
+    Gardner 2005.
     """
     own = tuple((float(offset), float(level) + settings["level_db"]) for offset, level in settings["points"])
     reference = tuple((float(offset), float(level)) for offset, level in settings["reference"])

@@ -66,7 +66,7 @@ def _in_downlink(settings: dict, network: Network) -> np.ndarray:
 
 
 def amplifies(settings: dict) -> float:
-    """Return the largest factor on an error: none where symbols are kept, repeated or joined, unbounded otherwise."""
+    """Return the largest factor on an error: 1 if symbols are kept, repeated or joined by lines, infinity for nudft."""
     return float("inf") if settings["regrid"] == "nudft" else 1.0
 
 
@@ -86,9 +86,9 @@ def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Samp
 def regridded(settings: dict, signal: np.ndarray, given: Sampling, network: Network) -> np.ndarray:
     """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them present.
 
-    zero: each at its nominal instant, zeros in the gaps. hold: the last one received, the first before it. linear:
-    straight lines between the true instants, constant beyond them. nudft: the evenly spaced signal whose N Fourier
-    coefficients are the sums over symbols at their true instants.
+    zero: each symbol at its nominal instant, zeros in the gaps. hold: the last symbol received, or the first one before
+    any was. linear: straight lines between the true instants, constant beyond them. nudft: the evenly spaced signal
+    whose N Fourier coefficients are the sums over symbols at their true instants.
     """
     steps = np.arange(network.symbols)
     at = np.flatnonzero(given.present)

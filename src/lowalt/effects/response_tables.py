@@ -1,0 +1,109 @@
+"""Tables of the frequency response: Bessel functions at the subcarriers, series of waves, and nodes of the band.
+
+None of them depends on a target's points, and a few of them, which are kept, serve all samples.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import factorial, jv
+
+from lowalt.common.network import Network
+from lowalt.echo.radar import Radar
+from lowalt.effects import interpolation
+from lowalt.effects.moment_loops import BLOCK
+
+
+def half_diagonal(shape: tuple[int, int]) -> float:
+    """Return the distance of an array's corner from its middle, in spacings; no element's path differs by more."""
+    return 0.5 * float(np.hypot(shape[0] - 1, shape[1] - 1))
+
+
+def series(rates: np.ndarray, longest: float, error: float) -> np.ndarray:
+    """Return the coefficients (Q, K) of exp(-j rate s) as a series in s, for the Q `rates` and |s| <= `longest`.
+
+    The terms from s^K on sum to less than `error`.
+    """
+    band = float(abs(rates).max()) * longest
+    count, term = 1, band
+    # The terms left out sum to at most e^band times the first of them.
+    while term * np.exp(band) > error:
+        count += 1
+        term *= band / count
+    order = np.arange(count)
+    return (-1j * rates[:, None]) ** order / factorial(order)
+
+
+def round_up(value: float) -> float:
+    """Return the next power of sqrt(2), so that a few tables serve all samples."""
+    return 2.0 ** (np.ceil(2 * np.log2(max(value * (1 + 1e-12), 2.0**-5))) / 2)
+
+
+@lru_cache(maxsize=64)
+def table(reach: float, count: int, error: float) -> np.ndarray:
+    """Return the matrix (P, M) of eps_p J_p(2 pi (m - (M-1)/2) reach / M), eps_0 = 1 and all other eps_p = 2.
+
+    P is a multiple of BLOCK; the orders from P on sum to less than `error`.
+    """
+    return _bessel(_orders(reach, error), 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count)
+
+
+def _orders(reach: float, error: float) -> int:
+    """Number of orders of the expansion over `reach` cells, rounded up to a whole block."""
+    band = np.pi * reach
+    order = int(band) + 1
+    # From this order on, each J_p is below half the J_p before it.
+    while 4.0 * abs(jv(order + 1, band)) > error:
+        order += 1
+    return _whole_blocks(order + 1)
+
+
+def _whole_blocks(count: int) -> int:
+    """`count`, rounded up to a multiple of BLOCK."""
+    return -(-count // BLOCK) * BLOCK
+
+
+def _bessel(orders: int, x: np.ndarray) -> np.ndarray:
+    """Matrix (orders, len(x)): eps_p J_p(x)."""
+    p = np.arange(orders)
+    return np.where(p == 0, 1.0, 2.0)[:, None] * jv(p[:, None], x)
+
+
+@lru_cache(maxsize=64)
+def joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrix (nodes x P, K) from moments to Chebyshev orders over the band, and these orders' values (K, M).
+
+    The moments are given at `nodes` frequencies, the values at the M = `count` subcarriers.
+    An entry of the moments is at most the sum of amplitudes, so the orders left out change a response by at most the
+    sum of their coefficients, which is below `error`.
+    """
+    band = np.pi * reach * (count - 1) / count
+    orders = _orders(reach, error)
+    # The products are entire functions: four times as many points as orders fold nothing above rounding.
+    fine = 4 * (nodes + orders)
+    x = interpolation.points(fine)
+    weights, bessel = interpolation.weights(nodes, x), _bessel(orders, band * x)
+    values = (weights.T[:, None] * bessel).reshape(nodes * orders, fine)
+    mix = values @ interpolation.coefficients(fine).T
+    kept = 1 + int(np.flatnonzero(abs(mix).sum(axis=0)[::-1].cumsum()[::-1] > error)[-1])
+    place = np.arccos(np.linspace(-1.0, 1.0, count))
+    return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
+
+
+def frequencies(network: Network, radio: Radar, squint: bool, error: float) -> np.ndarray:
+    """Return the frequencies (Q,) over the carrier at which the arrays are evaluated: Chebyshev points of the band.
+
+    The phase of an array's middle counts as range. Only the elements' paths relative to the middle's remain, so they
+    alone decide how many frequencies are needed.
+    """
+    count = radio.subcarriers
+    if not squint or count == 1:
+        return np.array([radio.kappa])
+    half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
+    band = np.pi * half * (half_diagonal(network.transmit) + half_diagonal(network.receive))
+    # Interpolation of exp(j B x) errs by at most 4 times the sum of |J_p(B)| over p >= nodes. Each J_p is below half
+    # the J_p before it, so the sum is at most 2 |J_nodes(B)|.
+    nodes = int(band) + 2
+    while 8.0 * abs(jv(nodes, band)) > error:
+        nodes += 1
+    return radio.kappa + half + half * interpolation.points(nodes)

@@ -1,0 +1,57 @@
+"""The metadata block at the head of a data card, as dataset hubs read it: licence, size, protocols and their shards."""
+
+from lowalt.common.splits import FOLDS
+from lowalt.shards.read import ShardSet
+
+TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
+
+
+def size_category(samples: int) -> str:
+    """Return the hub's name for a number of samples, such as "10K<n<100K"."""
+    steps = ["1K", "10K", "100K", "1M", "10M", "100M", "1B"]
+    place = sum(samples >= 10 ** (index + 3) for index in range(len(steps)))
+    if place in (0, len(steps)):
+        return f"n<{steps[0]}" if place == 0 else f"n>{steps[-1]}"
+    return f"{steps[place - 1]}<n<{steps[place]}"
+
+
+def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
+    """Return one pattern for the shards of a group and fold; their names, if one does not begin with group and fold."""
+    names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
+    usual = f"{group}-{fold}-"
+    return [f"{usual}*.tar"] if all(name.startswith(usual) for name in names) else names
+
+
+def configs(shards: ShardSet) -> list[dict]:
+    """Return the protocols as a hub's configurations: for each its splits and the shards of each split.
+
+    Shards are matched by group and fold in their names, so the list stays short for thousands of them.
+    """
+    present = {(entry["group"], entry["fold"]) for entry in shards.shards}
+    hub = {"train": "train", "val": "validation", "test": "test"}
+    result: list[dict] = []
+    for protocol in ("seen", "unseen"):
+        files: dict[str, list[str]] = {}
+        for group, fold in sorted(present, key=lambda pair: (pair[0], FOLDS.index(pair[1]))):
+            # In the unseen protocol all folds of the unseen group are tests, and the seen group has no test.
+            both = protocol == "seen" or group == "seen"
+            if protocol == "unseen" and group == "seen" and fold == "test":
+                continue
+            files.setdefault(hub[fold] if both else "test", []).extend(patterns(shards, group, fold))
+        if protocol == "unseen" and not any(group == "unseen" for group, _ in present):
+            continue
+        splits = [{"split": split, "path": files[split]} for split in hub.values() if split in files]
+        result.append({"config_name": protocol, "data_files": splits})
+    if result:
+        result[0]["default"] = True
+    return result
+
+
+def front(shards: ShardSet, name: str, license_name: str) -> dict:
+    """Return the metadata block at the head of the data card, as dataset hubs read it."""
+    return {
+        "pretty_name": name, "license": license_name.lower(), "language": ["en"],
+        "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
+        "configs": configs(shards),
+        "tags": TAGS,
+    }  # fmt: skip
