@@ -16,7 +16,7 @@ from lowalt.common.streams import stream
 from lowalt.effects.motion import flight, gusts, rotor_spread
 from lowalt.effects.motion.markov import steps
 from lowalt.motion import Perturbation, poses
-from lowalt.motion.poses import attitude
+from lowalt.motion.rotations import attitude
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make

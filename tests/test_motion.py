@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.motion import poses, positions, read_table, write_table
-from lowalt.motion.poses import attitude, rodrigues, turns
+from lowalt.motion.rotations import attitude, rodrigues, turns
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud

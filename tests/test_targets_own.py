@@ -14,7 +14,8 @@ from lowalt.common.errors import InputWarning
 from lowalt.report.figures.target import target_animation
 from lowalt.targets.cloud import read
 from lowalt.targets.draft import clusters
-from lowalt.targets.inspection import described, guessed_axes, guessed_unit, inspect_mesh
+from lowalt.targets.guesses import guessed_axes, guessed_unit
+from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
 from lowalt.targets.mesh_scene import selected

@@ -1,12 +1,16 @@
 """A skeleton file and a made-up walk in the ASF/AMC format: inputs of tests of recordings."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 
+from lowalt.targets import mocap
+from lowalt.targets.cloud import Cloud, check
 from lowalt.targets.skeleton import LIMBS, NODES
 
 CHANNELS = {"lfemur": "rx ry rz", "ltibia": "rx", "rfemur": "rx ry rz", "rtibia": "rx", "lhumerus": "rx ry rz"}
+PUBLISHED = {"hgt_m": 1.75}
 
 
 def asf(bones: dict[str, np.ndarray], extra: str = "") -> str:
@@ -37,3 +41,25 @@ def walk(frames: int, period: float = 100, turn_deg: float = 0.0, speed: float =
         lines += [f"lfemur {30 * swing!r} 0 0", f"rfemur {-30 * swing!r} 0 0", f"lhumerus {-20 * swing!r} 5 0"]
         lines += [f"ltibia {20 - 20 * swing!r}", f"rtibia {20 + 20 * swing!r}"]
     return "\n".join(lines)
+
+
+def write_files(folder: Path) -> Path:
+    """Write a skeleton s.asf and a walk m.amc of 260 frames into a folder; return the folder."""
+    rng = np.random.default_rng(5)
+    bones = {name: rng.normal(size=3) for name in LIMBS}
+    bones |= {"lfemur": np.array([0, -7.0, 0]), "rfemur": np.array([0, -7.0, 0]), "ltibia": np.array([0, -7.0, 0])}
+    bones |= {"rtibia": np.array([0, -7.0, 0]), "lfoot": np.array([0, -1.0, 2]), "rfoot": np.array([0, -1.0, 2])}
+    (folder / "s.asf").write_text(asf(bones))
+    (folder / "m.amc").write_text(walk(260))
+    return folder
+
+
+def cloud_of(folder: Path, **changes) -> Cloud:
+    """Return the checked cloud of a record of the folder's files, with some keys changed."""
+    record = {
+        "subtype": "Walking Pedestrian 1", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap",
+        "rcs_m2_per_point": 1.0, "points": 30,
+    }  # fmt: skip
+    extra = {"skeleton": "s.asf", "motion": "m.amc"} | changes
+    record = mocap.check_record(record | extra, extra, "record")
+    return check(mocap.mocap_cloud(record, folder, 3), "cloud")

@@ -8,21 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.double_double import two_product
 from lowalt.common.errors import InputError
 from lowalt.common.portable import applied, product
+from lowalt.motion.rotations import attitude, compiled, rodrigues, turns
 from lowalt.targets.cloud import Cloud
 
 
-def _kernels():
-    """Return the compiled functions; imported at the first pose, since stages that need none start without numba."""
-    from lowalt.motion import kernels
-
-    return kernels
-
-
 class Poses(NamedTuple):
-    """Rigid transforms of every part: a point u of part p stands at rotation[n, p] @ u + translation[n, p].
+    """Rigid transforms of every part: a point u of part p is at rotation[n, p] @ u + translation[n, p].
 
     rotation: (N, P, 3, 3); translation: (N, P, 3) m, global frame.
     """
@@ -32,7 +25,7 @@ class Poses(NamedTuple):
 
 
 class Perturbation(NamedTuple):
-    """Changes that are added to a target's own motion at N symbols; every field may be None.
+    """Changes that are added to a target's own motion at N symbols; a field that is None changes nothing.
 
     angle_rad: part -> (N,) rad, added to that part's turn; offset_m: (N, 3) m, added to the whole target's place,
     global frame; tilt_rad: (N, 3) rad, added to the row's yaw, pitch and roll.
@@ -41,35 +34,6 @@ class Perturbation(NamedTuple):
     angle_rad: dict[int, np.ndarray] | None = None
     offset_m: np.ndarray | None = None
     tilt_rad: np.ndarray | None = None
-
-
-def turns(rate_hz: float, times_s: np.ndarray) -> np.ndarray:
-    """Return the fraction of a turn, in [-1/2, 1/2], that rate_hz * times_s ends on; shape of `times_s`.
-
-    The product is a double-double, so the fraction keeps full precision after 10^6 turns.
-    """
-    product, error = two_product(rate_hz, times_s)
-    return (product - np.rint(product)) + error
-
-
-def rodrigues(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Return the matrices that turn by `angle` (N,) rad about the unit vector `axis` (3,); shape (N, 3, 3).
-
-    Source: Rodrigues' rotation formula, paper Eq. 17.
-    """
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sine, cosine = (values[:, None, None] for values in _kernels().sines_cosines(np.ascontiguousarray(angle, float)))
-    return cosine * np.eye(3) + sine * cross + (1.0 - cosine) * np.outer(axis, axis)
-
-
-def attitude(yaw_rad: float, pitch_rad: float, roll_rad: float) -> np.ndarray:
-    """Return R_Y(yaw) R_P(pitch) R_R(roll), turns about z, x and y; shape (3, 3). Source: paper Eq. 18."""
-    (d, e, f), (a, b, c) = _kernels().sines_cosines(np.array([yaw_rad, pitch_rad, roll_rad], dtype=np.float64))
-    yaw = np.array([[a, -d, 0.0], [d, a, 0.0], [0.0, 0.0, 1.0]])
-    pitch = np.array([[1.0, 0.0, 0.0], [0.0, b, -e], [0.0, e, b]])
-    roll = np.array([[c, 0.0, f], [0.0, 1.0, 0.0], [-f, 0.0, c]])
-    return product(product(yaw, pitch), roll)
 
 
 def _hinged(axes: np.ndarray, hinges: np.ndarray) -> np.ndarray:
@@ -105,8 +69,8 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
     if wings:
         flap = cloud.record["flap"]
         beat = row["phase_0_rad"] + angles.pop("cycle")
-        _, now = _kernels().sines_cosines(beat)
-        _, later = _kernels().sines_cosines(beat - np.radians(flap["fold_lag_deg"]))
+        _, now = compiled().sines_cosines(beat)
+        _, later = compiled().sines_cosines(beat - np.radians(flap["fold_lag_deg"]))
         angles["shoulder"] = np.radians(flap["mean_deg"]) + np.radians(flap["amplitude_deg"]) * now
         angles["fold"] = np.radians(flap["fold_amplitude_deg"]) * later
         for part in wings:
@@ -121,7 +85,7 @@ def _angles(cloud: Cloud, row: dict, times_s: np.ndarray) -> tuple[dict[str, np.
 def _perturbed(
     cloud: Cloud, angles: dict[str, np.ndarray], phases: dict[int, tuple[str, float]], more: dict[int, np.ndarray]
 ) -> None:
-    """Give each part of `more` an angle of its own: its kind's plus what `more` adds (N,) rad.
+    """Give each part of `more` an angle of its own: the angle it had plus more[part] (N,) rad.
 
     Raises: InputError naming the parts that do not move.
     """
@@ -137,18 +101,19 @@ def _perturbed(
 def _series(cloud: Cloud, row: dict, times_s: np.ndarray, more: dict[int, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Functions of time (N, K) and matrices (K, P, 4, 4) whose sum over K of products is every part's motion.
 
-    A turn about a hinge is A + cos B + sin C; a part on a moving part multiplies such sums. So what costs time is a
-    few cosines a symbol and one matrix product, however many parts there are. The body's own motion is left out.
+    A turn by angle a about a hinge is A + cos(a) B + sin(a) C; the motion of a part on a moving part is a product of
+    such sums. The cost is a few cosines a symbol and one matrix product, however many parts there are. The body's own
+    motion is not included.
     """
     angles, phases = _angles(cloud, row, times_s)
     _perturbed(cloud, angles, phases, more)
     one: tuple[str, ...] = ()
     columns = {one: np.ones(len(times_s))}
     for name in dict.fromkeys(name for name, _ in phases.values()):
-        columns["sin " + name,], columns["cos " + name,] = _kernels().sines_cosines(angles[name])
+        columns["sin " + name,], columns["cos " + name,] = compiled().sines_cosines(angles[name])
     moving = list(phases)
     still, cosine, sine = _hinged(cloud.axes[moving], cloud.hinges[moving])
-    s, c = _kernels().sines_cosines(np.array([phase for _, phase in phases.values()], dtype=np.float64))
+    s, c = compiled().sines_cosines(np.array([phase for _, phase in phases.values()], dtype=np.float64))
     s, c = s[:, None, None], c[:, None, None]
     own = np.stack([still, c * cosine + s * sine, c * sine - s * cosine])
     terms: list[tuple[list[tuple[str, ...]], np.ndarray]] = []
@@ -183,11 +148,11 @@ def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
 
 
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
-    """Node positions (N, L, 3) of a cyclic recording turned by `body`, linear between its frames (paper Eq. 22)."""
+    """Return the nodes' positions (N, L, 3) in a recording turned by `body`, linear between frames (paper Eq. 22)."""
     frames = len(cloud.track)
     place = (row["start_s"] + row["playback"] * times_s) * cloud.record["track_rate_hz"] % frames
     first = np.minimum(place.astype(np.int64), frames - 1)
-    turned = _kernels().product(cloud.track.reshape(-1, 3), body.T).reshape(frames, -1)
+    turned = compiled().product(cloud.track.reshape(-1, 3), body.T).reshape(frames, -1)
     before, result = turned.take(first, axis=0), turned.take((first + 1) % frames, axis=0)
     result -= before
     result *= (place - first)[:, None]
@@ -198,8 +163,8 @@ def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np
 def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbation | None = None) -> Poses:
     """Return the poses of all parts of `cloud` under the motion of `row` (motion table) at `times_s` (N,) s.
 
-    `perturbation` is added to that motion. A node cloud gets zero rotations (read-only), and translations that carry
-    the whole position.
+    `perturbation` is added to that motion. A cloud of nodes gets rotations of zeros (read-only), and its
+    translations are the positions of its nodes.
     Raises: InputError where the row lacks a value the cloud needs, or a part that does not move is to be turned.
     Source: paper Eqs. 17 to 20 and 22, Rodrigues' formula.
     """
@@ -226,8 +191,8 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     functions, matrices = _series(cloud, row, times_s, more or {})
     matrices = product(body, matrices[..., :3, :])
     terms = functions.shape[1]
-    rotation = _kernels().product(functions, matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
-    translation = _kernels().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
+    rotation = compiled().product(functions, matrices[..., :3].reshape(terms, -1)).reshape(count, parts, 3, 3)
+    translation = compiled().product(functions, matrices[..., 3].reshape(terms, -1)).reshape(count, parts, 3)
     if tilt is not None:
         rotation = product(turned[:, None], rotation)
         translation = applied(turned[:, None], translation)

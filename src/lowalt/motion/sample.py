@@ -1,4 +1,4 @@
-"""Drawing motion models: the published ranges and our defaults for what the paper leaves open.
+"""Drawing motion models from the published ranges, and from our defaults where the paper gives none.
 
 One stream a motion model (seed, "motion", subtype, model); draws happen in a fixed order, so a model is the
 same whatever else the configuration names.
@@ -39,7 +39,7 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
 
 
 def _edges(corners: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Signed area test of a point against every edge: positive inside a counter-clockwise convex polygon."""
+    """Return cross products (K,) of each edge and the way to a point; all > 0 inside a counter-clockwise polygon."""
     step, to_point = np.roll(corners, -1, axis=0) - corners, point - corners
     return step[:, 0] * to_point[:, 1] - step[:, 1] * to_point[:, 0]
 
@@ -67,6 +67,10 @@ def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
 
 
 def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
+    """Draw a place (2,) m inside the polygon `corners` and at least `clearance_m` from every mast.
+
+    Raises: InputError where 10,000 draws find none.
+    """
     low, high = corners.min(axis=0), corners.max(axis=0)
     for _ in range(10_000):
         point = rng.uniform(low, high)
@@ -77,13 +81,14 @@ def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, cle
 
 
 def heights(settings: dict, subtype: str, category: str, like: str) -> list[float]:
-    """Return lowest and highest flight (m) in `height_m`: of the subtype, of its class, or of what it is like."""
+    """Return the lowest and highest flight (m) that `height_m` gives for the subtype, its class or its `like`."""
     block = settings["height_m"]
     return next(block[name] for name in (subtype, category, like) if name in block)
 
 
 def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
-    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence: free or tied to it.
+    """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence: "free", or "tied" to
+    the speed.
 
     Raises: InputError for more moving parts than the motion table has phases.
     """
@@ -107,7 +112,7 @@ def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dic
 
 
 def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float, row: dict) -> None:
-    """Draw the target's longest side between `low_m` and `high_m`, alike on a logarithmic scale, and what follows.
+    """Draw the target's longest side from `low_m` to `high_m`, uniform in its logarithm, and scale rate and height.
 
     A craft or bird `s` times as large turns or beats `s` times as slowly, so blade tips and wings keep their speed; a
     wheel of `s` times the diameter turns `s` times as slowly at the same road speed. A recording keeps its cadence.
@@ -130,8 +135,8 @@ def draw(
     """Return one motion model's row (without group and model) for the target `cloud`.
 
     published: the subtype's ranges (config/targets.csv); masts_m: (S, 2) m, the stations' places; corners: (K, 2) m
-    from `region_polygon`; settings: the motion block of the configuration. All ranges are uniform, only the target's
-    size, where `sizes_m` asks for one of its own, is so on a logarithmic scale. Wheels turn at F = v / (pi D) (paper
+    from `region_polygon`; settings: the motion block of the configuration. All values are drawn
+    uniformly; where `sizes_m` asks for sizes, the logarithm of the size is. Wheels turn at F = v / (pi D) (paper
     Eq. 16).
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """

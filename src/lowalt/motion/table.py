@@ -32,6 +32,7 @@ def write_table(path: str | Path, rows: list[dict]) -> None:
 
 
 def _cells(row: dict, names: tuple[str, ...]) -> list:
+    """Return the cells of a row: texts, the model's number, then numbers in full precision, empty where NaN."""
     numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in names)
     return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
@@ -50,6 +51,7 @@ def read_table(path: str | Path) -> list[dict]:
 
 
 def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str]) -> dict:
+    """Return a row from the cells of one line. Raises: InputError naming file, line and column."""
     if len(cells) != len(header):
         raise InputError(f"{path}, line {line}: {len(cells)} cells, expected {len(header)}")
     row: dict = dict(zip(header, cells, strict=True))

@@ -1,4 +1,4 @@
-"""A record drafted from the look at a mesh; every guess is marked for the user to confirm.
+"""A record drafted from the inspection of a mesh; every guess is marked for the user to confirm.
 
 The draft is a YAML text with one record; it passes the checks of `mesh_record`, so a cloud can be made of it at once.
 """
@@ -6,7 +6,8 @@ The draft is a YAML text with one record; it passes the checks of `mesh_record`,
 import numpy as np
 
 from lowalt.common.classes import like
-from lowalt.targets.inspection import Component, Inspection
+from lowalt.targets.guesses import Component
+from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
 
 MARGIN = 0.02
@@ -31,15 +32,18 @@ def clusters(parts: list[Component]) -> list[list[Component]]:
 
 
 def _touch(one: Component, other: Component) -> bool:
+    """Whether the boxes of two components, widened by TOUCH of the larger extent, overlap."""
     slack = TOUCH * max(one.extent.max(), other.extent.max())
     return bool((one.low - slack <= other.high + slack).all() and (other.low - slack <= one.high + slack).all())
 
 
 def _numbers(values: np.ndarray) -> str:
+    """Numbers as a YAML list with five digits."""
     return "[" + ", ".join(f"{value:.5g}" for value in values) + "]"
 
 
 def _region(group: list[Component]) -> str:
+    """YAML text of a box around components, wider by MARGIN."""
     low = np.min([part.low for part in group], axis=0)
     high = np.max([part.high for part in group], axis=0)
     slack = MARGIN * float((high - low).max())
@@ -47,7 +51,7 @@ def _region(group: list[Component]) -> str:
 
 
 def _place(group: list[Component], found: Inspection) -> str:
-    """Where a group stands, seen from the target: front or rear, left or right."""
+    """Return the place of a group on the target in words: front or rear, left or right."""
     up, front = "xyz".index(found.up), "xyz".index(found.front)
     middle = (found.low + found.high) / 2
     centre = np.mean([part.centre for part in group], axis=0) - middle
@@ -56,7 +60,7 @@ def _place(group: list[Component], found: Inspection) -> str:
 
 
 def _wings(found: Inspection) -> list[str]:
-    """Two wings without an elbow, cut where the body ends, their hinges there amid the wing's root."""
+    """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle."""
     front, up = "xyz".index(found.front), "xyz".index(found.up)
     right = 3 - front - up
     sign = np.sign(np.cross(np.eye(3)[front], np.eye(3)[up])[right])
@@ -81,8 +85,8 @@ def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
     """Return a record file's text for a subtype of the published table (`row`), from an inspected mesh.
 
     `file` is the mesh's path inside the folder of inputs. Lines that end in CONFIRM hold guesses. Moving parts are the
-    components that may be rotors or wheels, taken out of the body by boxes; a bird's wings are what lies beyond its
-    body.
+    components that may be rotors or wheels; boxes take them out of the body. A bird's wings are the surface farther
+    out than `shoulder_m`.
     """
     category = like(row)
     kind = MOVING_KIND[category]

@@ -1,6 +1,6 @@
-"""A first look at a user's mesh: its unit, extents, named pieces and connected components, and what they may be.
+"""A first look at a user's mesh: its unit, extents, named pieces, connected components, and guesses on their kinds.
 
-Everything that the file does not state is a guess and is called one; nothing here changes a record.
+The text calls everything a guess that the file does not state (`guesses`); nothing here changes a record.
 """
 
 from dataclasses import dataclass, field
@@ -9,47 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.files import existing
+from lowalt.targets.guesses import Component, candidates, guessed_axes, guessed_unit
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces
 
-USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
-"""Largest extent of whole targets (m) by category: the smallest and the largest that are met."""
-
-ALIKE = 0.1
-"""Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
-FLAT = 0.35
-"""A propeller is at most this thick, in parts of its length."""
-ROUND = 0.12
-"""The two extents of a wheel across its axis differ by at most this share."""
-
 SLICES = 40
-"""Slices of a bird from its middle to a wing tip, of which each has a height."""
+"""Number of slices of a bird from its middle to a wing tip; the height of each is measured."""
 MOST_POINTS = 20_000
-"""Most triangles whose middles are kept."""
-
-
-@dataclass(frozen=True)
-class Component:
-    """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
-    named piece it belongs to, and what it may be (rotor, wheel or nothing)."""
-
-    number: int
-    low: np.ndarray
-    high: np.ndarray
-    triangles: int
-    closed: bool
-    piece: str
-    guess: str = ""
-
-    @property
-    def extent(self) -> np.ndarray:
-        """Size (3,) in m along the file's axes."""
-        return self.high - self.low
-
-    @property
-    def centre(self) -> np.ndarray:
-        """Middle (3,) in m of the extents."""
-        return (self.low + self.high) / 2
+"""Most triangles whose middles an inspection keeps."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +44,7 @@ class Inspection:
 
     @property
     def shoulder_m(self) -> float:
-        """How far from the middle a bird's body ends and its wing begins (m): where it is less than half as high."""
+        """Distance (m) from the middle to the wing: farther out, no slice is more than half as high as the highest."""
         right, up = 3 - "xyz".index(self.up) - "xyz".index(self.front), "xyz".index(self.up)
         across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)
         edges = np.linspace(0, across.max() * (1 + 1e-9), SLICES + 1)
@@ -86,67 +53,6 @@ class Inspection:
             inside = self.points[(across >= edges[index]) & (across < edges[index + 1]), up]
             high[index] = np.ptp(inside) if len(inside) else 0.0
         return float(edges[np.flatnonzero(high > 0.5 * high.max()).max() + 1])
-
-
-def guessed_unit(size: float, category: str) -> str:
-    """Return the unit of UNITS_M in which a largest extent of `size` (file units) is most usual for the category: the
-    one that brings it nearest, as a ratio, to the geometric mean of the smallest and the largest that are met."""
-    usual = float(np.sqrt(np.prod(USUAL_M[category])))
-    return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
-
-
-def guessed_axes(extent: np.ndarray, category: str) -> tuple[str, str]:
-    """Return the axes of the file that may point up and to the front, from the extents (3,) alone; signs are unknown.
-
-    A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across.
-    """
-    order = np.argsort(extent, kind="stable")
-    up = int(order[0])
-    front = int(order[2] if category == "Vehicle" else order[1])
-    if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
-        front = next(axis for axis in range(3) if axis != up)
-    return "xyz"[up], "xyz"[front]
-
-
-def _alike(one: Component, other: Component) -> bool:
-    """Whether two components have the same three sizes in any order."""
-    a, b = np.sort(one.extent), np.sort(other.extent)
-    return bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
-
-
-def _may_be(component: Component, up: int, whole: np.ndarray, category: str) -> str:
-    """Return the kind of part that one component may be, by its shape and size."""
-    extent = component.extent
-    if category == "UAV":
-        across = np.delete(extent, up).max()
-        if extent[up] < FLAT * across and 0.04 * whole.max() < across < 0.7 * whole.max():
-            return "rotor"
-    if category == "Vehicle":
-        small, *large = np.sort(extent)
-        if large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3:
-            return "wheel"
-    return ""
-
-
-def candidates(components: list[Component], up: int, whole: np.ndarray, category: str) -> dict[int, str]:
-    """Return what components may be, by number: sets of at least two alike ones at one height, the largest such set.
-
-    `up` the index of the axis that points up, `whole` (3,) the extents of the target in metres.
-    """
-    able = [(part, _may_be(part, up, whole, category)) for part in components]
-    able = [(part, kind) for part, kind in able if kind]
-    best: list[tuple[Component, str]] = []
-    for part, kind in able:
-        same = [
-            (other, kind)
-            for other, its in able
-            if its == kind and _alike(part, other) and abs(other.centre[up] - part.centre[up]) < 0.1 * whole.max()
-        ]
-        larger = len(same) > len(best) or (len(same) == len(best) and part.extent.max() > best[0][0].extent.max())
-        if len(same) >= 2 and larger:
-            best = same
-    return {part.number: kind for part, kind in best}
 
 
 def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
@@ -164,12 +70,12 @@ def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
 
 
 def _named(path: Path) -> list[Piece]:
-    """The pieces of a file under the most telling names it has: an OBJ's objects and groups, else the scene's."""
+    """Return the pieces of a file: an OBJ's by the names of its objects and groups, others by the scene's names."""
     return pieces(path, groups=path.suffix.lower() == ".obj")
 
 
 def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
-    """For each component the piece whose box it lies in, the smallest such one; empty where there is none."""
+    """Return for each component the name of the smallest piece whose box holds it, or an empty text where none does."""
     boxes = [
         (piece.instance, piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres) for piece in found
     ]
@@ -187,7 +93,7 @@ def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
 def inspect_mesh(path: str | Path, category: str, unit: str | float | None = None) -> Inspection:
     """Return what a mesh file holds, for a target of the category UAV, Bird or Vehicle.
 
-    `unit` where the user knows it; else the file's own statement, else a guess from the size.
+    `unit` is given where the user knows it; otherwise it is the file's own statement or a guess from the size.
     Raises: InputError naming the file and the reason where it cannot be read.
     """
     path = existing(path, "mesh")
@@ -219,6 +125,7 @@ def inspect_mesh(path: str | Path, category: str, unit: str | float | None = Non
 
 
 def _size(values: np.ndarray) -> str:
+    """Return sizes as text with four digits: a x b x c."""
     return " x ".join(f"{value:.4g}" for value in values)
 
 

@@ -12,6 +12,7 @@ from lowalt.targets import mesh, vehicle
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut, inside
 from lowalt.targets.mesh_record import ordered_parts
+from lowalt.targets.mesh_size import sized
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
 from lowalt.targets.sampling import face_normals
 from lowalt.targets.surfaces import Surface, merged
@@ -99,7 +100,7 @@ def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface],
     cloud = mesh.mesh_cloud(record, inputs, seed)
     raw, _ = mesh.pools(record, inputs, stream(seed, "cloud", record["subtype"]))
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
-    final, _ = mesh.sized(record, raw, kinds)
+    final, _ = sized(record, raw, kinds)
     front, up = mesh._vector(record["front"]), mesh._vector(record["up"])
     triangles = _triangles(record, inputs, np.stack([np.cross(front, up), front, up]))
     surfaces, offsets = [], []

@@ -1,5 +1,8 @@
-"""The files each rule reads, by the plan of the run. Each method takes the wildcards of a job and can stand in a rule's
-`input:`. Nothing is read here; whether a file exists is asked only where no rule of the run can make it."""
+"""The files that each rule reads, by the plan of the run; those of the data stages are in `data_products`.
+
+Each method takes the wildcards of a job and can stand in a rule's `input:`. Nothing is read here; a method looks
+whether a file exists only where no rule of the run can make it.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -10,13 +13,11 @@ from lowalt.common.shipped import shipped
 from lowalt.common.street import PACKAGE
 from lowalt.recognition import choose
 from lowalt.report.inputs import KEPT
-from lowalt.targets.records import source_files
-from lowalt.workflow.effect_calls import EffectCalls
-from lowalt.workflow.run import Run
+from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near
 
 FIDELITY = "results/fidelity-exact/transfer.csv"
-"""Loss of accuracy by training on echoes at a tolerance; other runs make it, and an error names it where missing."""
+"""Table of the accuracy lost by training on echoes at a tolerance; other runs make it."""
 
 REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
@@ -25,121 +26,15 @@ TABLES = (
     "accuracy.csv", "confusion.csv", "subtypes.csv", "comparisons.csv", "orderings.csv", "alarms.csv",
     "calibration.csv", "reliability.csv",
 )  # fmt: skip
-"""Tables of recognition that have one row a protocol, scheme and more."""
+"""Tables of recognition; their rows name a protocol and a scheme."""
 
 
-class Products:
-    """Paths of the products of one run."""
-
-    def __init__(self, run: Run, calls: EffectCalls) -> None:
-        self._run, self._config, self._calls = run, run.config, calls
-        self._groups: dict[tuple, list[str]] = {}
-
-    def _of_group(self, folder: str, wildcards: Any) -> list[str]:
-        key = (folder, wildcards.run, wildcards.group)
-        if key not in self._groups:
-            names = self._run.plan.groups[wildcards.group]
-            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
-        return self._groups[key]
-
-    def _of_chunk(self, folder: str, wildcards: Any) -> list[str]:
-        names = self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").members
-        key = (folder, wildcards.run, names)
-        if key not in self._groups:
-            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
-        return self._groups[key]
-
-    def record_files(self, wildcards: Any) -> list[str]:
-        """The user's mesh or recording files that the record of one subtype names."""
-        return source_files(self._run.records[self._run.subtypes[wildcards.subtype]], self._run.inputs)
-
-    def chunk_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of the subtypes of a chunk, in the table's order."""
-        return self._of_chunk("clouds", wildcards)
-
-    def motion(self, wildcards: Any) -> str:
-        """The motion table of a chunk, which SNRs added later share with the chunk that they are added to."""
-        return f"results/{wildcards.run}/motion/{self._source(wildcards)}.csv"
-
-    def first_motion(self, wildcards: Any) -> list[str]:
-        """Motion tables that together hold at least one model of every subtype."""
-        names = [name for name in self._run.plan.sources if not self._run.plan.span(name)[0]]
-        return [f"results/{wildcards.run}/motion/{name}.csv" for name in names]
-
-    def _source(self, wildcards: Any) -> str:
-        return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
-
-    def group_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a group's subtypes, in the table's order."""
-        return self._of_group("clouds", wildcards)
-
-    def scene_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them.
-
-        Raises: InputError for a companion that the run does not have.
-        """
-        companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
-        unknown = sorted(set(companions) - set(self._run.records))
-        if unknown:
-            raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
-        own = self.chunk_clouds(wildcards)
-        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
-        return [*own, *(path for path in more if path not in own)]
-
-    def chunk_occluders(self, wildcards: Any) -> list[str]:
-        """Surfaces of a chunk's subtypes where the scene hides points behind surfaces, none elsewhere."""
-        return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
-
-    def call_occluders(self, wildcards: Any) -> list[str]:
-        """Surfaces of a group's subtypes where the call hides points behind surfaces, none elsewhere."""
-        hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
-        return self._of_group("occluders", wildcards) if hidden else []
-
-    def span(self, wildcards: Any) -> str:
-        """The part of a group's motion models that one chunk holds, as options of the stage."""
-        first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
-        return f"--first {first} --count {count}"
-
-    def cost_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of the first subtype of each category, in the table's order."""
-        first: dict[str, str] = {}
-        for name, record in self._run.records.items():
-            first.setdefault(record["published"]["category"], name)
-        return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
-
-    def listening(self, wildcards: Any) -> list[str]:
-        """Names of the stations whose signals one echo job makes."""
-        return [wildcards.station] if self._run.echo_per_station else self._run.stations
-
-    def chunk_echoes(self, wildcards: Any) -> list[str]:
-        """The clean signals of a chunk, in the order of the stations."""
-        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
-        return [f"{stem}/{station}.npy" for station in self._run.stations]
-
-    def chunk_powers(self, wildcards: Any) -> list[str]:
-        """The powers of the targets' own echoes, to which set SNRs refer in a scene with effects; none elsewhere."""
-        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
-        return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
-
-    def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that shards are packed from: noisy signals, for images their tiles too, or clean echoes."""
-        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
-        kind = self._config["shards"]["kind"]
-        if kind == "recipe":
-            return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
-        tiles = {"tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else {}
-        return {"signals": f"{base}/noisy/{chunk}.npy", **tiles}
-
-    def reduced(self, wildcards: Any) -> dict[str, str]:
-        """Reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
-        if not self._run.is_reduced(int(wildcards.size)):
-            return {}
-        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
-        return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": self.motion(wildcards)}
+class Products(DataProducts):
+    """Paths of the products of one run: those of its data set, of its trainings and of its report."""
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files of training and evaluation: images shrunk to the scheme's size, the shards, or what samples are made
-        from."""
+        """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
+        shards, or the clouds from which samples are made on the spot."""
         base = f"results/{self._run.data}"
         if self._config["recognition"].get("input") == "dataset":
             clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
@@ -152,7 +47,7 @@ class Products:
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and those of other runs that are trained on too."""
+        """Files that one training reads: `samples`, and the images of other runs that the configuration adds."""
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         names = self._config["recognition"].get("extra", [])
         extra = [path for name in names for path in self._extra(name, size)]
@@ -161,7 +56,7 @@ class Products:
     def _extra(self, name: str, size: int) -> list[str]:
         """Images of another run's fold train, in the shards' order.
 
-        Raises: InputError naming the command that makes those that are missing.
+        Raises: InputError naming the target that makes the missing ones.
         """
         shards = sorted(Path(f"results/{name}/shards").glob("*-train-*.tar"))
         views = [f"results/{name}/views/{size}/{shard.stem}.npz" for shard in shards]
@@ -185,7 +80,7 @@ class Products:
         return [f"results/{name}/SHA256SUMS" for name in names]
 
     def trial_views(self, wildcards: Any) -> list[str]:
-        """Images that a trial may see, shrunk to its candidate's size: trained group, folds train and val."""
+        """Images that a trial may see, shrunk to its candidate's size: group "seen", folds train and val."""
         size = self._trial_size(wildcards)
         shards = [name for name in self._run.plan.shards if name.startswith(("seen-train-", "seen-val-"))]
         return [f"results/{self._run.data}/views/{size}/{shard}.npz" for shard in shards]
@@ -196,6 +91,7 @@ class Products:
         return [path for name in names for path in self._extra(name, self._trial_size(wildcards))]
 
     def _trial_size(self, wildcards: Any) -> int:
+        """Pixels a side of the images that the candidate of a trial is trained on."""
         changes = choose.read(choose.TABLE).changes(wildcards.candidate)
         return choose.settled(self._config["recognition"], changes)["size"]
 
@@ -246,7 +142,7 @@ class Products:
             for name, file in KEPT.items()
             if shipped(f"{REFERENCE}/{file}").is_file()
         }
-        # No rule makes it, so that no workflow needs the package of fifty digits: `make hard-cases` does.
+        # No rule makes this file, so that no run needs the package mpmath: `make hard-cases` makes it.
         if Path(f"{base}/hard_cases.csv").is_file():
             files["hard_cases"] = f"{base}/hard_cases.csv"
         if self._run.trainings:

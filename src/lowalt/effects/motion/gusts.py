@@ -11,7 +11,8 @@ import numpy as np
 from lowalt.common import portable
 from lowalt.effects.motion import flight
 from lowalt.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
-from lowalt.motion.poses import Perturbation, attitude
+from lowalt.motion.poses import Perturbation
+from lowalt.motion.rotations import attitude
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (

@@ -1,0 +1,140 @@
+"""The size of a user's mesh: check its unit against the published size, scale its parts, and set the origin.
+
+Body axes: x right, y front, z up, metres.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from lowalt.common import portable
+from lowalt.common.classes import like
+from lowalt.common.errors import InputError
+from lowalt.targets import bird
+from lowalt.targets.mesh_parts import Pool
+from lowalt.targets.mesh_record import ALL_AXES
+
+SMALLEST_PART = 25
+"""A moving part that is more than so many times smaller than the whole mesh is refused: its unit must be wrong."""
+
+
+SMALLEST_ROTOR_M = 0.01
+"""Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
+
+
+def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, low: float, high: float) -> None:
+    """Raise InputError if the size of `what` is below wanted_m / high or above wanted_m / low; all sizes in metres."""
+    if not low <= wanted_m / max(size_m, 1e-12) <= high:
+        raise InputError(
+            f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
+            f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit "
+            f"{record['unit']!r} right?"
+        )
+
+
+def _published_m(record: dict) -> np.ndarray:
+    """Return the published sizes (3,) m along right, front and up; a single published size stands three times."""
+    table = record["published"]
+    if record["size_is"] == ALL_AXES:
+        return np.array([table["wid_m"], table["len_m"], table["hgt_m"]])
+    return np.full(3, table["size_m"])
+
+
+def _bounds(parts: dict[str, Pool]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and the highest coordinates (3,) of all parts' points."""
+    low = np.min([pool.points.min(axis=0) for pool in parts.values()], axis=0)
+    return low, np.max([pool.points.max(axis=0) for pool in parts.values()], axis=0)
+
+
+def measured_m(size_is: str, parts: dict[str, Pool], kinds: dict[str, str]) -> float:
+    """Return the size (m) that `size_is` names; the pools are in body axes.
+
+    Raises: InputError where `size_is` is the motor diagonal and there are fewer than two rotors.
+    """
+    extent = np.subtract(*_bounds(parts)[::-1])
+    if size_is == "motor diagonal":
+        hubs = np.array([pool.hinge[:2] for name, pool in parts.items() if kinds[name] == "rotor"])
+        if len(hubs) < 2:
+            raise InputError(f"size_is is 'motor diagonal' for {len(hubs)} rotors, expected at least two")
+        return float(portable.norm(hubs[:, None] - hubs[None]).max())
+    return float({"width": extent[0], "length": extent[1], "height": extent[2]}.get(size_is, extent.max()))
+
+
+def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[np.ndarray, dict]:
+    """Return the scale factors (3,) along right, front and up, and the facts about sizes for the cloud's record.
+
+    The mesh is compared with the published size even where the record asks for no scaling, to find a wrong unit.
+    Raises: InputError where mesh and published size differ by more than the record's limit.
+    """
+    limit, wanted = record["scale_limit"], _published_m(record)
+    low, high = _bounds(parts)
+    size = high - low
+    if record["size_is"] != ALL_AXES:
+        try:
+            size = np.full(3, measured_m(record["size_is"], parts, kinds))
+        except InputError as error:
+            raise InputError(f"{record['subtype']}: {error}") from None
+        if record["size_is"] == "motor diagonal":
+            # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
+            # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
+            _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit)
+    for axis in range(3):
+        _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis], 1 / limit, limit)
+    whole = float((high - low).max())
+    for name, pool in parts.items():
+        extent = float(np.ptp(pool.points, axis=0).max())
+        if kinds[name] != "body" and extent < whole / SMALLEST_PART:
+            raise InputError(
+                f"{record['subtype']}: part {name} measures {extent:.3g} m in a mesh of {whole:.3g} m, expected at "
+                f"least 1/{SMALLEST_PART} of it; is the unit of its file right?"
+            )
+    ratio = wanted / size
+    scale = {"published": ratio, "uniform": np.full(3, ratio[1]), "none": np.ones(3)}[record["scale"]]
+    return scale, {"mesh_extent_m": (high - low).tolist(), "scale_factors": scale.tolist()}
+
+
+def _turned_radius(pool: Pool) -> float:
+    """Return the largest distance (m) of a part's samples from its axis."""
+    away = pool.points - pool.hinge
+    along = portable.dot(away, pool.axis)[:, None]
+    return float(portable.norm(away - along * pool.axis).max())
+
+
+def sized(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tuple[dict[str, Pool], dict]:
+    """Return the pools scaled and centred, and the facts that the cloud's record gets.
+
+    Wheels stay round: they are scaled about their hinge to the published diameter (or by the car's mean factor) and
+    set on the ground. The origin is the middle of the extents; in plan, a multirotor's is the middle of its hubs.
+    """
+    scale, facts = factors(record, parts, kinds)
+    ground = _bounds(parts)[0][2] * scale[2]
+    result = {}
+    for name, pool in parts.items():
+        normals = pool.normals / scale
+        normals /= portable.norm(normals)[:, None]
+        result[name] = replace(pool, points=pool.points * scale, normals=normals, hinge=pool.hinge * scale)
+        if kinds[name] == "wheel":
+            raw = 2 * _turned_radius(pool)
+            published = record["wheel_size"] == "published" and record["scale"] != "none"
+            diameter = record["published"]["wheel_diam_m"] if published else raw * float(np.sqrt(scale[1] * scale[2]))
+            hinge = np.array([*(pool.hinge * scale)[:2], ground + diameter / 2])
+            points = (pool.points - pool.hinge) * (diameter / raw) + hinge
+            result[name] = replace(pool, points=points, hinge=hinge)
+            facts["wheel_diameter_m"] = diameter
+        if kinds[name] == "rotor" and 2 * _turned_radius(result[name]) < SMALLEST_ROTOR_M:
+            raise InputError(
+                f"{record['subtype']}: rotor {name} has a diameter of {2 * _turned_radius(result[name]):.2g} m at the "
+                f"final size, expected at least {SMALLEST_ROTOR_M} m"
+            )
+    low, high = _bounds(result)
+    middle = (low + high) / 2
+    hubs = [pool.hinge[:2] for name, pool in result.items() if kinds[name] == "rotor"]
+    if hubs:
+        middle[:2] = portable.mean(np.array(hubs), 0)
+    if like(record) == "Vehicle":
+        facts["origin_height_m"] = float(middle[2] - ground)
+    if like(record) == "Bird":
+        facts |= {"flap": bird.FLAP | record.get("flap", {}), "wing_span_m": float(high[0] - low[0])}
+    return {
+        name: replace(pool, points=pool.points - middle, hinge=pool.hinge - middle) for name, pool in result.items()
+    }, facts

@@ -1,0 +1,116 @@
+"""The cycle of a recording: find the stretch whose end is most like its start, and close it without a jump."""
+
+import math
+
+import numpy as np
+
+from lowalt.common import portable
+from lowalt.common.errors import InputError
+from lowalt.common.portable import product
+from lowalt.common.rotations import nearest_rotations
+from lowalt.targets.mocap_motion import Motion, nodes_m
+from lowalt.targets.skeleton import NODES
+
+FADE_S = 0.15
+"""Length of the cross-fade that closes a cycle: about a quarter of a step, at most a sixth of the recording."""
+
+
+SHORTEST_S = 0.5
+"""Shortest cycle that is looked for in a long recording: about two steps of the fastest sprinters."""
+
+
+SHORTEST_GAIT_S = 0.3
+"""Shortest cycle that is accepted in a short recording: half of the shortest stride."""
+
+
+BLOCK = 256
+"""Number of starts of a cycle that are compared with all ends in one matrix product."""
+
+
+def refuse_short(frames: int, rate_hz: float, where: str) -> None:
+    """Raise InputError naming `where` if the recording is shorter than two cycles of SHORTEST_GAIT_S.
+
+    In a short recording `find_cycle` looks for cycles of half its length and longer.
+    """
+    needed = math.ceil(2 * SHORTEST_GAIT_S * rate_hz)
+    if frames < needed:
+        raise InputError(
+            f"{where}: {frames} frames, {frames / rate_hz:.3g} s, expected at least {needed} "
+            f"({2 * SHORTEST_GAIT_S:g} s at {rate_hz:g} Hz) for a cycle of a walk or run"
+        )
+
+
+def find_cycle(motion: Motion) -> tuple[int, int, int, float]:
+    """Return (start, end, fade, mismatch) of the cycle start..end-1 that closes best, in frames and metres.
+
+    The mismatch of two frames is the root mean square over the nodes of the difference in place and of the difference
+    in velocity times the fade's length, without the horizontal motion of the root. Among the cycles whose mismatch is
+    at most 1.5 times the least, the longest is taken, for variety. A cycle must move at least half as fast as the
+    fastest one, so that standing is no cycle. At least `fade` frames follow its end.
+    """
+    frames = len(motion.root_m)
+    fade = max(1, min(round(FADE_S * motion.rate_hz), frames // 6))
+    shortest = max(2 * fade, 2, min(round(SHORTEST_S * motion.rate_hz), frames // 2))
+    positions = nodes_m(motion)
+    positions[..., :2] -= positions[:, :1, :2]
+    velocity = np.gradient(positions, axis=0) * fade
+    state = np.concatenate([positions, velocity], axis=1).reshape(frames, -1)
+    place = motion.root_m[:, :2]
+    # Only pairs (start, end) of a few starts at a time: all pairs of a long recording would take gigabytes.
+    blocks = [np.arange(first, min(first + BLOCK, frames)) for first in range(0, frames, BLOCK)]
+    fastest = max(_speeds(place, starts, shortest, fade).max() for starts in blocks)
+    least, candidates = np.inf, []
+    for starts in blocks:
+        distance = _mismatches(state, starts)
+        distance[_speeds(place, starts, shortest, fade) < max(fastest / 2, 0.0)] = np.inf
+        least = min(least, float(distance.min()))
+        row, end = np.nonzero(distance <= 1.5 * least)
+        candidates.append(np.stack([starts[row], end, distance[row, end]], axis=1))
+    start, end, distance = np.concatenate(candidates).T
+    good = distance <= 1.5 * least
+    longest = (end - start)[good].max()
+    best = np.flatnonzero(good & (end - start == longest))
+    best = best[np.argmin(distance[best])]
+    found = int(start[best]), int(end[best])
+    return *found, fade, float(portable.norm(state[found[0]] - state[found[1]]) / np.sqrt(len(NODES)))
+
+
+def _speeds(place: np.ndarray, starts: np.ndarray, shortest: int, fade: int) -> np.ndarray:
+    """Return the horizontal speed (S, F) in metres a frame from each start to each end.
+
+    The value is -1 where the two are no cycle: fewer than `shortest` frames lie between them, or fewer than `fade`
+    frames follow the end.
+    """
+    ends = np.arange(len(place))[None]
+    length = ends - starts[:, None]
+    way = portable.norm(place[None] - place[starts, None])
+    return np.where((length >= shortest) & (ends + fade <= len(place)), way / np.maximum(length, 1), -1.0)
+
+
+def _mismatches(state: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """Return the root mean square distance (S, F) over the nodes between the states at each start and at each end."""
+    square = portable.dot(state, state)
+    both = product(state[starts], state.T)
+    return np.sqrt(np.maximum(square[starts, None] + square - 2 * both, 0) / len(NODES))
+
+
+def closed(motion: Motion, start: int, end: int, fade: int) -> tuple[Motion, np.ndarray]:
+    """Return the cycle start..end-1, closed in place and velocity, and the drift (2,) in m/s taken out of it.
+
+    The root's uniform horizontal drift over the cycle is taken out; its bob and sway stay. The first `fade` frames of
+    the cycle are blended with the frames that follow its end, by weights w that rise from 0 to 1 with slope zero at
+    both ends: w x first frames + (1 - w) x following frames. Blended rotations are made orthogonal again, so bones keep
+    their lengths.
+    """
+    count = end - start
+    drift = (motion.root_m[end] - motion.root_m[start]) / count * [1, 1, 0]
+    root = motion.root_m - np.arange(-start, len(motion.root_m) - start)[:, None] * drift
+    turned = motion.turned[start:end].copy()
+    place = np.arange(fade) / fade
+    weight = place**2 * (3 - 2 * place)
+    after = slice(end, end + fade)
+    looped = root[start:end].copy()
+    looped[:fade] = weight[:, None] * looped[:fade] + (1 - weight[:, None]) * root[after]
+    weight = weight[:, None, None, None]
+    turned[:fade] = nearest_rotations(weight * turned[:fade] + (1 - weight) * motion.turned[after])
+    return Motion(looped, turned, motion.bones_m, motion.rate_hz), drift[:2] * motion.rate_hz

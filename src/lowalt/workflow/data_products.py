@@ -1,0 +1,127 @@
+"""The files that the rules of clouds, motion, echoes, noise, tiles and shards read, by the plan of the run.
+
+Each method takes the wildcards of a job and can stand in a rule's `input:`. Nothing is read here.
+"""
+
+from typing import Any
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.targets.records import source_files
+from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.run import Run
+
+
+class DataProducts:
+    """Paths of the files from which the data set of one run is made."""
+
+    def __init__(self, run: Run, calls: EffectCalls) -> None:
+        """Keep the run and its calls for effects."""
+        self._run, self._config, self._calls = run, run.config, calls
+        self._groups: dict[tuple, list[str]] = {}
+
+    def _of_group(self, folder: str, wildcards: Any) -> list[str]:
+        """Files of a folder of the run, one for each subtype of a group, in the table's order."""
+        key = (folder, wildcards.run, wildcards.group)
+        if key not in self._groups:
+            names = self._run.plan.groups[wildcards.group]
+            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
+        return self._groups[key]
+
+    def _of_chunk(self, folder: str, wildcards: Any) -> list[str]:
+        """Files of a folder of the run, one for each subtype of a chunk, in the table's order."""
+        names = self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").members
+        key = (folder, wildcards.run, names)
+        if key not in self._groups:
+            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
+        return self._groups[key]
+
+    def record_files(self, wildcards: Any) -> list[str]:
+        """The user's mesh or recording files that the record of one subtype names."""
+        return source_files(self._run.records[self._run.subtypes[wildcards.subtype]], self._run.inputs)
+
+    def chunk_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of the subtypes of a chunk, in the table's order."""
+        return self._of_chunk("clouds", wildcards)
+
+    def motion(self, wildcards: Any) -> str:
+        """The motion table of a chunk; a chunk of added SNRs uses that of the chunk that it adds to."""
+        return f"results/{wildcards.run}/motion/{self._source(wildcards)}.csv"
+
+    def first_motion(self, wildcards: Any) -> list[str]:
+        """Motion tables that together hold at least one model of every subtype."""
+        names = [name for name in self._run.plan.sources if not self._run.plan.span(name)[0]]
+        return [f"results/{wildcards.run}/motion/{name}.csv" for name in names]
+
+    def _source(self, wildcards: Any) -> str:
+        """Name of the chunk whose motion and echoes a chunk uses: its own, or the one that it adds SNRs to."""
+        return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
+
+    def group_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of a group's subtypes, in the table's order."""
+        return self._of_group("clouds", wildcards)
+
+    def scene_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them.
+
+        Raises: InputError for a companion that the run does not have.
+        """
+        companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
+        unknown = sorted(set(companions) - set(self._run.records))
+        if unknown:
+            raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
+        own = self.chunk_clouds(wildcards)
+        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
+        return [*own, *(path for path in more if path not in own)]
+
+    def chunk_occluders(self, wildcards: Any) -> list[str]:
+        """Surfaces of a chunk's subtypes; none where the scene hides no points behind surfaces."""
+        return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
+
+    def call_occluders(self, wildcards: Any) -> list[str]:
+        """Surfaces of a group's subtypes; none where the call hides no points behind surfaces."""
+        hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
+        return self._of_group("occluders", wildcards) if hidden else []
+
+    def span(self, wildcards: Any) -> str:
+        """The part of a group's motion models that one chunk holds, as options of the stage."""
+        first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
+        return f"--first {first} --count {count}"
+
+    def cost_clouds(self, wildcards: Any) -> list[str]:
+        """Clouds of the first subtype of each category, in the table's order."""
+        first: dict[str, str] = {}
+        for name, record in self._run.records.items():
+            first.setdefault(record["published"]["category"], name)
+        return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
+
+    def listening(self, wildcards: Any) -> list[str]:
+        """Names of the stations whose signals one echo job makes."""
+        return [wildcards.station] if self._run.echo_per_station else self._run.stations
+
+    def chunk_echoes(self, wildcards: Any) -> list[str]:
+        """The clean signals of a chunk, in the order of the stations."""
+        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
+        return [f"{stem}/{station}.npy" for station in self._run.stations]
+
+    def chunk_powers(self, wildcards: Any) -> list[str]:
+        """The powers of the targets' own echoes, to which SNRs refer in a scene with effects; none in other scenes."""
+        stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
+        return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
+
+    def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal) or clean
+        echoes (recipe)."""
+        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
+        kind = self._config["shards"]["kind"]
+        if kind == "recipe":
+            return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
+        tiles = {"tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else {}
+        return {"signals": f"{base}/noisy/{chunk}.npy", **tiles}
+
+    def reduced(self, wildcards: Any) -> dict[str, str]:
+        """Reduced images of a chunk and its motion table; nothing where the tiles stage makes none of this size."""
+        if not self._run.is_reduced(int(wildcards.size)):
+            return {}
+        base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
+        return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": self.motion(wildcards)}

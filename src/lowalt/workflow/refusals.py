@@ -1,0 +1,90 @@
+"""Refusals of configurations whose values contradict each other, other runs or the files that are there.
+
+Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
+"""
+
+from pathlib import Path
+
+from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
+from lowalt.common.config import plain
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
+from lowalt.shards.clean import refuse
+from lowalt.targets.records import missing_inputs, records_of
+
+TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
+"""Blocks of the configuration that may differ between a run and the run whose data set it trains on."""
+
+
+def refuse_sizes(config: dict) -> None:
+    """Refuse sizes of motion models whose range is reversed, and sizes together with effects."""
+    sizes = config["motion"].get("sizes_m", {})
+    for category, (low, high) in sizes.items():
+        if low > high:
+            raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
+    if sizes and config["effects"]:
+        raise InputError(
+            f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one or the other"
+        )
+
+
+def refuse_input(config: dict) -> None:
+    """Refuse a cache of images for samples made on the spot, and shards of clean echoes in scenes that have none."""
+    if config["shards"]["kind"] == "recipe":
+        refuse(config["effects"])
+    block = config["recognition"]
+    if block.get("input") == "dataset" and block["cache"]:
+        raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
+
+
+def refuse_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
+    """Refuse to train on a run that is missing, differs in network, spectra, images or classes, or has this seed."""
+    made = Path("results") / name / "config.yaml"
+    if name in (config["run"], config.get("data")) or not made.is_file():
+        raise InputError(f"recognition.extra: {name!r}, expected another, finished run; no {made} or it is this run")
+    if not config["recognition"]["cache"]:
+        raise InputError("recognition.extra: given without recognition.cache, expected true")
+    own, other = plain(config), plain(load_yaml(made))
+    differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
+    if differ:
+        raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
+    others = classes_of({name: record["published"] for name, record in records_of(other["targets"]).items()})
+    if others != classes:
+        raise InputError(f"recognition.extra: run {name!r} has the classes {others}, expected {classes}")
+    if own["seed"] == other["seed"]:
+        raise InputError(
+            f"recognition.extra: run {name!r} has this run's seed {own['seed']}, so its motion models would be those "
+            "that are tested; expected another seed"
+        )
+
+
+def refuse_no_files(targets: dict, inputs: str | None) -> None:
+    """Refuse a folder of inputs that holds none of the named files, where built-in models would replace them all."""
+    if targets.get("where_missing") != "builtin":
+        return
+    named = records_of({**targets, "where_missing": "refuse"})
+    real = {name: record for name, record in named.items() if record["source"] in ("mesh", "mocap")}
+    lacking = [name for name, record in real.items() if missing_inputs({name: record}, inputs)]
+    if real and len(lacking) == len(real):
+        raise InputError(f"inputs: {inputs}, expected a folder with the files of at least one of {lacking}")
+
+
+def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
+    """Refuse flight heights for names that are neither subtypes nor classes."""
+    unknown = sorted(set(heights) - {*published, *classes, *CATEGORIES})
+    if unknown:
+        raise InputError(f"motion.height_m: {unknown}, expected subtypes, classes {list(classes)} or {list(AIRBORNE)}")
+
+
+def refuse_data(config: dict) -> None:
+    """Refuse another run's data set that is not there or was made with other settings than this configuration's."""
+    name = config.get("data", config["run"])
+    if name == config["run"]:
+        return
+    made = Path("results") / name / "config.yaml"
+    if not made.is_file():
+        raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
+    own, other = plain(config), plain(load_yaml(made))
+    differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
+    if differ:
+        raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
