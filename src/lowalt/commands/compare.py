@@ -45,6 +45,7 @@ def _seconds(folder: Path) -> dict[str, float]:
 
 
 def _sizes(folder: Path) -> dict[str, int]:
+    """Samples and bytes of the data set; empty where the run has none."""
     path = folder / "shards/index.json"
     if not path.exists():
         return {}
@@ -53,7 +54,7 @@ def _sizes(folder: Path) -> dict[str, int]:
 
 
 def facts(folder: Path) -> dict[str, dict]:
-    """Return what one run's folder tells, {part: {what: value}}.
+    """Return the facts of one run's folder, {part: {name: value}}.
 
     Parts: configuration (dotted keys), accuracy_percent, processor_s, data.
     Raises: InputError naming the folder that is no run's.
@@ -67,7 +68,7 @@ def facts(folder: Path) -> dict[str, dict]:
 
 
 def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
-    """Return, of two runs' folders, {part: {what: (of the first, of the second)}} for all that differs or is measured.
+    """Return {part: {name: (value of the first, value of the second)}} for all that differs or is measured in two runs.
 
     Parts: configuration (only what differs), accuracy_percent, processor_s, data. None stands where a run has none.
     Raises: InputError naming the folder that is no run's.
@@ -75,6 +76,7 @@ def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
     found = [facts(folder) for folder in (one, other)]
 
     def pairs(part: str) -> dict[str, tuple]:
+        """Values of both runs in one part, by name; None where a run has none."""
         first, second = (mine[part] for mine in found)
         return {name: (first.get(name), second.get(name)) for name in dict.fromkeys([*first, *second])}
 
@@ -83,6 +85,7 @@ def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
 
 
 def _cell(value: object) -> str:
+    """A value as text; a dash for None."""
     return "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
 
 

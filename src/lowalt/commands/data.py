@@ -1,4 +1,4 @@
-"""The commands `lowalt verify`, `lowalt remake` and `lowalt predict`: is a data set whole, what does a model say."""
+"""The commands `lowalt verify`, `lowalt remake` and `lowalt predict`: check a data set, remake samples, ask a model."""
 
 import argparse
 import json

@@ -1,4 +1,4 @@
-"""The command `lowalt report --gallery`: a page that links all finished runs and holds any two side by side."""
+"""The command `lowalt report --gallery`: a page that links all finished runs and compares any two of them."""
 
 import argparse
 from pathlib import Path

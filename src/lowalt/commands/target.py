@@ -20,6 +20,7 @@ TABLE = SHIPPED / "config/targets.csv"
 
 
 def _unit(text: str) -> str | float:
+    """Unit of a command line: a name of UNITS_M, or metres. Raises: ArgumentTypeError for other text."""
     if text in UNITS_M:
         return text
     try:
@@ -62,6 +63,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
 
 
 def _row(table: Path, subtype: str) -> dict:
+    """The row of a subtype in a table of targets. Raises: InputError for an unknown subtype."""
     rows = load_table(table)
     if subtype not in rows:
         raise InputError(f"--subtype is {subtype!r}, expected one of {list(rows)}")
@@ -69,6 +71,7 @@ def _row(table: Path, subtype: str) -> dict:
 
 
 def _inspect(given: argparse.Namespace) -> str:
+    """Inspect a mesh and draw it."""
     from lowalt.report.figures.inspection import inspection_picture
 
     found = inspect_mesh(given.file, given.category, given.unit)
@@ -79,6 +82,7 @@ def _inspect(given: argparse.Namespace) -> str:
 
 
 def _new(given: argparse.Namespace) -> str:
+    """Draft a record of a mesh file."""
     row = _row(given.table, given.subtype)
     if row["category"] == "Pedestrian":
         raise InputError(f"--subtype is {given.subtype!r}, a pedestrian, expected a UAV, a bird or a vehicle")
@@ -102,6 +106,7 @@ def _new(given: argparse.Namespace) -> str:
 
 
 def _make(given: argparse.Namespace) -> str:
+    """Make the cloud of a record and a picture of it."""
     from lowalt.targets.make import make
 
     records = read_records(given.record)
@@ -125,6 +130,7 @@ def _make(given: argparse.Namespace) -> str:
 
 
 def _picture(cloud: Path, out: Path) -> str:
+    """Draw a cloud's file and return the picture's path."""
     from lowalt.report.figures.target import target_animation, target_picture
 
     draw = target_animation if out.suffix == ".gif" else target_picture

@@ -15,9 +15,9 @@ def add_noise(
 ) -> np.ndarray:
     """Return `signal` plus circular complex Gaussian noise at `snr_db`, complex128 of the same shape (N,).
 
-    The noise power is `power` / 10^(snr_db / 10), by default of mean |signal|^2; give the target's own where the signal
-    holds more than its echo. At an SNR of +inf nothing is drawn and the signal comes
-    back as it is; a signal of zeros has no power to set noise against and stays zeros.
+    The noise power is `power` / 10^(snr_db / 10), where `power` is mean |signal|^2 by default; give the power of
+    the target's echo where the signal holds more than that. At an SNR of +inf nothing is drawn and the signal is
+    returned unchanged. A signal of zeros has no power to refer to and stays zeros.
     Raises: InputError for an empty or non-finite signal, an SNR that is NaN or -inf, a negative power, or no generator
     where noise is to be drawn.
     Source: paper, section V-A; unit-power circular noise has variance 1/2 a component.

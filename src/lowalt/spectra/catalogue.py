@@ -79,12 +79,15 @@ class Spectra(Mapping[str, Any]):
         return cls(**found)
 
     def __getitem__(self, name: str) -> Any:
+        """Settings of one spectrum."""
         return self._settings[name]
 
     def __iter__(self) -> Iterator[str]:
+        """Names, in the order of a tile's columns."""
         return iter(self._settings)
 
     def __len__(self) -> int:
+        """Number of spectra."""
         return len(self._settings)
 
     def check(self, symbols: int) -> None:

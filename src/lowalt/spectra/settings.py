@@ -8,12 +8,14 @@ from lowalt.common.errors import InputError
 
 
 def _whole(where: str, value: object, least: int) -> int:
+    """Return an integer of at least `least`. Raises: InputError naming `where`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{where} is {value!r}, expected an integer >= {least}")
     return int(value)
 
 
 def _power_of_two(where: str, value: object, least: int) -> int:
+    """Return a power of two of at least `least`. Raises: InputError naming `where`."""
     number = _whole(where, value, least)
     # The sliding transform doubles its window and its points level by level.
     if number & (number - 1):

@@ -2,7 +2,7 @@
 
 Axes: front +y, right +x, up +z, metres. The origin lies at the wing's quarter chord, under the rotor's hub at mid
 cabin, or in the middle of the envelope. A plane's wing span, a helicopter's rotor diameter and a balloon's diameter are
-the published size. What a layout needs is in FIGURES; where a number below is a plain factor it only rounds or joins
+the published size. FIGURES lists the figures that each layout needs; plain factors below only round or join
 shells.
 """
 
@@ -58,7 +58,7 @@ _LEFT = np.diag([-1.0, 1.0, 1.0])
 
 
 def fault(record: dict) -> str | None:
-    """Return what makes a merged record no aircraft of its layout, or None."""
+    """Return the reason why a merged record is no aircraft of its layout, or None."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     model, size, count = record["model"], record["published"]["size_m"], record["published"]["n_rotors_or_wings"]
     if record["size_is"] != SIZES[model]:
@@ -85,7 +85,7 @@ def _both(shell: Surface) -> list[Surface]:
 def _propeller(
     name: str, hub: tuple[float, float, float], size: tuple[float, float, float], facing: np.ndarray, sense: int = 1
 ) -> Part:
-    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is what `facing` makes of up.
+    """A turning propeller of a `size` (diameter m, blade's chord m, blades) whose axis is facing @ (0, 0, 1).
 
     Rotors share their points by the area of their blades.
     """

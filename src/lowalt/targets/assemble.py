@@ -26,8 +26,8 @@ CANDIDATES_PER_POINT = 12
 class Part:
     """One part of a model: closed shells in body axes (m), and how the part moves.
 
-    `copies` > 1: the shells are one of that many equal copies about the hinge's axis. `cuts` are volumes the part's
-    surface is cut away in (wheel wells). `weight` is its share among the moving parts.
+    `copies` > 1: the shells are one of that many equal copies about the hinge's axis. `cuts` are volumes (wheel wells)
+    inside which the part has no surface. `weight` is its share among the moving parts.
     """
 
     name: str

@@ -14,7 +14,7 @@ WHEEL_M = 0.678
 CRANK_M = 0.170
 WHEEL_BASE_M = 1.02
 GEAR = 3
-"""Turns of the wheels a turn of the cranks; a whole number closes the cycle. 1.0 turn/s is then 6.4 m/s."""
+"""Turns of the wheels for each turn of the cranks; a whole number closes the cycle. 1.0 turn/s is then 6.4 m/s."""
 RIM = 8
 """Points on each rim."""
 CHAINS = (

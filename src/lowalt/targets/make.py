@@ -15,6 +15,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
 
 
 def _made(record: dict, inputs: Path | None, seed: int) -> Cloud:
+    """Return the cloud of a merged record, unchecked; arguments and errors as `make`."""
     # Imports wait for the source: a built-in cloud must not pay for pymeshlab.
     source = record.get("source")
     if source == "builtin":

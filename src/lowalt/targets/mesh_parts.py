@@ -1,7 +1,7 @@
 """From repaired meshes to parts: placing, cutting regions, finding hinges. All in metres along the file's axes.
 
-A part is a pool of dense samples of its surface; which samples belong to which part is decided here, where and how
-large the target is comes later. Pure functions over arrays.
+A part is a pool of dense samples of its surface. This module decides which samples belong to which part; `mesh_size`
+scales and moves the target later. Pure functions over arrays.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation
 
 SHARED_LIMIT = 0.01
-"""Share of its samples that a region may have in common with another's: regions that touch share their border."""
+"""Largest share of its samples that a region may have in common with another: regions that touch share a border."""
 
 
 @dataclass(frozen=True)
@@ -123,10 +123,11 @@ def refuse_shared(pool: Pool, mesh: Mesh, regions: dict[str, dict], where: str) 
 def hinged(pool: Pool, part: dict, up: np.ndarray, front: np.ndarray, where: str) -> Pool:
     """Return the pool with its hinge and unit axis, given by the record's part or found from its samples.
 
-    Found: the hinge is the middle of a wheel's extents or the mean of a rotor's samples, the axis the samples'
-    thinnest direction. Not said: a rotor's axis is found, a wheel's sideways, a wing's the front line. Signs: a rotor
-    turns anticlockwise about the axis seen from above, a wheel rolls to the front, a wing rises, all at positive
-    angles; `sense: cw` turns a rotor's axis round. `up` and `front` (3,) are the target's, in the file's axes.
+    Where the record says "found", the hinge is the middle of a wheel's extents or the mean of a rotor's samples, and
+    the axis is the direction in which the samples are thinnest. Where it names no axis, that of a rotor is found, that
+    of a wheel points sideways, and that of a wing to the front. Signs: at positive angles a rotor turns anticlockwise
+    seen from above, a wheel rolls to the front and a wing rises; `sense: cw` reverses a rotor's axis. `up` and `front`
+    (3,) are the target's, in the file's axes.
     Raises: InputError naming `where` for too few samples to find an axis.
     """
     right = np.cross(front, up)

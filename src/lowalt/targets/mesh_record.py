@@ -1,8 +1,8 @@
 """The keys and values of a mesh record, checked before any file is opened.
 
-All places are along the axes of the mesh file, before scaling, in metres or with `lengths: file` in the record's unit;
-a checked record has metres. The order of keys and parts means nothing. The keys stand in `records.schema.yaml`, with
-their meaning.
+All places are along the axes of the mesh file, before scaling, in metres, or with `lengths: file` in the record's
+unit; a checked record has metres. The order of keys and parts changes nothing. `records.schema.yaml` lists the keys
+with their meaning.
 """
 
 from lowalt.common.classes import like
@@ -37,7 +37,7 @@ def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
 
 
 def _ancestors(name: str, parts: dict[str, dict]) -> list[str]:
-    """The parent of a part, the parent's parent and so on; it ends at a name that stands there already."""
+    """The parent of a part, the parent's parent and so on; it ends at a name that occurs twice."""
     found = [name]
     while (parent := parts.get(found[-1], {}).get("parent")) is not None:
         found.append(parent)
@@ -78,6 +78,7 @@ def in_metres(record: dict) -> dict:
     factor = UNITS_M[unit] if isinstance(unit, str) else unit
 
     def scaled(value: object) -> object:
+        """Return lengths times the factor in nested lists and mappings; names and flags stay."""
         if isinstance(value, dict):
             return {key: item if key in ("axis", "whole") else scaled(item) for key, item in value.items()}
         if isinstance(value, list):
@@ -85,6 +86,7 @@ def in_metres(record: dict) -> dict:
         return factor * value if isinstance(value, (int, float)) else value
 
     def part_in_metres(part: dict) -> dict:
+        """Return a part whose hinge, region and moves are in metres."""
         places = {key: scaled(part[key]) for key in ("region", "hinge") if key in part}
         meshes = [mesh | {"move": scaled(mesh["move"])} if "move" in mesh else mesh for mesh in part.get("meshes", [])]
         return part | places | ({"meshes": meshes} if meshes else {})
@@ -130,6 +132,6 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
 
 
 def record_files(record: dict) -> list[str]:
-    """Return the user's files a mesh record needs, relative to the folder of inputs, each once, in order."""
+    """Return the user's files that a mesh record names, relative to the folder of inputs, each once, in order."""
     files = [mesh["file"] for part in record["parts"].values() for mesh in part.get("meshes", [])]
     return list(dict.fromkeys(files))

@@ -14,7 +14,7 @@ from lowalt.common import portable
 from lowalt.common.errors import InputError
 
 HEADER_BYTES = 1 << 20
-"""Bytes at the start of a file in which its unit and its extensions stand."""
+"""Number of bytes at the start of a file that are searched for its unit and its extensions."""
 
 
 @dataclass(frozen=True)
@@ -90,5 +90,6 @@ def selected(path: Path, names: list[str] | None) -> list[Piece]:
 
 
 def _lacking(found: list[Piece], names: list[str]) -> list[str]:
+    """Return the names that no piece has, as its geometry or its instance."""
     known = {name for piece in found for name in (piece.geometry, piece.instance)}
     return sorted(set(names) - known)

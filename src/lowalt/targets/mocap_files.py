@@ -138,6 +138,7 @@ def in_radians(path: Path) -> bool:
 
 
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
+    """Return the numbers of a line of a frame. Raises: InputError naming `where` for a fault in it."""
     expected = len(skeleton.dofs.get(words[0], ()))
     try:
         values = [float(word) for word in words[1:]]

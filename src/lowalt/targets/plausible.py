@@ -1,7 +1,8 @@
-"""Whether the parts of a user's mesh can be what the record calls them: wheels under a car, hubs amid their blades.
+"""Whether the parts of a user's mesh fit their kinds: wheels below a car, a hub in the middle of its blades.
 
-A wrong direction, unit or hinge still gives a cloud; here it is found by its geometry. Pure functions over pools in
-body axes (x right, y front, z up, metres, the mesh's own size), before anything is scaled or set on the ground.
+A wrong direction, unit or hinge still gives a cloud; this module finds it by the geometry of the parts. Pure functions
+over pools in body axes (x right, y front, z up, metres, the mesh's own size), before anything is scaled or set on the
+ground.
 """
 
 import warnings
@@ -12,9 +13,9 @@ from lowalt.common.errors import InputError, InputWarning
 from lowalt.targets.mesh_parts import Pool
 
 ACROSS = np.cos(np.radians(20.0))
-"""Least cosine between a wheel's axis and the car's width: steered wheels turn further, but not in a model."""
+"""Least cosine between a wheel's axis and the car's width; models have their front wheels straight."""
 ROUND = 1.1
-"""A wheel may be this much wider than the smaller of its two extents across the axis."""
+"""Largest ratio of a wheel's width to the smaller of its two extents across the axis."""
 OFF_HUB = 1.0
 """Largest distance from a rotor's hub to the middle of its surface, in parts of the rotor's own largest extent; a
 single blade without its hub may have up to 1."""
@@ -22,11 +23,12 @@ FEWEST_WHEELS = 3
 
 
 def _extent(points: np.ndarray) -> np.ndarray:
+    """Extents (3,) of points (N, 3)."""
     return np.ptp(points, axis=0)
 
 
 def _wheel_faults(parts: dict[str, Pool], kinds: dict[str, str]) -> list[str]:
-    """One sentence for each wheel that cannot be one."""
+    """Return a sentence for each wheel whose place, axis or shape is not that of a wheel."""
     body = next(pool.points for name, pool in parts.items() if kinds[name] == "body")
     low, high = body[:, 2].min(), body[:, 2].max()
     found = []
@@ -51,7 +53,7 @@ def _wheel_faults(parts: dict[str, Pool], kinds: dict[str, str]) -> list[str]:
 
 
 def _rotor_faults(parts: dict[str, Pool], kinds: dict[str, str]) -> list[str]:
-    """One sentence for each rotor whose hub is not amid its blades."""
+    """Return a sentence for each rotor whose hub is too far from the middle of its blades."""
     found = []
     for name, pool in parts.items():
         if kinds[name] == "rotor":
@@ -100,7 +102,7 @@ def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, st
 def refuse_implausible(
     parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, where: str
 ) -> None:
-    """Refuse parts that cannot be what they are called, and warn of what is unusual.
+    """Refuse parts whose shape contradicts their kind, and warn of unusual ones.
 
     `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part that has one,
     `category` the published class that the target is like.

@@ -26,6 +26,7 @@ def keys(section: str) -> tuple[str, ...]:
 
 @functools.cache
 def _validator(section: str) -> jsonschema.Draft202012Validator:
+    """Return the validator of a section, made once."""
     return jsonschema.Draft202012Validator({"$defs": schema()["$defs"], **schema()["sources"][section]})
 
 

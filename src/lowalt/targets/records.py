@@ -1,9 +1,9 @@
-"""Records: what each subtype is made from, read from the table of published values and from record files.
+"""Records of all subtypes, read from the table of published values and from record files.
 
 A record file is YAML, one record a name. Later files replace earlier ones, whole records at a time; files of the
 configuration's key `targets.own` come last. A record may have a key `row`, whose cells replace those of the subtype's
-row in the table of targets or make a new row: one file is then a whole new target. What only one source understands (a
-mesh's unit, a recording's trim) is checked by that source's own `check_record`.
+row in the table of targets or make a new row: one file is then a whole new target. Keys of one source alone (a mesh's
+unit, the frames of a recording) are checked by that source's own `check_record`.
 """
 
 import csv
@@ -62,6 +62,7 @@ def load_table(path: str | Path) -> dict[str, dict]:
 
 
 def _cell(where: str, column: str, text: str) -> str | int | float | None:
+    """Return a cell as text, number or None. Raises: InputError naming `where` and the column."""
     if column in _WORDS:
         return text
     if text == "":
@@ -185,7 +186,7 @@ def merge(row: dict, record: dict, where: str) -> dict:
 
 
 def _check_like(merged: dict, where: str) -> None:
-    """Refuse a record of which nobody knows how its target moves, or whose row lacks the speeds it needs."""
+    """Refuse a record without a published class that it is like, or whose row lacks the speeds of that class."""
     try:
         kind = like(merged)
     except InputError as error:

@@ -1,4 +1,4 @@
-"""The 31 nodes of a pedestrian: their names, who hangs on whom, and forward kinematics.
+"""The 31 nodes of a pedestrian: their names, the parent of each, and forward kinematics.
 
 Shared by recordings (`mocap`) and the built-in gait (`gait`), so that both give the same cloud. A node is the far
 end of the bone that carries its name, as in the CMU skeleton files. Axes: x right, y front, z up, metres.
@@ -56,6 +56,7 @@ def stature_m(offsets_m: np.ndarray) -> float:
     """
 
     def bone(name: str) -> np.ndarray:
+        """Return the bone (3,) of a node."""
         return offsets_m[NODES.index(name)]
 
     spine = sum(portable.norm(bone(name)) for name in _SPINE)

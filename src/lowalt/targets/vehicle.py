@@ -32,7 +32,7 @@ MOVING_SHARE = 0.35
 
 
 def fault(record: dict) -> str | None:
-    """Return what makes a merged record no car, or None."""
+    """Return the reason why a merged record is no car, or None."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     table = record["published"]
     axle = f["front_overhang"] + f["wheel_base"]
@@ -152,7 +152,7 @@ def parts(record: dict) -> tuple[list[Part], dict]:
             )  # fmt: skip
             inside, outside = side * (across - 0.6 * tyre), side * width
             wells.append(cylinder(0.56 * diameter, (inside, *centre[1:]), (outside, *centre[1:]), 24))
-    # No station looks up at a car: the underside between the sills would only take points from what is seen.
+    # No station sees a car from below, so the underside between the sills gets no points.
     floor = f["ground_clearance"] + 0.06 * height
     wells.append(box((0.86 * width, 1.1 * length, 2 * floor), (0, 0, -height / 2)))
     skins = (_lower, _greenhouse) if record["model"] == "car" else (_coach,)

@@ -48,6 +48,7 @@ class DeviceRenderer:
         }
 
     def _put(self, table: np.ndarray) -> Tensor:
+        """Copy a table to the device; integers become int64."""
         table = table.astype(np.int64) if table.dtype.kind in "iu" else table
         return torch.from_numpy(np.ascontiguousarray(table)).to(self.device)
 

@@ -101,9 +101,11 @@ class Tiles:
         self._file = self.path.open("rb")
 
     def __len__(self) -> int:
+        """Number of tiles."""
         return len(self.offsets) - 1
 
     def __getitem__(self, number: int) -> bytes:
+        """Bytes of one PNG. Raises: IndexError for a number out of range."""
         if not 0 <= number < len(self):
             raise IndexError(number)
         first, last = (int(self.offsets[number + step]) for step in (0, 1))

@@ -16,11 +16,12 @@ from lowalt.tiles import filters
 from lowalt.tiles.huffman import zlib_compress
 
 MOST_EXPANSION = 1032
-"""No zlib stream expands by more. Source: RFC 1951, a match of 258 bytes takes two bits at least."""
+"""Most bytes that one byte of a zlib stream gives. Source: RFC 1951, a match of 258 bytes takes at least two bits."""
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def _chunk(name: bytes, body: bytes) -> bytes:
+    """A chunk of a PNG: length, name, body, checksum."""
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", deflate.crc32(name + body))
 
 

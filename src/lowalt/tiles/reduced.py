@@ -47,6 +47,7 @@ def writing(
             arrays.append(np.lib.format.open_memmap(temporary, "w+", np.uint8, shape))
 
         def fill(number: int, tile: np.ndarray) -> None:
+            """Write the reduced images of one sample's tile into all files."""
             images = split(tile, spectra) if arrays else tile
             for array in arrays:
                 array[number] = resize(images, array.shape[-1])

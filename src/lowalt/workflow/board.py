@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from lowalt.common.progress import Progress
 
 Reader = Callable[[str], Progress | None]
-"""Reads how far a job is from its log."""
+"""Reads from a job's log how much of the job is done."""
 
 LEAST_PART = 0.1
 """Part of a job that must be done before the first estimate: a job starts with modules and machine code to compile."""
@@ -17,7 +17,7 @@ LEAST_PART = 0.1
 
 @dataclass
 class Job:
-    """A job that runs: its stage, what it is about (its wildcards), its log and when it started (s)."""
+    """A job that runs: its stage, its wildcards as a label, its log and the time of its start (s)."""
 
     stage: str
     label: str
@@ -65,7 +65,7 @@ class Board:
         return new
 
     def finish(self, job_id: object, now: float, good: bool = True) -> str | None:
-        """Note the end of a job; return its stage where no job of it is left, else None. Unknown jobs are left out."""
+        """Note the end of a job; return its stage if that was the stage's last job, else None."""
         job = self.jobs.pop(str(job_id), None)
         if job is None:
             return None
@@ -86,6 +86,7 @@ class Board:
 
     @property
     def _width(self) -> int:
+        """Characters of the longest name of a stage."""
         return max(map(len, [*self.totals, *self.stages, "all"]))
 
     def line(self, name: str, now: float, read: Reader) -> str:
@@ -107,7 +108,7 @@ class Board:
 
 
 def _running(job: Job, progress: Progress | None) -> str:
-    """The job's wildcards, if any, and how far it is, if it says so."""
+    """Return the job's wildcards and, where its log tells, how much of it is done."""
     parts = f"{progress.done}/{progress.total} {progress.unit}" if progress else ""
     return f"{job.label} {parts}".strip()
 
@@ -120,7 +121,7 @@ def span(seconds: float) -> str:
 
 
 def pace(per_second: float) -> str:
-    """Return a rate of jobs a second, minute or hour, whichever reads as a number of at least one."""
+    """Return a rate in jobs a second, a minute or an hour: the first of these units that gives at least one."""
     for factor, unit in ((1, "s"), (60, "min"), (3600, "h")):
         if per_second * factor >= 1 or unit == "h":
             return f"{per_second * factor:.1f}/{unit}"

@@ -33,9 +33,9 @@ EARLY = 0.1
 
 
 def room_mb(written_mb: float, share: float) -> float:
-    """Return the room of a disk (MB) that a run of `written_mb` fills: from SMALL_MB to LARGE_MB, evenly in logarithm.
+    """Return the room of a disk (MB) that a run of `written_mb` fills: smallest x (largest / smallest)^share.
 
-    share: where between the two, in [0, 1). A run that writes less than the largest disk holds gets smaller ones.
+    share: in [0, 1). largest = min(LARGE_MB, 0.8 written_mb); smallest = min(SMALL_MB, largest / 2).
     """
     largest = min(LARGE_MB, 0.8 * written_mb)
     smallest = min(SMALL_MB, largest / 2)

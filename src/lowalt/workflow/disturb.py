@@ -1,4 +1,4 @@
-"""Disturbances of a running Snakemake: kills of all, of it alone, of a worker, by a signal or for want of memory.
+"""Disturbances of a running Snakemake: signals to all its processes, to it alone or to a worker, and lack of memory.
 
 Only processes of the run that the caller started are touched: each function takes that run's main process.
 """
@@ -48,6 +48,7 @@ def running(main: psutil.Process) -> str:
 
 
 def _kill(processes: list[psutil.Process], number: int) -> None:
+    """Send a signal to processes; those that have ended are left out."""
     for process in processes:
         try:
             process.send_signal(number)
@@ -98,6 +99,7 @@ class MemoryGroup:
     """A memory control group of our own, in whose processes the kernel's out-of-memory killer can be called."""
 
     def __init__(self, parent: Path) -> None:
+        """Make the group's folder in the folder of its parent group."""
         self.folder = parent / f"lowalt-campaign-{os.getpid()}"
         self.folder.mkdir()
         unified = (self.folder / "memory.max").exists()
@@ -106,6 +108,7 @@ class MemoryGroup:
         self.events = self.folder / ("memory.events" if unified else "memory.oom_control")
 
     def _v1(self, what: str) -> Path:
+        """File of a limit or a usage in bytes, in the first version of control groups."""
         return self.folder / f"memory.{what}_in_bytes"
 
     def enter(self) -> None:
@@ -113,6 +116,7 @@ class MemoryGroup:
         (self.folder / "cgroup.procs").write_text(str(os.getpid()))
 
     def _kills(self) -> int:
+        """Number of processes that the kernel has killed in the group for lack of memory."""
         words = self.events.read_text().split()
         return int(words[words.index("oom_kill") + 1])
 
@@ -132,6 +136,7 @@ class MemoryGroup:
         return self._kills() > before
 
     def _to_usage(self) -> None:
+        """Set the limit to the memory that the group holds; change nothing where the kernel refuses."""
         try:
             self.limit.write_text(self.usage.read_text().strip())
         except OSError:

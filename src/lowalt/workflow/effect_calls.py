@@ -11,6 +11,7 @@ class EffectCalls:
     """No effects, each effect alone with its defaults, and scenes."""
 
     def __init__(self, run: Run) -> None:
+        """Keep the run whose effects are priced."""
         self._run = run
 
     @cached_property

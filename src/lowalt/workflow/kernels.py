@@ -1,8 +1,8 @@
 """`python -m lowalt.workflow.kernels`: compile the machine code of data stages before their jobs ask for it.
 
-Machine code is compiled once a machine (`lowalt.common.jit`), which takes most of a minute of processor time. The first
-jobs of the echo and tiles stages would do it one stage after the other. Here two processes do it at the same time, from
-smallest inputs that go through the stages' own commands; a job that comes meanwhile waits for them.
+Machine code is compiled once on each machine (`lowalt.common.jit`), which takes most of a minute of processor time. The
+first jobs of the echo and tiles stages would compile it one stage after the other. Here two processes do so at the same
+time: each runs its stage's own command on very small inputs. A job that starts meanwhile waits for them.
 """
 
 import json
@@ -64,7 +64,7 @@ def tiles(config: dict, folder: Path) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Compile for the stages named (none: all, a process each)."""
+    """Compile for the named stages; without a name for all, each in a process of its own."""
     unknown = sorted(set(arguments) - set(STAGES))
     if unknown:
         raise InputError(f"lowalt.workflow.kernels: {unknown}, expected some of {STAGES}")

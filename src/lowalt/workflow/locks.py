@@ -24,7 +24,7 @@ GRACE_S = 10.0
 
 @contextlib.contextmanager
 def guarded(folder: Path) -> Iterator[None]:
-    """Let one process at a time look at the locks and change them; the system lets go of a process that dies inside.
+    """Let one process at a time look at the locks and change them; the system frees the guard of a process that dies.
 
     Raises: InputError where the file system of the folder cannot lock files, since two runs could then both win.
     """
@@ -40,10 +40,12 @@ def guarded(folder: Path) -> Iterator[None]:
 
 
 def _owner_path(locks: Path, number: int) -> Path:
+    """File of a lock's owner."""
     return locks / f"{number}.owner.json"
 
 
 def _lock_path(locks: Path, number: int, kind: str) -> Path:
+    """File of a lock's files of one kind, as Snakemake names it."""
     return locks / f"{number}.{kind}.lock"
 
 
@@ -127,6 +129,7 @@ def install() -> None:
 
     @contextlib.contextmanager
     def lock(self: FilePersistence) -> Iterator[None]:
+        """Hold the lock of a working directory for the length of a block. Raises: WorkflowError naming the holders."""
         folder, locks, owner = Path(self.path), Path(self._lockdir), Owner.current()
         try:
             with guarded(folder):
@@ -145,6 +148,7 @@ def install() -> None:
 
     @contextlib.contextmanager
     def lock_warn_only(self: FilePersistence) -> Iterator[None]:
+        """Say who holds the lock and go on, as Snakemake does for runs that write nothing."""
         if self.locked:
             logger.info(holders(Path(self._lockdir)))
         yield

@@ -1,4 +1,4 @@
-"""Options of a stage's command line that stand there only where the job has the input they name.
+"""Options of a stage's command line that depend on the job: each is an empty text where the job lacks its input.
 
 Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`.
 """
@@ -47,7 +47,7 @@ def extra(wildcards: Any, input: Any) -> str:
 
 
 def samples(wildcards: Any, input: Any) -> str:
-    """The shrunk images, the index of the shards, or the configuration whose samples are made."""
+    """Option that names the shrunk images, the index of the shards, or the configuration to make samples from."""
     if input.get("dataset"):
         return f"--dataset {input.dataset}"
     return f"--views {input.views}" if input.get("views") else f"--index {input.index}"

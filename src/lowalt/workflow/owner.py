@@ -81,6 +81,7 @@ def started(pid: int) -> int | None:
 
 
 def _state(pid: int) -> str | None:
+    """State of a process as one letter, None where there is no such process."""
     fields = _fields(pid)
     return fields and fields[0]
 
@@ -94,8 +95,10 @@ def _fields(pid: int) -> list[str] | None:
 
 
 def _boot() -> str:
+    """Id of this start of the machine."""
     return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
 
 
 def _namespace() -> str:
+    """Namespace in which this process has its id."""
     return str(Path("/proc/self/ns/pid").readlink())

@@ -32,7 +32,7 @@ SIGNS = {
         ("job_selector", "jobs, self.remaining_jobs, self.resources, self._input_sizes"),
     ),
 }
-"""Text of the methods that shows a fault: every line must be there."""
+"""Methods and lines of their source: a scheduler has the fault if all of its lines are there."""
 
 LEAST = 8
 """Ready jobs of each rule that a round looks at, on a machine with few cores."""
@@ -44,6 +44,7 @@ def faults(scheduler: type) -> set[str]:
 
 
 def _source(scheduler: type, method: str) -> str:
+    """Source text of a method or property, empty where the class has none."""
     found = inspect.getattr_static(scheduler, method, None)
     function = found.fget if isinstance(found, property) else found
     return inspect.getsource(function) if function else ""
@@ -105,12 +106,14 @@ def _entry(job: Any) -> tuple[str, tuple]:
 
 
 class Unfinished(Sequence):
-    """The jobs of a scheduler that have not finished and do not run, listed only where somebody looks."""
+    """The jobs of a scheduler that have not finished and do not run, listed only when an item is read."""
 
     def __init__(self, scheduler: Any) -> None:
+        """Keep the scheduler whose jobs are listed."""
         self._scheduler = scheduler
 
     def _jobs(self) -> list[Any]:
+        """Jobs that have neither finished nor failed and do not run."""
         scheduler = self._scheduler
         dag, taken = scheduler.workflow.dag, scheduler.running | scheduler.failed
         return [job for job in dag.needrun_jobs() if job not in taken and not dag.finished(job)]

@@ -1,4 +1,4 @@
-"""The settings of every stage as one JSON text each: what a stage does not read does not stand in its text.
+"""The settings of every stage as one JSON text each, which holds only the values that the stage reads.
 
 Snakemake compares these texts, so a changed value re-runs the stages that read it and no others. Each method takes the
 wildcards of a job and can stand in a rule's `params:`. A text is made once: Snakemake asks for it again and again.
@@ -22,22 +22,27 @@ class Settings:
     """Settings of the stages of one run."""
 
     def __init__(self, run: Run, calls: EffectCalls) -> None:
+        """Keep the run and its calls for effects."""
         self._run, self._config, self._calls = run, run.config, calls
         self._texts: dict[tuple, str] = {}
 
     def _text(self, *key: Any, **block: Any) -> str:
+        """The JSON text of a block, made once for each key."""
         if key not in self._texts:
             self._texts[key] = canonical(block)
         return self._texts[key]
 
     def _blocks(self, *names: str) -> dict:
+        """Blocks of the configuration by name."""
         return {name: self._config[name] for name in names}
 
     @property
     def _published(self) -> dict[str, dict]:
+        """Rows of the table of targets by subtype."""
         return {name: record["published"] for name, record in self._run.records.items()}
 
     def _chunk(self, wildcards: Any) -> Chunk:
+        """The chunk that a job is about."""
         return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}")
 
     def _snrs(self, wildcards: Any) -> list[float]:
@@ -134,7 +139,7 @@ class Settings:
         )
 
     def trial(self, wildcards: Any) -> str:
-        """How a network is trained and asked where no candidate changes it, and the seed of a trial."""
+        """Settings of training and evaluation before a candidate changes them, and the seed of a trial."""
         block, seed = self._config["recognition"], int(wildcards.train_seed)
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation", "evaluation")}
         return self._text(
@@ -142,7 +147,7 @@ class Settings:
         )
 
     def evaluation(self, wildcards: Any) -> str:
-        """How a network is asked."""
+        """Settings with which a network predicts."""
         return self._text("evaluation", **self._config["recognition"]["evaluation"])
 
     def seed(self, wildcards: Any) -> str:
@@ -166,7 +171,7 @@ class Settings:
         )
 
     def effects_table(self, wildcards: Any) -> str:
-        """The run's seed, and how a network is asked."""
+        """The run's seed, and the settings with which a network predicts."""
         evaluation = self._config["recognition"]["evaluation"]
         return self._text("effects_table", **self._blocks("seed"), evaluation=evaluation)
 

@@ -15,6 +15,7 @@ CATALOGUE = "lowalt.spectra.catalogue"
 
 
 def _file(module: str) -> Path | None:
+    """File of a module of the package, None where there is none."""
     base = ROOT.joinpath(*module.split("."))
     for path in (base / "__init__.py", base.with_suffix(".py")):
         if path.is_file():

@@ -1,8 +1,8 @@
 """Disk and memory that a run will need, from measured figures, compared with what the machine has before it starts.
 
-A figure of a rule is a line in its jobs' size: bytes of its outputs and peak memory as base + slope x units, where a
-unit is what the job's arrays consist of (`units`). The lines come from finished runs by `space_measured.py` and stand
-in results/reference/space.csv. Pure functions of tables and numbers; only `free_memory` looks at the machine.
+The figures of a rule are two lines in the size of its jobs: bytes of outputs and peak memory, each base + slope x
+units. A unit is one element of the job's arrays (`units`). `space_measured.py` fits the lines to finished runs and
+writes results/reference/space.csv. Pure functions of tables and numbers; only `memory` looks at the machine.
 """
 
 from collections.abc import Iterable, Mapping
@@ -115,7 +115,7 @@ def _levels(wildcards: Mapping[str, str], plan: Plan) -> int:
 
 
 def need(jobs: Iterable[Job], figures: dict[str, Figures], plan: Plan, config: dict, cores: int) -> Need:
-    """Return what these jobs need on a machine with so many cores.
+    """Return the disk and the memory that these jobs need on a machine with so many cores.
 
     Outputs that are there already are written over, so only their growth counts, plus one output at a time that stands
     next to the one it replaces. Temporary outputs are counted as two for each core. Rules without figures are named.
@@ -144,11 +144,11 @@ def need(jobs: Iterable[Job], figures: dict[str, Figures], plan: Plan, config: d
 
 
 NEARLY = 0.9
-"""Share of the free disk above which a person is warned."""
+"""A run that needs more than this share of the free disk gets a warning."""
 
 
 def verdicts(found: Need, disk_free: float, memory_free: float, memory_total: float) -> tuple[list[str], list[str]]:
-    """Return why a run cannot end well (sentences with figures), and what a person should know before it starts.
+    """Return sentences with figures: reasons why a run cannot finish, and warnings before it starts.
 
     disk_free, memory_free, memory_total: bytes.
     """
@@ -172,6 +172,7 @@ def verdicts(found: Need, disk_free: float, memory_free: float, memory_total: fl
 
 
 def _size(size: float) -> str:
+    """Bytes as text in GB or MB."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"
 
 

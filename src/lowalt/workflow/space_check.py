@@ -20,10 +20,10 @@ ALIKE = {"echo_in_scene": "echo"}
 
 
 def check(jobs: list[space.Job], plan: Plan, config: dict, cores: int | None, table: Path, folder: Path) -> list[str]:
-    """Return what a person should know about disk and memory before these jobs start.
+    """Return warnings about disk and memory for these jobs before they start.
 
-    cores: of this machine, or None where jobs run elsewhere, whose memory is then not looked at. folder: where results
-    go. The environment variable LOWALT_SPACE chooses what happens where a run cannot fit: refuse (default), warn, off.
+    cores: of this machine, or None where jobs run on other machines; memory is then not checked. folder: that of
+    the results. The environment variable LOWALT_SPACE decides on a run that cannot fit: refuse (default), warn, off.
     Raises: SpaceError with figures where the run cannot fit; InputError where the variable has another value.
     """
     choice = os.environ.get(VARIABLE, "refuse")
@@ -66,7 +66,7 @@ def before(workflow: object, plan: Plan, config: dict) -> None:
 
 
 def after(folder: Path = Path()) -> None:
-    """Say in one line that the disk is full, where it is: a failed job's own message may not have found room."""
+    """Log one line if the disk is full: a failed job may not have had room to write its own message."""
     from snakemake.logging import logger
 
     free = free_bytes(folder / "results")

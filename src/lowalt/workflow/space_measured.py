@@ -1,6 +1,6 @@
-"""`python -m lowalt.workflow.space_measured`: what jobs wrote and held in finished runs, as lines in their size.
+"""`python -m lowalt.workflow.space_measured`: fit lines to the disk and memory of jobs in finished runs.
 
-Bytes are those of the files a run left, peak memory is what each job wrote into its log or stands in a table of stages.
+Bytes are those of the files that a run left. Peak memory comes from each job's log or from a table of stages.
 """
 
 import argparse
@@ -34,7 +34,7 @@ OUTPUTS = {
 """Files of a run that one job of a rule leaves. Tiles are gone at the end; the shards hold the same images."""
 TEMPORARY = ("tiles",)
 ROUNDING = 1e-6
-"""Share of the largest value below which what a slope adds is rounding."""
+"""A slope that adds less than this share of the largest value is set to zero: it is rounding."""
 PEAK = re.compile(r"peak memory (\d+) MiB")
 
 
@@ -55,6 +55,7 @@ def line(points: list[tuple[float, float]]) -> tuple[float, float]:
 
 
 def _plan(config: dict) -> Plan:
+    """The plan of the run of a configuration."""
     records = records_of(config["targets"])
     return Plan.of(config, {name: record["published"] for name, record in records.items()})
 

@@ -35,7 +35,7 @@ def alive(kept: dict) -> bool:
 
 
 def read(folder: Path = FOLDER) -> list[dict]:
-    """Return what all runs of a working directory left, oldest first; damaged files are left out."""
+    """Return the kept states of all runs of a working directory, oldest first; damaged files are left out."""
     found = []
     for path in folder.glob("*.json"):
         try:
@@ -46,6 +46,7 @@ def read(folder: Path = FOLDER) -> list[dict]:
 
 
 def _sweep(folder: Path) -> None:
+    """Remove the files of runs that have ended."""
     for kept in read(folder):
         if not alive(kept):
             (folder / f"{kept['pid']}.json").unlink(missing_ok=True)

@@ -23,7 +23,7 @@ TIMINGS = (
 )  # fmt: skip
 """Names of files and folders of a run that hold times, which no run repeats."""
 LOUD = ("Traceback (most recent call last)", "Directory cannot be locked")
-"""Text that a disturbed run must not leave a person with."""
+"""Texts that the output of a disturbed run must not contain."""
 
 
 def checksums(folder: Path) -> dict[str, str]:
@@ -38,7 +38,7 @@ def checksums(folder: Path) -> dict[str, str]:
 
 
 def copy_project(project: Path, folder: Path) -> None:
-    """Copy what a run reads, without results and bytecode; with the machine code that the project has compiled."""
+    """Copy the files that a run reads and the compiled machine code, without results and bytecode."""
     for name in PARTS:
         source = project / name
         if source.is_dir():
@@ -51,6 +51,7 @@ class Trial:
     """One copy of the project in which a run is started again and again."""
 
     def __init__(self, project: Path, folder: Path, options: argparse.Namespace, group: MemoryGroup | None) -> None:
+        """Copy the project into a folder; options are those of the campaign."""
         self.folder, self.options, self.group, self.said = folder, options, group, ""
         folder.mkdir(exist_ok=True)
         copy_project(project, folder)
@@ -71,6 +72,7 @@ class Trial:
             )  # fmt: skip
 
     def _first(self) -> None:
+        """In the new process, before Snakemake: take Ctrl-C as at a terminal, and enter the memory group."""
         # A shell's background job ignores Ctrl-C and hands that on; the run must feel it as at a terminal.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         if self.group:
