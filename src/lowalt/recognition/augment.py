@@ -34,6 +34,7 @@ def check(block: dict) -> dict:
 
 
 def _contrast(exponent: float, zero: int) -> np.ndarray:
+    """Return the table (256,) uint8 that raises the distance from the zero index to a power; the ends stay."""
     index = np.arange(256) - zero
     reach = 255 - zero
     values = zero + np.sign(index) * reach * (np.abs(index) / reach) ** exponent

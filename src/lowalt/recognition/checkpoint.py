@@ -16,6 +16,7 @@ from lowalt.common.files import existing, replacing
 
 
 def _digest(state: object) -> str:
+    """SHA-256 of all values of a state, in their order."""
     hasher = hashlib.sha256()
 
     def walk(value: object) -> None:

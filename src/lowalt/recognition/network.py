@@ -78,6 +78,7 @@ class Palettes(nn.Module):
 
 
 def _encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
+    """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity for depth 0."""
     if depth == 0:
         return nn.Identity()
     layer = nn.TransformerEncoderLayer(

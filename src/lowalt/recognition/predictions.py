@@ -102,6 +102,7 @@ def from_facts(facts: Facts, stations: tuple[int, ...], probabilities: np.ndarra
 
 
 def _number(value: float) -> str:
+    """A number as a cell of the file; NaN as an empty one."""
     return "" if math.isnan(value) else repr(float(value))
 
 

@@ -85,6 +85,7 @@ def train(
 
 
 def _record(path: Path, content: dict) -> None:
+    """Write a record as JSON with sorted keys."""
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(content, indent=1, sort_keys=True) + "\n")
 

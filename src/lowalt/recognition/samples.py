@@ -148,6 +148,7 @@ def with_extra(own: ViewSamples, extra: ViewSamples) -> ViewSamples:
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:
+    """Return the images and facts of a cache file that are in `folds`, None where none is."""
     checked_archive(path, "views")
     try:
         with np.load(path, allow_pickle=False) as data:

@@ -86,12 +86,14 @@ def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, wh
 
 
 def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, where: str) -> tuple[int, ...]:
+    """Return the sorted places of names among the known ones; refuse an unknown name or one given twice."""
     if not parts or len(set(parts)) != len(parts) or not set(parts) <= set(known):
         raise InputError(f"{where}: {what} {text!r}, expected some of {known}, each once")
     return tuple(sorted(known.index(part) for part in parts))
 
 
 def _number(row: dict, column: str, kind: type, low: float, high: float, where: str) -> float:
+    """Return the number in an optional column, its default where the cell is empty; refuse one out of range."""
     text = row.get(column) or ""
     if not text:
         return 1.0 if column == "share" else 0
@@ -105,6 +107,7 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
 
 
 def _station_names(text: str, known: Sequence[str]) -> list[str]:
+    """Split names of stations, "north+south" or "ABC"."""
     names = text.split("+")
     return names if set(names) <= set(known) else list(text)
 

@@ -15,6 +15,7 @@ from lowalt.shards import ShardSet
 
 
 def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
+    """Read and check the class probabilities of a prediction file: {key: probabilities}."""
     found: dict[str, list[float]] = {}
     with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)

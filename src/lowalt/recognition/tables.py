@@ -58,6 +58,7 @@ def snr_text(snr_db: float) -> str:
 
 
 def _percent(share: float) -> str:
+    """A share in percent, with four digits."""
     return f"{100 * share:.4f}"
 
 
@@ -113,6 +114,7 @@ def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], widt
 
 
 def _alarm_part(found: Predictions) -> AlarmPart:
+    """The data of predictions from which false alarms are counted."""
     return AlarmPart(found.probabilities[:, LOOKED_FOR], found.label, found.motion, found.subtype)
 
 
@@ -174,6 +176,7 @@ def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[
 
 
 def _write(path: Path, columns: list[str], rows: list[list]) -> None:
+    """Write a table whose first columns are protocol and scheme."""
     write_csv(path, ["protocol", "scheme", *columns], rows)
 
 

@@ -71,6 +71,7 @@ def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterab
 
 
 def _spread(groups: list[list[float]]) -> str:
+    """Pooled standard deviation of accuracies between seeds in points; empty where no model has two seeds."""
     several = [100 * np.array(group) for group in groups if len(group) > 1]
     if not several:
         return ""

@@ -43,6 +43,7 @@ def _columns(values: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _wav(path: Path, record: Record) -> _Table:
+    """Read a WAV file, which states its rate."""
     from scipy.io import wavfile
 
     rate, values = wavfile.read(path)
@@ -51,6 +52,7 @@ def _wav(path: Path, record: Record) -> _Table:
 
 
 def _mat(path: Path, record: Record) -> _Table:
+    """Read the record's variable of a MATLAB file, or its only one."""
     held = read_mat(path)
     name = record.variable
     if name is None:
@@ -64,6 +66,7 @@ def _mat(path: Path, record: Record) -> _Table:
 
 
 def _csv(path: Path, record: Record) -> _Table:
+    """Read a CSV table; its first line names the columns unless all its cells are numbers."""
     with text_file(path, "recording") as file:
         first = file.readline().strip().split(",")
     try:
@@ -76,10 +79,12 @@ def _csv(path: Path, record: Record) -> _Table:
 
 
 def _npy(path: Path, record: Record) -> _Table:
+    """Read a NumPy array."""
     return _Table(_columns(np.load(path, allow_pickle=False), path), (), None)
 
 
 def _sigmf(path: Path, record: Record) -> _Table:
+    """Read a SigMF recording, which may state its rate."""
     try:
         import sigmf
     except ImportError as error:

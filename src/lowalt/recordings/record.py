@@ -53,6 +53,7 @@ class Record:
 
 
 def _positive(where: str, key: str, value: object) -> float:
+    """Return the value of a key in hertz; refuse one that is no positive number."""
     good = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value) and value > 0
     if not good:
         raise InputError(f"{where}: {key} is {value!r}, expected a positive number of hertz")
@@ -60,6 +61,7 @@ def _positive(where: str, key: str, value: object) -> float:
 
 
 def _one_of(where: str, key: str, value: object, known: tuple[str, ...]) -> None:
+    """Refuse a value that is not among the known ones."""
     if value not in known:
         raise InputError(f"{where}: {key} is {value!r}, expected one of {known}")
 

@@ -103,6 +103,7 @@ def write_table(path: str | Path, columns: tuple[str, ...], rows: list) -> None:
 
 
 def _cell(value: object) -> object:
+    """Return a value as a cell of the table."""
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.5g}"
     return value

@@ -89,6 +89,7 @@ def _course(scene: dict, cloud: Cloud, times_s: np.ndarray, rng: np.random.Gener
 
 
 def _rate(scene: dict, cloud: Cloud, speed: float, rng: np.random.Generator) -> float:
+    """The rate (Hz) of rotors, wings or wheels; wheels roll at the speed (m/s)."""
     if cloud.like == "Vehicle":
         return speed / (math.pi * cloud.record["wheel_diameter_m"])
     return value(scene["rate_hz"], rng) if "rate_hz" in scene else 0.0
