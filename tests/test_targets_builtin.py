@@ -3,8 +3,6 @@
 import hashlib
 import itertools
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +11,11 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import slug
 from lowalt.targets.assemble import allot, turn
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES
-from lowalt.targets.cloud import check, read, write
+from lowalt.targets.cloud import check, write
 from lowalt.targets.dimensions import rows as dimension_rows
-from lowalt.targets.gallery import main as gallery
 from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.surfaces import inside
 from lowalt.targets.uav_pieces import hubs, motor_diagonal
@@ -286,30 +282,6 @@ def test_flap_and_cross_section_may_be_set():
     cloud = variant("Crow", flap={"mean_deg": 5.0}, rcs_m2_per_point=0.01)
     assert cloud.record["flap"]["mean_deg"] == 5.0 and cloud.record["flap"]["amplitude_deg"] == 40.0
     assert (cloud.rcs_m2 == 0.01).all()
-
-
-def test_command_line_makes_the_same_cloud(tmp_path, clouds):
-    settings = tmp_path / "settings.json"
-    settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"]}))
-    out = tmp_path / "seagull.npz"
-    command = [sys.executable, "-m", "lowalt.targets", "--settings", f"@{settings}", "--out", str(out)]
-    subprocess.run(command, check=True, capture_output=True)
-    np.testing.assert_array_equal(read(out).points, clouds["Seagull"].points)
-    settings.write_text(json.dumps({"seed": 1, "record": RECORDS["Seagull"] | {"source": "clay"}}))
-    refused = subprocess.run(command, capture_output=True, text=True)
-    assert refused.returncode == 2 and "record.source is 'clay'" in refused.stderr
-
-
-def test_gallery_draws_every_cloud(tmp_path, clouds):
-    names = ["DJI Mini 2", "EH 216 S", "Crow", "Xiaomi SU7 2024"]
-    for name in names:
-        write(tmp_path / f"{slug(name)}.npz", clouds[name])
-    out = tmp_path / "gallery.png"
-    gallery(["--clouds", *(str(tmp_path / f"{slug(name)}.npz") for name in names), "--out", str(out)])
-    from PIL import Image
-
-    picture = np.asarray(Image.open(out).convert("RGB"))
-    assert picture.shape[1] > 1000 and len({tuple(pixel) for pixel in picture[::7, ::7].reshape(-1, 3)}) > 20
 
 
 def test_every_figure_has_a_source_or_the_mark_estimate():

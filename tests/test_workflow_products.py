@@ -12,7 +12,6 @@ import yaml
 
 from lowalt.common.config import merge, plain
 from lowalt.common.errors import InputError
-from lowalt.common.shipped import located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
 from lowalt.report.inputs import KEPT, OPTIONAL
@@ -22,7 +21,6 @@ from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import FIDELITY, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
-from lowalt.workflow.sources import code, sources
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
@@ -282,26 +280,3 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
 def test_a_run_that_transfers_from_itself_is_refused():
     with pytest.raises(InputError, match=r"recognition\.transfer: 'default' is this run"):
         run_of({"recognition": {"transfer": ["default"]}})
-
-
-def test_code_is_the_sources_relative_to_the_checkout_or_absolute_elsewhere(tmp_path, monkeypatch):
-    here = code("lowalt.noise")
-    assert "src/lowalt/noise/awgn.py" in here
-    assert [ROOT / path for path in here] == list(sources("lowalt.noise"))
-    code.cache_clear()
-    monkeypatch.chdir(tmp_path)
-    assert all(Path(path).is_absolute() for path in code("lowalt.noise"))
-    code.cache_clear()
-
-
-def test_files_of_the_checkout_are_found_from_elsewhere_and_own_ones_come_first(tmp_path, monkeypatch):
-    config = load_yaml("config/default.yaml")
-    assert located(config, ROOT) == config
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "config").mkdir()
-    (tmp_path / "config/schemes.csv").touch()
-    found = located(config, ROOT)
-    assert found["targets"]["table"] == str(ROOT / "config/targets.csv")
-    assert found["targets"]["records"] == [str(ROOT / path) for path in config["targets"]["records"]]
-    assert found["recognition"]["table"] == "config/schemes.csv" and found["report"]["accuracy"] is None
-    assert located(found, ROOT) == found
