@@ -7,7 +7,8 @@ import pytest
 from scipy import stats
 
 from lowalt.effects.channel import clutter, patches
-from test_effects_channel import NETWORK, body, seen, settings_of
+from test_effects_channel import NETWORK, body, seen
+from test_effects_clutter import settings_of
 
 
 def finely(power: np.ndarray, count: int, parts: int = 16) -> np.ndarray:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
+from test_effects_need import recording_of
 
 from lowalt.effects.catalogue import BY_NEED
-from test_effects import recording_of
 from test_effects_bounds import decoded, excess
 
 
