@@ -1,9 +1,8 @@
-"""Shards: bytes, order, records, index, damage, reading by us and by webdataset."""
+"""Shards: bytes, order, index, damage, reading by us and by webdataset."""
 
 import hashlib
 import io
 import json
-import math
 import pickle
 import shutil
 import tarfile
@@ -15,13 +14,12 @@ from PIL import Image
 
 from dataset import SEED, SNRS, SPLIT, TARGETS, build, motion_rows, publish, write_settings
 from lowalt.common.errors import InputError
-from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.motion import write_table
 from lowalt.shards import ShardSet, faults
 from lowalt.shards.__main__ import main
 from lowalt.shards.read import complex_signals
-from lowalt.shards.record import geometry, record, row_of, sample_key, snr_label
+from lowalt.shards.record import row_of
 from lowalt.shards.size import main as size_main
 from lowalt.shards.size import models_per_chunk, sample_bytes
 from lowalt.shards.table import map_samples
@@ -113,66 +111,10 @@ def test_order_depends_on_names_alone(images, tmp_path):
     assert before != sorted(before)
 
 
-def test_record_tells_motion_geometry_and_versions():
-    row = motion_rows("seen")[0]
-    row.update(x_m=30.0, y_m=40.0, z_m=25.0, vx_mps=3.0, vy_mps=4.0, vz_mps=7.0)
-    network = Network.from_settings(NETWORK)
-    entry = json.loads(record(row, math.inf, "val", SEED, network))
-    assert entry["key"] == "dji-mavic-3-000000-snrinf"
-    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (0, "UAV", 300.0, False)
-    assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] == 0.0
-    assert entry["seed"] == SEED
-    seen = entry["geometry"]["A"]
-    # Station A stands at (0, 0, 25): range 50 m, level, receding at 5 m/s.
-    assert seen["range_m"] == 50 and seen["omega"] == 0
-    assert seen["radial_mps"] == pytest.approx(5)
-    assert seen["psi"] == pytest.approx(-math.sin(math.radians(30)) * 0.6 + math.cos(math.radians(30)) * 0.8)
-    assert set(entry["versions"]) == {"lowalt"}
-
-
-def types(value):
-    """The tree of a record's types, a leaf for each value."""
-    return {name: types(item) for name, item in value.items()} if isinstance(value, dict) else type(value)
-
-
-def test_every_field_has_one_type_in_all_records():
-    network = Network.from_settings(NETWORK)
-    rows = [*motion_rows("seen"), *motion_rows("unseen")]
-    trees = [types(json.loads(record(row, snr, "val", SEED, network))) for row in rows for snr in (3, 3.5, math.inf)]
-    assert all(tree == trees[0] for tree in trees)
-    assert type(None) not in trees[0]["motion"].values()
-
-
-def test_a_record_tells_row_and_snr_back():
-    row = motion_rows("seen")[0]
-    for snr_db in (3.0, math.inf):
-        text = record(row, snr_db, "val", SEED, Network.from_settings(NETWORK))
-        again, snr = row_of(json.loads(text))
-        assert snr == snr_db
-        assert record(again, snr, "val", SEED, Network.from_settings(NETWORK)) == text
-    with pytest.raises(InputError, match=r"of lowalt 0\.1\.0, expected"):
-        row_of({"key": "crow", "snr_db": "inf", "versions": {"lowalt": "0.1.0"}})
-
-
 def test_signals_of_an_older_data_set_are_read(signals):
     stored = ShardSet(signals / "index.json").signal(0)
     assert (complex_signals(stored.view(np.float32).reshape(3, 400, 2)) == stored).all()
     assert complex_signals(stored) is stored
-
-
-def test_geometry_above_a_station_is_finite():
-    row = {**motion_rows("seen")[0], "x_m": 0.0, "y_m": 0.0, "z_m": 25.0}
-    assert geometry(row, Network.from_settings(NETWORK))["A"] == {
-        "range_m": 0.0, "psi": 0.0, "omega": 0.0, "radial_mps": 0.0,
-    }  # fmt: skip
-
-
-def test_keys_are_unique_and_without_dots():
-    snrs = [3, 3.5, -60, 200, 0.25, math.inf, 13, -3.5]
-    keys = {sample_key("EH216-S", 7, snr) for snr in snrs}
-    assert len(keys) == len(snrs)
-    assert not any("." in key or "/" in key for key in keys)
-    assert snr_label(3) == snr_label(3.0) == "snr003"
 
 
 def test_index_has_counts_and_checksums(images):
