@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.optimize import differential_evolution
-from test_effects_need import recording_of
 
 from lowalt.effects.catalogue import BY_NEED
 from test_effects_bounds import decoded, excess
+from test_effects_need import recording_of
 
 
 def share(place: np.ndarray, recorded: bool) -> float:
