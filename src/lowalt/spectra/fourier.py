@@ -56,7 +56,7 @@ def fill(re: np.ndarray, im: np.ndarray, settings: Fourier, tables: tuple, out: 
 
 
 def on_device(re: Any, im: Any, settings: Fourier, tables: list, starts: int) -> Any:
-    """Return what `fill` computes for tensors (B, stations, symbols): (B, stations, points, starts), the same bits.
+    """Return the values of `fill` for tensors (B, stations, symbols): (B, stations, points, starts), the same bits.
 
     tables: tensors (stations, points) of cosines and sines.
     """

@@ -30,7 +30,7 @@ MOVING_SHARE = 0.62
 
 
 def fault(record: dict) -> str | None:
-    """Return what makes a merged record no bird, or None."""
+    """Return the reason why a merged record is no bird, or None."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     long = f["bill"] + f["head"] + f["neck"] + f["tail"]
     if long > 0.9:

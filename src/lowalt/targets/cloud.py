@@ -172,7 +172,7 @@ def _check_nodes(cloud: Cloud) -> None:
 
 
 def _rate_fault(cloud: Cloud) -> str | None:
-    """Return what is wrong with a cloud's rate factors, or None."""
+    """Return the fault of a cloud's rate factors, or None."""
     given = cloud.record.get("rate_factors", {})
     if not isinstance(given, dict):
         return f"{given!r}, expected numbers by the parts' names"

@@ -91,7 +91,7 @@ def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
 
 
 def inspect_mesh(path: str | Path, category: str, unit: str | float | None = None) -> Inspection:
-    """Return what a mesh file holds, for a target of the category UAV, Bird or Vehicle.
+    """Return the facts and guesses on a mesh file for a target of the category UAV, Bird or Vehicle.
 
     `unit` is given where the user knows it; otherwise it is the file's own statement or a guess from the size.
     Raises: InputError naming the file and the reason where it cannot be read.

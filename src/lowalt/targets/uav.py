@@ -38,7 +38,7 @@ MOVING_SHARE = 0.4
 
 
 def fault(record: dict) -> str | None:
-    """Return what makes a merged record no craft that could fly or be sampled, or None."""
+    """Return the reason why a merged record is no craft that could fly or be sampled, or None."""
     figures = {name: value["si"] for name, value in record["figures"].items()}
     if record["model"] in aircraft.LAYOUTS:
         return aircraft.fault(record)

@@ -62,7 +62,7 @@ def fill(re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out:
 
 
 def on_device(re: Any, im: Any, settings: Transfer, tables: list, starts: int) -> Any:
-    """Return what `fill` computes for tensors (B, stations, symbols): (B, stations, speeds, starts), the same bits.
+    """Return the values of `fill` for tensors (B, stations, symbols): (B, stations, speeds, starts), the same bits.
 
     tables: tensors (stations, ...) of `tables` of every station.
     """
