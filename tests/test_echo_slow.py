@@ -4,7 +4,7 @@ from math import comb
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from lowalt.echo import Path, Rigid, echo_signal, method_text
@@ -43,13 +43,15 @@ def flight(rng, symbols, points, away, size, speed=15.0, yaw=0.3, spin=0.0):
     seed=st.integers(0, 10_000), away=st.floats(40.0, 3000.0), size=st.floats(0.02, 3.0), speed=st.floats(0.0, 40.0),
     yaw=st.floats(0.0, 2.0), tolerance=st.sampled_from([1e-2, 1e-3, 1e-5, 1e-7, 1e-9]),
 )  # fmt: skip
+@example(seed=190, away=40.0, size=0.5, speed=21.0, yaw=2.0, tolerance=0.01)
 def test_what_is_interpolated_keeps_its_bound(always_approximate, seed, away, size, speed, yaw, tolerance):
     net, rng = network(symbols=120), np.random.default_rng(seed)
     motion = flight(rng, 120, 40, (away, 0.3 * away, 40.0), size, speed, yaw, 400.0)
     arguments = (net, net.stations[0], motion, rng.exponential(size=80), motion.translation[0, 0])
     truth, result = echo_signal(*arguments, paths=[Path()]), echo_signal(*arguments, tolerance)
     assert relative(result.signal, truth.signal) <= min(result.bound, tolerance) + truth.bound
-    assert (result.totals >= truth.totals * (1 - 1e-3 * tolerance - 1e-9)).all()
+    # Approximated array gains err relative to the beam's peak, so far from the beam relative to the largest sum.
+    assert (result.totals >= truth.totals * (1 - 1e-9) - 1e-3 * tolerance * truth.totals.max()).all()
     assert (result.cell == truth.cell).all() or result.near_ties + truth.near_ties
     # Blades that turn by a radian a symbol are never interpolated; a body is, unless it is large.
     assert result.method.slow[0] in (0, 40) and (result.method.slow[0] == 40 or size > 0.3 or tolerance < 1e-6)

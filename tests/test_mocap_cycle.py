@@ -81,6 +81,7 @@ def test_a_cycle_that_closes_badly_is_refused_with_its_mismatch(files):
     assert gap > 0.01 and f"31 points, mocap (closes to {100 * gap:.2g} cm), " in caption(kept)
 
 
+@pytest.mark.slow
 def test_a_long_recording_is_searched_in_little_memory():
     rng = np.random.default_rng(1)
     frames = 6000

@@ -182,6 +182,7 @@ def test_the_page_shows_every_row(tmp_path):
 
 
 @pytest.mark.workflow
+@pytest.mark.slow
 def test_effects_are_priced_where_asked_for_and_nowhere_else(tmp_path):
     pytest.importorskip("snakemake")
     from test_workflow import planned, snakemake, workplace

@@ -100,6 +100,7 @@ def finished(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_one_core_and_two_a_job_a_station_and_one_for_all_give_the_same_bytes(finished, tmp_path):
     alone = workplace(tmp_path)
     (alone / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"echo": {"job": "chunk"}}))

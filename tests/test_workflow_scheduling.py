@@ -149,6 +149,7 @@ onsuccess:
 
 
 @pytest.mark.workflow
+@pytest.mark.slow
 def test_mended_rounds_are_fewer_and_look_at_fewer_jobs_in_a_run_that_waits(tmp_path):
     counts = {}
     for mended in ("no", "yes"):
