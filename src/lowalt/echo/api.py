@@ -35,9 +35,9 @@ class EchoResult(NamedTuple):
     of symbols in which a second cell is within a relative 1e-12, so that rounding decides between both; bound: proved
     bound of the error relative to max |signal|, inf where nothing can be said; method: how it was computed, and why;
     gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
-    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included; where points were
-    interpolated in slow time, a little above it, or below it by at most a thousandth of the tolerance times the
-    largest of these sums.
+    totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included. With a tolerance it is an
+    upper bound, too large by at most the tolerance times the largest, or by more where points were interpolated in
+    slow time.
     """
 
     signal: np.ndarray

@@ -137,6 +137,8 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             total *= scale * (1.0 + unit * (chunk + 20))
             second *= scale * (1.0 + unit * (chunk + 24))
             peaks = scale / (1.0 - extents[i, SPREAD]) ** 2
+            # The amplitudes summed are approximated ones: the sum of the true ones may be larger by their error.
+            total += total * plan.share + peaks * (plan.peak + gains)
             summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
             bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
