@@ -45,8 +45,8 @@ def test_tables_say_what_the_predictions_say(tmp_path):
     test = found.fold == "test"
     accuracy = read_rows(tmp_path / "out/accuracy.csv")
     assert [row["scheme"] for row in accuracy] == ["A:VRP+TRP+VT"] * 4 + ["ABC:VRP+TRP+VT"] * 4 + ["A:VT"] * 4
-    head = ["protocol", "scheme", "snr_db", "accuracy_percent", "samples", "hardware", "seeds", "spread_points"]
-    assert list(accuracy[0]) == head
+    head = ["protocol", "scheme", "snr_db", "accuracy_percent", *tables.F1, "samples", "hardware", "seeds"]
+    assert list(accuracy[0]) == [*head, "spread_points"]
     assert (accuracy[0]["seeds"], accuracy[0]["spread_points"]) == ("1", "")
     for row in accuracy[4:7]:
         chosen = test & (found.snr_db == float(row["snr_db"]))

@@ -1,8 +1,9 @@
 """From prediction files to the paper's tables and further ones, as CSV; no choice is made on test data.
 
 Files written, each with the columns `protocol, scheme` first:
-    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, samples, hardware; several seeds averaged,
-                     seeds says how many and spread_points their standard deviation (empty for one)
+    accuracy.csv     snr_db ("avg": mean over the SNRs), accuracy_percent, macro F1 in percent with its 95 % interval,
+                     samples, hardware; several seeds averaged, seeds says how many and spread_points their standard
+                     deviation (empty for one)
     seen_test.csv    the same for the seen subtypes' test fold in the unseen protocol
     seeds.csv        one row a training: accuracy_percent on average over the SNRs, its network, cost and hardware
     confusion.csv    category, predicted, samples
@@ -31,6 +32,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition.evaluated import Run
 from lowalt.recognition.intervals import model_shares, strict_difference
+from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.statistics import (
@@ -47,6 +49,8 @@ from lowalt.recognition.statistics import (
 )
 
 DETECTIONS = (0.9, 0.95, 0.99)
+F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
+"""Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
 TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
             "samples_per_s", "precision", "ranks")  # fmt: skip
 """Columns that seeds.csv repeats from a training's record."""
@@ -62,9 +66,20 @@ def _percent(share: float) -> str:
     return f"{100 * share:.4f}"
 
 
-def accuracy_rows(runs: list[Run], part: str) -> Iterable[list]:
-    """Yield rows [snr_db, accuracy_percent, samples, hardware, seeds, spread_points] of one scheme's runs, averaged."""
+def accuracy_rows(runs: list[Run], part: str, seed: int) -> Iterable[list]:
+    """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one scheme's runs.
+
+    Values are means over the runs, one a training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
+    subtypes where they were not trained on.
+    """
     parts = [run.part(part) for run in runs]
+    protocol, name = runs[0].protocol, runs[0].scheme
+    generator = stream(seed, "macro-f1", protocol, name, part)
+    whole = (protocol, part) == ("unseen", "test")
+    scores = {
+        snr if snr == "avg" else snr_text(snr): interval
+        for snr, interval in f1_by_snr(parts, len(runs[0].classes), whole, generator).items()
+    }
     tables = [accuracy_by(found.snr_db, found.correct) for found in parts]
     shares = {snr_text(snr): [table[snr][0] for table in tables] for snr in tables[0]}
     counts = {snr_text(snr): count for snr, (_, count) in tables[0].items()}
@@ -72,7 +87,8 @@ def accuracy_rows(runs: list[Run], part: str) -> Iterable[list]:
     counts["avg"] = len(parts[0])
     for snr, values in shares.items():
         spread = _percent(np.std(values, ddof=1)) if len(values) > 1 else ""
-        yield [snr, _percent(np.mean(values)), counts[snr], runs[0].hardware, len(values), spread]
+        f1 = map(_percent, scores[snr])
+        yield [snr, _percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, len(values), spread]
 
 
 def seed_rows(runs: list[Run]) -> Iterable[list]:
@@ -204,12 +220,12 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
         group.append(run)
     keys = sorted(groups, key=lambda key: (key[0], order.index(key[1])))
     share = ["accuracy_percent", "samples"]
-    measured = ["snr_db", *share, "hardware", "seeds", "spread_points"]
+    measured = ["snr_db", "accuracy_percent", *F1, "samples", "hardware", "seeds", "spread_points"]
     bands = ["from", "to", *share]
     rates = ("detected", *map(word, _one_set(runs)[1:]))
     alarm = ["asked_percent", "threshold", *(f"{rate}_{end}" for rate in rates for end in ("percent", "low", "high"))]
     tables = {
-        "accuracy": (measured, lambda group: accuracy_rows(group, "test")),
+        "accuracy": (measured, lambda group: accuracy_rows(group, "test", seed)),
         "seeds": (["seed", "accuracy_percent", *TRAINING, "hardware"], seed_rows),
         "confusion": (["category", "predicted", "samples"], confusion_rows),
         "subtypes": (["category", "subtype", *share], subtype_rows),
@@ -222,7 +238,7 @@ def write(runs: list[Run], order: list[str], published: dict, folder: str | Path
     for name, (columns, rows) in tables.items():
         _write(Path(folder) / f"{name}.csv", columns, [[*key, *row] for key in keys for row in rows(groups[key])])
     seen = [[*key, *row] for key in keys if key[0] == "unseen" and len(groups[key][0].part("seen_test"))
-            for row in accuracy_rows(groups[key], "seen_test")]  # fmt: skip
+            for row in accuracy_rows(groups[key], "seen_test", seed)]  # fmt: skip
     _write(Path(folder) / "seen_test.csv", measured, seen)
     compared = [
         [protocol, better, other, claim, *row]

@@ -27,6 +27,19 @@ def spreads(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
     return dict(result)
 
 
+def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
+    """Return macro F1 on average over the SNRs as protocol -> scheme -> "value (low to high)", in percent.
+
+    Tables of earlier versions have no such column; their schemes are left out.
+    """
+    result: dict = defaultdict(dict)
+    for row in rows:
+        if row["snr_db"] == "avg" and row.get("macro_f1_percent"):
+            value, low, high = (float(row[f"macro_f1_{name}"]) for name in ("percent", "low", "high"))
+            result[row["protocol"]][row["scheme"]] = f"{value:.2f} ({low:.2f} to {high:.2f})"
+    return dict(result)
+
+
 def measurement(path: str | Path) -> dict:
     """Return one job's measurement from Snakemake's benchmark file (JSON lines, extended; the last run counts).
 

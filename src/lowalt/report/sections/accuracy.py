@@ -5,7 +5,7 @@ from pathlib import Path
 from lowalt.common.csv_tables import read_csv
 from lowalt.report.figures.accuracy_plots import over_snr
 from lowalt.report.run import Run
-from lowalt.report.tables import by_scheme, spreads
+from lowalt.report.tables import by_scheme, macro_f1, spreads
 
 COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
 
@@ -30,6 +30,7 @@ def values(run: Run) -> dict:
     return {
         "classes": len(run.shards.classes),
         "ours": ours, "published": paper, "spreads": spreads(measured), "snrs": run.snr_labels,
+        "macro_f1": macro_f1(measured),
         "network": network_words(run.config["recognition"]),
         "plot": over_snr(ours, paper) if ours else None,
     }  # fmt: skip
