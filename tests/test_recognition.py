@@ -8,6 +8,7 @@ import torch
 from torch import nn
 
 from lowalt.common.errors import InputError
+from lowalt.recognition import fusion as fusion_of
 from lowalt.recognition import network, schemes
 
 BLOCK = {
@@ -66,11 +67,11 @@ def test_each_spectrum_is_coloured_by_its_own_palette():
 
 @torch.inference_mode()
 def test_pooling_is_mean_within_a_station_and_max_between_stations():
-    fusion = network.AttentionFusion(8, 3, {**BLOCK, "intra_depth": 0, "inter_depth": 0})
+    fusion = fusion_of.AttentionFusion(8, 3, {**BLOCK, "intra_depth": 0, "inter_depth": 0})
     tokens = torch.randn(5, 3, 3, 8)
     expected = (tokens + fusion.modality).mean(2).amax(1)
     torch.testing.assert_close(fusion(tokens), expected)
-    torch.testing.assert_close(network.MeanFusion()(tokens), tokens.mean((1, 2)))
+    torch.testing.assert_close(fusion_of.MeanFusion(8)(tokens), tokens.mean((1, 2)))
 
 
 @torch.inference_mode()

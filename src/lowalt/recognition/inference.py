@@ -64,7 +64,7 @@ def probabilities(
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
-    mirror: average with the probabilities of the images mirrored along Doppler, which show the target turned by 180
+    mirror: average with the probabilities of the inputs mirrored along Doppler, which show the target turned by 180
     degrees. Each rank gets whole batches, so that sums do not depend on the number of ranks.
     """
     model.eval()
@@ -73,7 +73,7 @@ def probabilities(
         if index % machine.ranks != machine.rank:
             continue
         images = torch.from_numpy(samples.views(numbers[start : start + batch])).to(machine.device)
-        seen = (images, images.flip(-2)) if mirror else (images,)
+        seen = (images, model.mirrored(images)) if mirror else (images,)
         with machine.autocast():
             logits = [model(image) for image in seen]
         result[start : start + batch] = torch.stack([found.double().softmax(1) for found in logits]).mean(0).cpu()

@@ -25,17 +25,24 @@ from torch import nn
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
+from lowalt.recognition import spectrogram_transformer
+from lowalt.recognition.fusion import Fused
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
 
 
 def backbone(name: str, weights: str, size: int) -> nn.Module:
-    """Return the timm model `name` as a feature extractor for size x size RGB images.
+    """Return the timm model `name`, or one of `spectrogram_transformer`, as a feature extractor for size x size RGB
+    images.
 
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
+    if name in spectrogram_transformer.SHAPES:
+        if weights != "none":
+            raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
+        return spectrogram_transformer.backbone(name, size)
     if not timm.is_model(name):
         raise InputError(f"network: backbone {name!r} is not a timm model (timm {timm.__version__})")
     options: dict = {"num_classes": 0}
@@ -77,46 +84,7 @@ class Palettes(nn.Module):
         return colour.movedim(-1, -3)
 
 
-def _encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
-    """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity for depth 0."""
-    if depth == 0:
-        return nn.Identity()
-    layer = nn.TransformerEncoderLayer(
-        width, heads, round(width * feed_forward), dropout, activation="gelu", batch_first=True, norm_first=True
-    )
-    # Pre-norm layers leave their sum unnormalised: the stack needs a norm of its own.
-    return nn.TransformerEncoder(layer, depth, norm=nn.LayerNorm(width), enable_nested_tensor=False)
-
-
-class AttentionFusion(nn.Module):
-    """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and max pool."""
-
-    def __init__(self, width: int, spectra: int, block: dict) -> None:
-        """width: features of a token; spectra: views a station; block: the network's settings."""
-        super().__init__()
-        self.modality = nn.Parameter(torch.empty(spectra, width))
-        nn.init.trunc_normal_(self.modality, std=0.02)
-        shape = (block["heads"], block["feed_forward"], block["dropout"])
-        self.intra = _encoder(width, block["intra_depth"], *shape)
-        self.inter = _encoder(width, block["inter_depth"], *shape)
-
-    def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F."""
-        samples, stations = tokens.shape[:2]
-        tokens = tokens + self.modality
-        station = self.intra(tokens.flatten(0, 1)).mean(dim=1)
-        return self.inter(station.unflatten(0, (samples, stations))).amax(dim=1)
-
-
-class MeanFusion(nn.Module):
-    """The paper's baseline: the mean of all tokens."""
-
-    def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> their mean (B, features)."""
-        return tokens.mean(dim=(1, 2))
-
-
-class Recogniser(nn.Module):
+class Recogniser(Fused):
     """Index images of a scheme's views to a logit for each class: palettes, shared backbone, fusion, classifier."""
 
     def __init__(self, scheme: Scheme, block: dict, size: int, palettes: np.ndarray, classes: int) -> None:
@@ -130,20 +98,9 @@ class Recogniser(nn.Module):
         self.backbone = backbone(scheme.backbone or block["backbone"], block["weights"], size)
         # Number of features that enter the classifier: some networks have a wider layer after their last features.
         width = getattr(self.backbone, "head_hidden_size", self.backbone.num_features)
-        if scheme.fusion == "attention" and width % block["heads"]:
-            raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")
         pre = self.backbone.pretrained_cfg
         self.palettes = Palettes(palettes, scheme.spectra, pre["mean"], pre["std"])
-        self.shape = (len(scheme.stations), len(scheme.spectra))
-        self.classes, mean = classes, scheme.fusion == "mean"
-        self.fusion = MeanFusion() if mean else AttentionFusion(width, len(scheme.spectra), block)
-        if block["hidden"]:
-            self.classifier = nn.Sequential(
-                nn.Linear(width, block["hidden"]), nn.GELU(), nn.Dropout(block["dropout"]),
-                nn.Linear(block["hidden"], classes),
-            )  # fmt: skip
-        else:
-            self.classifier = nn.Linear(width, classes)
+        self.add_head(scheme.fusion, width, (len(scheme.stations), len(scheme.spectra)), block, classes)
 
     def tokens(self, index: torch.Tensor) -> torch.Tensor:
         """Index images (B, K * V, rows, columns) uint8 -> tokens (B, K, V, features)."""
@@ -154,17 +111,10 @@ class Recogniser(nn.Module):
         features = self.backbone(images.flatten(0, 2))
         return features.view(samples, stations, spectra, -1)
 
-    def forward(self, index: torch.Tensor, alone: bool = False) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
-        """Index images (B, K * V, rows, columns) uint8, station-major -> logits (B, classes).
-
-        alone: return as well the logits (B * K, classes) of each station as if it were the only one; the backbone runs
-        once.
-        """
-        tokens = self.tokens(index)
-        logits = self.classifier(self.fusion(tokens))
-        if not alone:
-            return logits
-        return logits, self.classifier(self.fusion(tokens.flatten(0, 1).unsqueeze(1)))
+    @staticmethod
+    def mirrored(index: torch.Tensor) -> torch.Tensor:
+        """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees."""
+        return index.flip(-2)
 
 
 def parameters(model: nn.Module) -> int:

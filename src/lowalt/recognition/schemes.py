@@ -5,7 +5,7 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
     stations    names of stations of the run's network, joined by "+"; names of one letter may stand together, "ABC"
     spectra     spectra joined by "+"
-    fusion      attention (the paper's proposal) | mean (its baseline)
+    fusion      attention (the paper's proposal) | mean (its baseline) | voting | concatenation
     backbone    timm name, or empty for the configuration's own backbone
     protocols   protocols of the paper's tables that hold this row, joined by "+"
 
@@ -29,7 +29,7 @@ TABLE = "config/schemes.csv"
 """Where the table of schemes stands if a command names no other."""
 SPECTRA = tuple(name.upper() for name in NAMES)
 """Spectra as the table of schemes writes them, in the catalogue's order."""
-FUSIONS = ("attention", "mean")
+FUSIONS = ("attention", "mean", "voting", "concatenation")
 PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
 OPTIONAL = ("size", "steps", "share")
