@@ -138,12 +138,24 @@ def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample(rng):
     assert relative(ours.signal, still.signal) > 1e-3
 
 
+WORK = {
+    "transmitter": (interface.DrawsData, interface.ChangesWaveform, interface.PicksSubcarriers, interface.SamplesTime),
+    "channel": (
+        interface.PointsBeams, interface.SetsCrossSections, interface.WeighsPoints, interface.WeighsRoutes,
+        interface.AddsPaths, interface.AddsEchoes, interface.AddsTargets, interface.BoundsItself,
+    ),
+    "motion": (interface.PerturbsMotion,), "receiver": (interface.ChangesSamples,),
+    "detection": (interface.FiltersCells, interface.ChoosesCells),
+}  # fmt: skip
+"""The protocols of each place of which an effect's module satisfies exactly one."""
+
+
 def test_the_catalogue_names_every_effect_module_and_only_those():
     for entry in ORDER:
         module = __import__(dotted(entry.partition("/")[2]), fromlist=["idle"])
         assert module.SOURCE and isinstance(module.DEFAULTS, dict)
         assert isinstance(module, interface.Effect)
-        provided = [one for one in interface.WORK[PLACES[entry.partition("/")[2]]] if isinstance(module, one)]
+        provided = [one for one in WORK[PLACES[entry.partition("/")[2]]] if isinstance(module, one)]
         assert len(provided) == 1
     assert len(set(ORDER)) == len(ORDER)
 

@@ -1,7 +1,7 @@
 """The interface of an effect: the names that its module must offer, and those that it may offer.
 
-An effect is a module, `effects/{place}/{name}.py`. It must offer everything in `Effect` and the working function of one
-of the protocols for its place below. `Checks` and `Amplifies` are optional. The chain asks by `isinstance`.
+An effect is a module, `effects/{place}/{name}.py`. It must offer everything in `Effect` and the functions of exactly
+one protocol that names its place below; those marked optional come in addition. The chain asks by `isinstance`.
 
 N symbols, L points, P parts, M subcarriers. Arrays are complex128 or float64. `settings` holds every key of `DEFAULTS`.
 `rng` is the stream (seed, "effect", name, subtype, model[, station]), so no effect moves another effect's draws.
@@ -196,7 +196,7 @@ class AddsTargets(Protocol):
 
 @runtime_checkable
 class BoundsItself(Protocol):
-    """Channel: physics beyond Eq. 7 that is left out where its bound allows it; `response` and `chain` compute it."""
+    """Channel: physics beyond Eq. 7 that is left out where its bound allows it; `target_echo` computes it."""
 
     def bound(self, settings: dict, view: View, others: frozenset[str]) -> np.ndarray:
         """Return the largest change of any range cell relative to each part's peak amplitudes; (N, P) or broadcast.
@@ -240,22 +240,3 @@ class ChoosesCells(Protocol):
 
     def choose(self, settings: dict, chosen: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return the chosen cells (N,) int64, given those chosen so far and all cells (N, M)."""
-
-
-WORK = {
-    "motion": (PerturbsMotion,),
-    "transmitter": (DrawsData, ChangesWaveform, PicksSubcarriers, SamplesTime),
-    "channel": (
-        PointsBeams,
-        SetsCrossSections,
-        WeighsPoints,
-        WeighsRoutes,
-        AddsPaths,
-        AddsEchoes,
-        AddsTargets,
-        BoundsItself,
-    ),
-    "receiver": (ChangesSamples,),
-    "detection": (FiltersCells, ChoosesCells),
-}
-"""The protocols of each place; an effect's module satisfies exactly one of its place's."""

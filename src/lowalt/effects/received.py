@@ -31,6 +31,7 @@ from lowalt.effects.interface import (
 )
 from lowalt.effects.need import Decision
 from lowalt.effects.steps import error_before, steps_alone
+from lowalt.effects.target_echo import TargetEcho
 from lowalt.effects.view import Beams, View
 from lowalt.targets.cloud import Cloud
 
@@ -107,7 +108,7 @@ def received_signal(
     weighed = weighed or "cell_noise" in chain.names
     own = None
     # Call the engine only where the chain would not compute the same echo itself.
-    if not link and (not exact or (chain.bent and not weighed)):
+    if not link and (not exact or (chain.target.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     chain.others = others(scene, chain, cloud, row, clouds or {})
@@ -141,7 +142,7 @@ def arriving(signal: np.ndarray) -> float:
 
 def seen_alone(chain: Chain) -> np.ndarray:
     """Return the target's echo (N,) on the direct path with its visibility and aspect; SNRs refer to it."""
-    cells = np.fft.ifft(chain.direct, axis=1)
+    cells = np.fft.ifft(chain.target.direct, axis=1)
     return cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
 
 
@@ -152,8 +153,8 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     return cloud
 
 
-def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud]) -> list[Chain]:
-    """Return a chain for every target other than that of `chain`, under the same beams at the same instants."""
+def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud]) -> list[TargetEcho]:
+    """Return the echo of every target other than that of `chain`, under the same beams at the same instants."""
     view = chain.view
     mine = [one for one in chain.channel if not isinstance(one.module, (AddsTargets, AddsEchoes))]
     result = []
@@ -166,9 +167,7 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
             beams = view.beams or Beams(np.zeros(1), view.aim_m[None])
             seen = replace(seen, times_s=view.times_s, sampling=view.sampling, beams=beams)
             draws = partial(_drawn, scene, at, view.station.name)
-            other = Chain(mine, seen, draws)
-            other.sending = chain.sending
-            result.append(other)
+            result.append(TargetEcho(mine, seen, draws, chain.sending))
     return result
 
 

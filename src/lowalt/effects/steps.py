@@ -27,7 +27,7 @@ def error_before(chain: Chain, allowed: float) -> float:
     factors = (one.module.amplifies(one.settings) for one in providing((*chain.receiver, *chain.detection), Amplifies))
     stretch = math.prod(factor for factor in factors if math.isfinite(factor))
     # Instants and frequencies are interpolated one after the other.
-    strongest = stretch * 2.0 * float(chain.strengths.sum(axis=1).max())
+    strongest = stretch * 2.0 * float(chain.target.strengths.sum(axis=1).max())
     fits = allowed
     if chain.step > 0:
         fits = min(allowed, allowed**2 * math.sqrt(0.5 * chain.view.network.subcarriers) / chain.step)

@@ -61,6 +61,11 @@ def turned(angle_rad: np.ndarray) -> np.ndarray:
     return result
 
 
+def baseband_hz(network: Network) -> np.ndarray:
+    """Return the frequency of each subcarrier from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
+    return (np.arange(network.subcarriers) - network.subcarriers // 2) * network.subcarrier_spacing_hz
+
+
 @dataclass(frozen=True)
 class Frame:
     """One coherent processing interval (look) as the receiver of one station knows it."""
@@ -108,8 +113,7 @@ class Frame:
     @cached_property
     def baseband_hz(self) -> np.ndarray:
         """Frequency of each subcarrier from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
-        subcarriers = self.sent.shape[1]
-        return (np.arange(subcarriers) - subcarriers // 2) * self.network.subcarrier_spacing_hz
+        return baseband_hz(self.network)
 
     @property
     def oscillator_hz(self) -> float:

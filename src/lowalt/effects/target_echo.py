@@ -1,0 +1,175 @@
+"""The echo of one moving target at one station over all paths, as subcarriers or as time samples of each symbol."""
+
+from collections.abc import Callable
+from functools import cached_property
+
+import numpy as np
+
+from lowalt.effects import need, steering, waveform
+from lowalt.effects.catalogue import NamedEffect, providing
+from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
+from lowalt.effects.response import ImagePath
+from lowalt.effects.sending import Sending
+from lowalt.effects.steering import Steered
+from lowalt.effects.view import View
+
+EXACT = 1e-13
+"""Error of interpolation, relative to the sum of peak amplitudes, where nothing is approximated."""
+
+
+class TargetEcho:
+    """Computes one target's echo with any subset of its physics by need.
+
+    channel: the scene's channel effects; draws: as in `chain.Chain`; sending: what the station sends. `error` is the
+    largest error of interpolation over frequencies and over instants, each relative to the sum of peak amplitudes.
+    """
+
+    def __init__(
+        self, channel: list[NamedEffect], view: View, draws: Callable[[str], np.random.Generator], sending: Sending
+    ):
+        self.channel, self.view, self.draws, self.sending = channel, view, draws, sending
+        self.error = EXACT
+        self.by_need = {effect.name: effect for effect in providing(channel, BoundsItself)}
+        self._seen: dict[str, np.ndarray] = {}
+        self.factor: np.ndarray | float = 1.0
+        for effect in providing(channel, WeighsPoints):
+            self.factor = self.factor * self._visible(effect, view)
+
+    @property
+    def bent(self) -> bool:
+        """Whether `direct` is not the whole echo: the scene has further paths or physics by need."""
+        return bool(self.by_need or providing(self.channel, AddsPaths))
+
+    @cached_property
+    def strengths(self) -> np.ndarray:
+        """Largest sum of amplitudes (N, P) that each part can have in a range cell before the receiver."""
+        amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
+        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.routes))
+
+    @cached_property
+    def routes(self) -> np.ndarray | float:
+        """Factor on the points' amplitudes: `factor`, or (R, N, L) of each route where the scene tells them apart."""
+        told = providing(self.channel, WeighsRoutes)
+        if not told or not self._paths:
+            return self.factor
+        weighing = providing(self.channel, WeighsPoints)
+        return told[0].module.routes(told[0].settings, self.view, self._paths, weighing, self._visible)
+
+    @cached_property
+    def direct(self) -> np.ndarray:
+        """The target's subcarriers (N, M) on the direct path alone, without physics by need, to rounding."""
+        return steering.echo(self.view, factor=self.factor, error=EXACT)
+
+    @cached_property
+    def own_response(self) -> np.ndarray:
+        """Subcarriers (N, M) of this target with every effect of the scene, to rounding."""
+        return self.subcarriers(self.view, frozenset(self.by_need), self.routes)
+
+    @cached_property
+    def own_samples(self) -> np.ndarray:
+        """Time samples (N, M) of this target with every effect of the scene, to rounding."""
+        return self.samples(self.view, frozenset(self.by_need), self.routes, slice(None))
+
+    def subcarriers(self, view: View, on: frozenset[str], factor: np.ndarray | float) -> np.ndarray:
+        """Return the subcarriers (N, M) with the physics `on`, summed over all paths."""
+        paths = self._paths if view is self.view else self._paths_of(view)
+        if view is self.view and factor is self.factor and not paths and not on & {"squint", "wavefront"}:
+            return self.direct
+        return steering.echo(
+            view, paths, factor, squint="squint" in on, wavefront="wavefront" in on, error=self.error
+        )  # fmt: skip
+
+    def samples(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
+    ) -> np.ndarray:
+        """Return the time samples (N, M) of the symbols `rows` of the look, with the physics `on`.
+
+        view, factor: the target and its points' factors at these symbols alone.
+        """
+        if "symbol_motion" not in on:
+            still = np.zeros(1), np.ones((1, view.network.subcarriers))
+            return self._summed(view, on, factor, rows, still)
+        moving = self.by_need["symbol_motion"].module
+        samples = self._summed(view, on, factor, rows, moving.instants(view, self.error))
+        bent = np.flatnonzero(moving.bent(view))
+        if len(bent):
+            part = view.at(view.times_s[bent])
+            own = factor if np.ndim(factor) == 0 else _every_row(factor, len(samples))[..., bent, :]
+            numbers = np.arange(len(self.view.times_s))[rows][bent]
+            samples[bent] = self._summed(part, on, own, numbers, moving.every_sample(part))
+        return samples
+
+    def _summed(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows, times: tuple[np.ndarray, np.ndarray]
+    ) -> np.ndarray:
+        """Time samples (N, M) of the target's echo from its response at instants of a symbol.
+
+        times: the instants (Q,) s and their interpolation weights (Q, M). Points are summed in groups that lose equally
+        many samples.
+        """
+        delays, weights = times
+        everyone = np.arange(len(view.times_s))
+        groups: list[tuple[int, np.ndarray | float, np.ndarray]] = [(0, factor, everyone)]
+        if "cyclic_prefix" in on:
+            cut = self.by_need["cyclic_prefix"]
+            first = cut.module.first_samples(cut.settings, view)
+            groups = [(int(count), factor * (first == count), _any_of(first == count)) for count in np.unique(first)]
+            turned = cut.module.turn(cut.settings, view.network, waveform.baseband_hz(view.network))
+        # Visibility and reflection coefficients stay during a symbol; only places move.
+        held = self._paths if view is self.view else self._paths_of(view)
+        samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
+        now, before = self.sending.aired[rows], self.sending.aired_before[rows] if "cyclic_prefix" in on else None
+        for delay, weight in zip(delays, weights, strict=True):
+            later = view.at(view.times_s + delay) if "symbol_motion" in on else view
+            paths = held
+            if held and later is not view:
+                paths = [ImagePath(new, old.coefficient) for new, old in zip(self._images_of(later), held, strict=True)]
+            rays = Steered(later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error)
+            for count, strength, lit in groups:
+                spectrum = rays.echo(strength)[lit]
+                echo = waveform.transmit(spectrum, now[lit])
+                if count:
+                    echo[:, :count] = waveform.transmit(spectrum * turned, before[lit])[:, :count]
+                echo *= weight
+                samples[lit] += echo
+        return samples
+
+    def _paths_of(self, view: View) -> list[ImagePath]:
+        """All paths except the direct one."""
+        return [
+            path for effect in providing(self.channel, AddsPaths) for path in effect.module.paths(effect.settings, view)
+        ]
+
+    def _images_of(self, view: View) -> list[np.ndarray]:
+        """The points' images (N, L, 3) m of all paths except the direct one."""
+        found = []
+        for effect in providing(self.channel, AddsPaths):
+            if providing([effect], MovesImages):
+                found += effect.module.images(effect.settings, view)
+            else:
+                found += [path.places for path in effect.module.paths(effect.settings, view)]
+        return found
+
+    @cached_property
+    def _paths(self) -> list[ImagePath]:
+        """All paths except the direct one, over the whole look."""
+        return self._paths_of(self.view)
+
+    def _visible(self, effect: NamedEffect, view: View) -> np.ndarray:
+        """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time."""
+        if view is self.view and effect.name in self._seen:
+            return self._seen[effect.name]
+        found = effect.module.visible(effect.settings, view, self.draws(effect.name))
+        if view is self.view:
+            self._seen[effect.name] = found
+        return found
+
+
+def _every_row(factor: np.ndarray, count: int) -> np.ndarray:
+    """A factor (N or 1, L) or (R, N or 1, L) with a row for each of `count` symbols."""
+    return np.broadcast_to(factor, (*factor.shape[:-2], count, factor.shape[-1]))
+
+
+def _any_of(chosen: np.ndarray) -> np.ndarray:
+    """Return the symbols (K,) in which any point (N, L) is chosen."""
+    return np.flatnonzero(chosen.any(axis=1))
