@@ -1,6 +1,8 @@
 """The viewer of samples: which it holds, what its panels and points stand for, and its controls in a browser."""
 
 import base64
+import html
+import json
 import re
 from types import SimpleNamespace
 
@@ -10,7 +12,7 @@ import pytest
 from craft import craft, row
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
-from lowalt.report import viewer
+from lowalt.report import viewer, viewer_echoes
 from lowalt.report.figures.style import embedded
 from lowalt.report.page import assembled, rendered
 from lowalt.shards.record import sample_key
@@ -83,11 +85,17 @@ def page():
         embedded(encode(np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette))
         for step in (0, 1)
     ]
-    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "level": 300.0}
+    network, times = renderer.network, renderer.network.times_s
+    signals = np.stack([np.exp(2j * np.pi * 30 * times), 0 * times])
+    speeds = {network.stations[0].name: {"radial_mps": 17.0}, network.stations[1].name: {"radial_mps": None}}
+    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "level": 300.0, "network": tile[1],
+              "echoes": viewer_echoes.echoes(signals, speeds, network)}  # fmt: skip
     one = {**shared, "subtype": "One", "model": 1, "tile": tile[0], "probabilities": {"seen A": [0.2, 0.8]}}
     two = {**shared, "subtype": "Two", "model": 5, "tile": tile[1], "probabilities": {}}
-    data = {"samples": [one, two], "motions": {"One 1": viewer.motion(craft(), row(0))}, "classes": ["UAV", "Bird"]}
-    values = {"data": data, "panels": panels, "size": 16, "shown": 16, "rows": 2, "columns": 3}
+    data = {"samples": [one, two], "motions": {"One 1": viewer.motion(craft(), row(0))}, "classes": ["UAV", "Bird"],
+            "stations": ["A", "B"]}  # fmt: skip
+    values = {"data": data, "panels": panels, "size": 16, "shown": 16, "rows": 2, "columns": 3, "pixels": 8,
+              "stations": ["A", "B"], "floor_db": 40.0, "look_s": 0.06}  # fmt: skip
     text = assembled("viewer", [{"id": "samples", "title": "Samples", "html": rendered("samples", values)}])
     sound(text)
     return text, tile
@@ -108,12 +116,49 @@ def test_every_control_of_the_viewer_works(page, tmp_path):
     at("play").click(); said.push(at("play").textContent); at("play").click(); said.push(at("play").textContent);
     at("subtype").value = "Two"; at("subtype").dispatchEvent(new Event("change"));
     tell();
+    const drawn = (kind) => [...document.querySelectorAll("path." + kind)].map((path) => path.getAttribute("d"));
+    const marks = [...document.querySelectorAll("path.speed")].map((path) => path.getAttribute("transform"));
+    document.body.dataset.echo = JSON.stringify([at("speeds").textContent, drawn("power"), drawn("phase"), marks]);
     document.body.dataset.said = said.join(";");
     """
-    said = re.search('data-said="(.*?)"', browsed(tmp_path, text, script), re.S)[1].split(";")
+    found = browsed(tmp_path, text, script)
+    said = re.search('data-said="(.*?)"', found, re.S)[1].split(";")
     assert said[0].startswith(f"UAV: One (seen), motion model 1, no noise|{len(tiles[0])}|")
     assert "seen A20.080.0Bird, wrong" in said[0]
     assert said[1:3] == ["true", "true"] and said[4:6] == ["Pause", "Play"]
     assert said[3].endswith("ms.") and "of a cycle of" in said[3]
     none = "No network was asked about this sample."
     assert said[6] == f"UAV: Two (seen), motion model 5, no noise|{len(tiles[1])}|{none}"
+    spoken, power, phase, marks = json.loads(html.unescape(re.search('data-echo="(.*?)"', found, re.S)[1]))
+    network = viewer.Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}).network
+    station = network.stations[0]
+    shown, folds = viewer_echoes.folded(17.0, station.frequency_hz, network.symbol_interval_s)
+    assert f"A 17 m/s (shown at {round(shown, 2)} m/s, folded {folds} time" in spoken and "B" not in spoken
+    # The power of a line is flat at the top of its panel, that of a silent station at the bottom.
+    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[0])) == {"0.0"}
+    assert set(re.findall(r"[ML][\d.]+ ([\d.]+)", power[1])) == {"64.0"}
+    heights = [float(value) for value in re.findall(r"M[\d.]+ ([\d.]+)", phase[0])]
+    wanted = [150 - 64 * (30 * time % 1) for time in network.times_s]
+    assert len(heights) == network.symbols
+    assert all(min(abs(a - b), 64 - abs(a - b)) < 0.3 for a, b in zip(heights, wanted, strict=True))
+    # One mark in each of the first station's three spectra, at the height of the folded speed.
+    assert [mark is not None for mark in marks] == [True] * 3 + [False] * 3
+
+
+def test_a_speed_is_shown_where_its_phase_repeats():
+    limit = viewer_echoes.largest_speed(4.9e9, 2.5e-3)
+    assert limit == pytest.approx(6.118, abs=1e-3)
+    assert viewer_echoes.folded(3.0, 4.9e9, 2.5e-3) == (3.0, 0)
+    shown, folds = viewer_echoes.folded(-20.0, 4.9e9, 2.5e-3)
+    assert (shown, folds) == (pytest.approx(-20 + 4 * limit), 2)
+    turns = [2 * 4.9e9 / 299_792_458 * speed * 2.5e-3 for speed in (-20.0, shown)]
+    assert turns[0] % 1 == pytest.approx(turns[1] % 1)
+
+
+def test_power_and_phase_come_back_from_their_bytes():
+    signal = np.array([1.0, 0.1j, -0.5, 1e-9, 0])
+    power = np.frombuffer(base64.b64decode(viewer_echoes.power(signal)), np.uint8)
+    assert ((power / 255.0 - 1) * viewer_echoes.FLOOR_DB)[:3] == pytest.approx([0, -20, -6.02], abs=0.1)
+    assert power[3:].tolist() == [0, 0] and set(base64.b64decode(viewer_echoes.power(0 * signal))) == {0}
+    phase = np.frombuffer(base64.b64decode(viewer_echoes.phase(signal)), np.uint8)
+    assert phase[:3].tolist() == [0, 64, 128]

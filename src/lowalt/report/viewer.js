@@ -1,5 +1,5 @@
 "use strict";
-// The viewer of samples: three choices, a tile, the probabilities of its classes, and the target's own motion to turn by hand.
+// The viewer of samples: three choices, echoes, a tile, the probabilities of its classes, and the target's own motion to turn by hand.
 (() => {
   const data = JSON.parse(document.getElementById("viewer-data").textContent);
   const at = (name) => document.getElementById(`viewer-${name}`);
@@ -75,19 +75,49 @@
     at("frame").value = state.frame;
   }
 
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+
+  // Power as a line, phase as a dash a symbol: a line through phases would jump at every full turn.
+  function echoes(sample) {
+    const speeds = [];
+    for (const kind of ["power", "phase"]) {
+      document.querySelectorAll(`#viewer-tile path.${kind}`).forEach((path, row) => {
+        const echo = sample.echoes[row];
+        if (!echo) { path.setAttribute("d", ""); return; }
+        const values = bytes(echo[kind]), { wide, high, from } = path.dataset, step = wide / values.length;
+        const level = (value) => (Number(from) + high * (1 - value / (kind === "power" ? 255 : 256))).toFixed(1);
+        const parts = Array.from(values, (value, at) => (kind === "phase" ? `M${(at * step).toFixed(1)} ${level(value)}h1.2` : `${at ? "L" : "M"}${((at + 0.5) * step).toFixed(1)} ${level(value)}`));
+        path.setAttribute("d", parts.join(""));
+      });
+    }
+    sample.echoes.forEach((echo, row) => {
+      if (echo.speed === undefined) return;
+      const folds = echo.folds ? `shown at ${echo.shown} m/s, folded ${echo.folds} time${echo.folds > 1 ? "s" : ""}` : "not folded";
+      speeds.push(`${data.stations[row]} ${echo.speed} m/s (${folds})`);
+    });
+    at("speeds").textContent = speeds.length ? `Radial speed of the whole target, receding positive: ${speeds.join("; ")}.` : "";
+    document.querySelectorAll("#viewer-tile path.speed").forEach((path) => {
+      const { row, low, high, size } = path.dataset, echo = sample.echoes[row];
+      const there = echo && echo.shown !== undefined && echo.shown >= Number(low) && echo.shown <= Number(high);
+      path.style.display = there ? "" : "none";
+      if (there) path.setAttribute("transform", `translate(0 ${((size * (high - echo.shown)) / (high - low)).toFixed(1)})`);
+    });
+  }
+
   function show() {
     const one = data.samples.find((sample) => sample.subtype === at("subtype").value && String(sample.model) === at("model").value && sample.snr === at("snr").value);
     const name = `${one.category}: ${one.subtype} (${one.group}), motion model ${one.model}, ${one.snr}`;
     at("name").textContent = name;
     at("tile").setAttribute("aria-label", `tile of ${name}`);
-    document.querySelectorAll("#viewer-tile image").forEach((image) => image.setAttribute("href", one.tile));
+    document.querySelectorAll("#viewer image").forEach((image) => image.setAttribute("href", one[image.dataset.of || "tile"]));
+    echoes(one);
     shares(one);
     const found = data.motions[`${one.subtype} ${one.model}`] || null;
     if (found !== state.motion) {
       state.motion = found;
       state.frame = 0;
       if (found) {
-        state.points = new Int16Array(Uint8Array.from(atob(found.points), (letter) => letter.charCodeAt(0)).buffer);
+        state.points = new Int16Array(bytes(found.points).buffer);
         at("frame").max = found.frames - 1;
       }
     }

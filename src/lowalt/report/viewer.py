@@ -1,4 +1,4 @@
-"""The samples in the viewer of the page: their choice, tiles with axes, probabilities and motion.
+"""The samples in the viewer of the page: their choice, tiles with axes, echoes, probabilities and motion.
 
 All are small: tiles are reduced to PIXELS a side, motion is kept as millimetres at FRAMES instants of one cycle.
 """
@@ -18,8 +18,10 @@ from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.sample import axes_of
 from lowalt.report.figures.style import embedded
+from lowalt.report.viewer_echoes import echoes, largest_speed
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of
+from lowalt.shards.remake import Remaker
 from lowalt.spectra import spectrum
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles import resize
@@ -111,41 +113,55 @@ def panels(renderer: Renderer) -> list[dict]:
         for column, name in enumerate(renderer.spectra):
             axes = axes_of(name, station, renderer)
             low, high = sorted((axes.bottom_mps, axes.top_mps))
+            folds = largest_speed(station.frequency_hz, renderer.network.symbol_interval_s)
             ticks = {
                 key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
                 for key, ends in (("x", (0.0, axes.seconds)), ("y", (low, high)))
             }
             found.append(
                 {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
-                 "high": high, "seconds": axes.seconds, "turned": axes.bottom_mps > axes.top_mps, **ticks}
+                 "high": high, "seconds": axes.seconds, "turned": axes.bottom_mps > axes.top_mps,
+                 "folds": folds, **ticks}
             )  # fmt: skip
     return found
 
 
-def samples(shards: ShardSet, clouds: dict[str, Cloud], files: list[str], groups: dict[str, str]) -> dict:
+def reduced(tile: np.ndarray, spectra: int, pixels: int, palette: np.ndarray) -> str:
+    """Return a tile (rows, columns) uint8 as an embedded PNG whose images have at most `pixels` a side."""
+    images = split(tile, spectra)
+    images = resize(images, pixels) if images.shape[-1] > pixels else images
+    return embedded(encode(join(images, spectra), palette))
+
+
+def samples(
+    shards: ShardSet, remaker: Remaker | None, clouds: dict[str, Cloud], files: list[str], groups: dict[str, str],
+    pixels: int,
+) -> dict:  # fmt: skip
     """Return the viewer's samples: {"samples": [...], "motions": {...}}.
 
-    clouds: by subtype; files: prediction files; groups: "seen" or "unseen" by subtype.
+    remaker: makes signals again, None for a data set that does not say how; clouds: by subtype; files: prediction
+    files; groups: "seen" or "unseen" by subtype; pixels: side of an image as the networks see it.
     """
     unseen = {slug(name) for name, group in groups.items() if group == "unseen"}
     numbers = chosen(shards, predicted_keys(files), unseen)
     shares = probabilities(files, {shards.keys[number].decode() for number in numbers}, shards.classes)
+    names = [station.name for station in shards.renderer.network.stations]
     spectra, held, motions, total = len(shards.spectra), [], {}, 0
     for number in numbers:
-        images = split(shards.tile(number), spectra)
-        images = resize(images, PIXELS) if images.shape[-1] > PIXELS else images
-        tile = embedded(encode(join(images, spectra), shards.palette))
+        whole, record = shards.tile(number), shards.record(number)
+        tile = reduced(whole, spectra, PIXELS, shards.palette)
         total += len(tile)
         if held and total > BUDGET:
             break
-        record = shards.record(number)
         name = f"{record['subtype']} {record['model']}"
         if name not in motions and record["subtype"] in clouds and record["motion"].get("x_m") is not None:
             motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
+        heard = echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
         snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
         held.append({
             "subtype": record["subtype"], "category": record["category"], "model": record["model"],
-            "group": groups.get(record["subtype"], ""), "snr": snr,
-            "level": record["snr_db"], "tile": tile, "probabilities": shares.get(record["key"], {}),
+            "group": groups.get(record["subtype"], ""), "snr": snr, "level": record["snr_db"], "tile": tile,
+            "network": reduced(whole, spectra, pixels, shards.palette), "echoes": heard,
+            "probabilities": shares.get(record["key"], {}),
         })  # fmt: skip
-    return {"samples": held, "motions": motions, "classes": list(shards.classes)}
+    return {"samples": held, "motions": motions, "classes": list(shards.classes), "stations": names}

@@ -58,6 +58,21 @@ class Remaker:
         self.network = Network.from_settings(shards.index["render"]["network"])
         self._makers: dict[int, Maker] = {}
 
+    def _maker(self, seed: int) -> Maker:
+        """The maker of samples with a root seed."""
+        if seed not in self._makers:
+            index = self.shards.index
+            self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)
+        return self._makers[seed]
+
+    def signal(self, entry: dict) -> np.ndarray:
+        """Return the signals (stations, symbols) complex64 of the sample that a record describes.
+
+        Raises: InputError as `made`.
+        """
+        row, snr_db = row_of(entry)
+        return self._maker(entry["seed"]).signal(row, snr_db)
+
     def made(self, entry: dict) -> tuple[bytes, bytes]:
         """Return record and data (PNG or .npy) of the sample that a record describes.
 
@@ -65,11 +80,7 @@ class Remaker:
         """
         row, snr_db = row_of(entry)
         seed = entry["seed"]
-        if seed not in self._makers:
-            index = self.shards.index
-            self._makers[seed] = Maker(index["render"], index["echo"], seed, self.clouds, self.occluders)
-        maker = self._makers[seed]
-        signal = maker.signal(row, snr_db)
+        maker, signal = self._maker(seed), self.signal(entry)
         data = maker.png(signal) if self.shards.kind == "image" else npy(signal)
         row = accompanied(row, self.shards.index["echo"]["effects"], seed)
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data

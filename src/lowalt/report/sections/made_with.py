@@ -1,29 +1,50 @@
-"""Section: what made the run: seed, hardware, checksum of the data set, versions of packages, whole configuration."""
+"""Section: what made the run: revision, seeds, machines, versions, checksums, configuration, and the commands again."""
 
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
 import yaml
 
-from lowalt.common.files import sha256
 from lowalt.common.hardware import describe
+from lowalt.common.shipped import located, shipped
+from lowalt.common.yaml_files import load_yaml
+from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
 from lowalt.report.run import Run
 
-NAMES = ("lowalt", "snakemake", "numpy", "scipy", "numba", "pillow", "deflate", "torch", "torchvision", "timm")
+NAMES = (
+    "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",
+    "torchvision", "timm", "matplotlib", "vl-convert-python",
+)  # fmt: skip
+"""Packages whose version can change a run's outputs, or the page."""
+BASE = "config/default.yaml"
 
 
-def versions() -> list[str]:
-    """Return "name version" of Python and every package whose version can change a run's outputs."""
-    found = [f"Python {platform.python_version()}"]
+def versions() -> list[tuple[str, str]]:
+    """Return (name, version) of Python and of every package of NAMES."""
+    found = [("Python", platform.python_version())]
     for name in NAMES:
         try:
-            found.append(f"{name} {version(name)}")
+            found.append((name, version(name)))
         except PackageNotFoundError:
-            found.append(f"{name} not installed")
+            found.append((name, "not installed"))
     return found
 
 
+def machines(run: Run) -> list[tuple[str, str]]:
+    """Return (what was made, machine) of the trainings, by their own records, and of the page."""
+    rows = run.inputs.table("seeds")
+    trained = {
+        f"training: {row['protocol']} {row['scheme']}, seed {row['seed']}": row.get("hardware", "") for row in rows
+    }
+    return [("this page", describe()), *((name, machine) for name, machine in trained.items() if machine)]
+
+
 def values(run: Run) -> dict:
-    """Return the seed, the hardware, the checksum of the shards' index, the versions, and the configuration as YAML."""
-    made = {"seed": run.config["seed"], "hardware": describe(), "index": sha256(run.inputs.path("index"))}
-    return {**made, "versions": versions(), "configuration": yaml.safe_dump(run.config, sort_keys=False)}
+    """Return the revision, the seeds, machines, versions, checksums, the configuration and the commands again."""
+    commit = revision()
+    lines, overlay = commands(commit, changes(located(load_yaml(shipped(BASE))), run.config))
+    return {
+        "commit": commit, "code": code_sum(), "seed": run.config["seed"], "seeds": run.config["recognition"]["seeds"],
+        "machines": machines(run), "versions": versions(), "files": checksums(run.inputs.files), "commands": lines,
+        "overlay": overlay, "configuration": yaml.safe_dump(run.config, sort_keys=False, allow_unicode=True),
+    }  # fmt: skip

@@ -1,7 +1,8 @@
-"""Section: a viewer of some samples: tile with axes, the networks' probabilities, the target's own motion in 3-D."""
+"""Section: a viewer of some samples: echoes, tile with axes, probabilities of the networks, motion in 3-D."""
 
-from lowalt.report import viewer
+from lowalt.report import viewer, viewer_echoes
 from lowalt.report.run import Run
+from lowalt.shards.remake import opened
 from lowalt.targets.cloud import read
 
 
@@ -10,9 +11,13 @@ def values(run: Run) -> dict:
     clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
     files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
     groups = {name: row["unseen_protocol"] for name, row in run.targets.items()}
+    network, pixels = run.shards.renderer.network, run.config["recognition"]["size"]
     panels = viewer.panels(run.shards.renderer)
     size = run.shards.index["render"]["images"]["size"]
+    remaker = opened(run.inputs.path("index")) if run.shards.index.get("echo") else None
     return {
-        "data": viewer.samples(run.shards, clouds, files, groups), "panels": panels, "size": size,
+        "data": viewer.samples(run.shards, remaker, clouds, files, groups, pixels), "panels": panels, "size": size,
         "shown": min(size, viewer.PIXELS), "rows": panels[-1]["row"] + 1, "columns": panels[-1]["column"] + 1,
+        "pixels": pixels, "stations": run.stations, "floor_db": viewer_echoes.FLOOR_DB,
+        "look_s": network.symbols * network.symbol_interval_s,
     }  # fmt: skip

@@ -1,0 +1,82 @@
+"""Where a run came from: revision of the code, changes of the configuration, checksums, and the commands again."""
+
+import hashlib
+import subprocess
+from pathlib import Path
+
+import yaml
+
+from lowalt.common.files import sha256
+from lowalt.common.shipped import SHIPPED
+from lowalt.common.street import PACKAGE
+
+COUNTED = (".py", ".smk", ".yaml")
+"""Endings of the files of the package that decide what a run makes."""
+
+
+def revision(folder: Path = SHIPPED) -> str:
+    """Return the commit of the checkout in `folder` and how many of its tracked files differ from it, or "no checkout".
+
+    A folder that is no root of a checkout has none, nor has a machine without git.
+    """
+    if not (folder / ".git").exists():
+        return "no checkout"
+    git = ["git", "-C", str(folder)]
+    try:
+        commit = subprocess.run([*git, "rev-parse", "HEAD"], capture_output=True, text=True, check=True).stdout.strip()
+        state = [*git, "status", "--porcelain", "--untracked-files=no"]
+        changed = subprocess.run(state, capture_output=True, text=True, check=True).stdout.splitlines()
+    except (OSError, subprocess.CalledProcessError):
+        return "no checkout"
+    files = f"{len(changed)} tracked file{'s' if len(changed) > 1 else ''}"
+    return f"{commit}, {files} changed since" if changed else commit
+
+
+def code_sum(folder: Path = PACKAGE) -> str:
+    """Return one SHA-256 of all source files of the package, by name and content: the code without any version control.
+
+    Files of machine code are no source and are left out.
+    """
+    whole = hashlib.sha256()
+    for path in sorted(folder.rglob("*")):
+        if path.suffix in COUNTED and "shipped" not in path.relative_to(folder).parts:
+            whole.update(f"{path.relative_to(folder).as_posix()} {sha256(path)}\n".encode())
+    return whole.hexdigest()
+
+
+def changes(base: dict, config: dict) -> dict:
+    """Return the smallest overlay that turns the configuration `base` into `config` when it is laid over it.
+
+    A key that `config` lacks becomes null, which removes a station or a spectrum.
+    """
+    found = {}
+    for key in [*config, *(key for key in base if key not in config)]:
+        mine, other = config.get(key), base.get(key)
+        if isinstance(mine, dict) and isinstance(other, dict):
+            inner = changes(other, mine)
+            if inner:
+                found[key] = inner
+        elif key not in config or key not in base or mine != other:
+            found[key] = mine
+    return found
+
+
+def checksums(files: dict[str, str | list[str]]) -> list[dict]:
+    """Return path, bytes and SHA-256 of every file of a manifest but those of benchmarks and of the kept reference.
+
+    files: path or list of paths by name. Files that several names share stand once.
+    """
+    named = [name for name in files if name != "benchmarks" and not name.startswith("kept_")]
+    paths = [path for name in named for path in ([files[name]] if isinstance(files[name], str) else files[name])]
+    return [{"path": path, "bytes": Path(path).stat().st_size, "sha256": sha256(path)} for path in dict.fromkeys(paths)]
+
+
+def commands(commit: str, overlay: dict) -> tuple[str, str]:
+    """Return the commands that make a run again, and the text of the overlay they name, empty where there is none.
+
+    commit: as `revision` gives it; overlay: as `changes` gives it.
+    """
+    lines = [] if commit == "no checkout" else [f"git checkout {commit.partition(',')[0]}"]
+    text = yaml.safe_dump(overlay, sort_keys=False, allow_unicode=True) if overlay else ""
+    return "\n".join([*lines, "make .venv/set-up" if overlay else "make",
+                      *([".venv/bin/lowalt run again.yaml"] if overlay else [])]), text  # fmt: skip
