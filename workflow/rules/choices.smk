@@ -22,6 +22,8 @@ rule trial:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
+    resources:
+        gpu=min(1, RUN.gpus),
     params:
         settings=settings.trial,
         stations=RUN.stations,

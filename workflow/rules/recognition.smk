@@ -82,6 +82,8 @@ rule train:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"] * RUN.processes
+    resources:
+        gpu=RUN.gpus,
     params:
         settings=settings.training,
         launcher=RUN.launcher,
@@ -114,6 +116,8 @@ rule evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        gpu=min(1, RUN.gpus),
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -166,6 +170,8 @@ rule transfer_evaluate:
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
+    resources:
+        gpu=min(1, RUN.gpus),
     params:
         settings=settings.evaluation,
         source=options.samples,

@@ -162,10 +162,10 @@ def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple
     model: model.pt; block: recognition.evaluation. Raises: InputError where the images are not of the model's size.
     """
     from lowalt.recognition import recipe, runs
-    from lowalt.recognition.inference import Machine, probabilities
+    from lowalt.recognition.inference import Machine, evaluation, probabilities
     from lowalt.recognition.schemes import columns_in
 
-    batch, threads, precision, mirror = pick(block, "batch", "threads", "precision", "mirror")
+    batch, threads, precision, mirror, _ = evaluation(block)
     trained = runs.load(model)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)

@@ -8,6 +8,9 @@ import numpy as np
 import torch
 from torch import distributed, nn
 
+from lowalt.common.command import pick
+from lowalt.recognition import gpus
+from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.samples import ViewSamples
 
 
@@ -36,13 +39,18 @@ class Machine:
 
     @classmethod
     def here(cls, precision: str) -> "Machine":
-        """Return this process's machine: a GPU where there is one; gloo (CPU) or nccl (GPU) under torchrun.
+        """Return this process's machine: a GPU where there is one, and no other job's; gloo (CPU) or nccl (GPU) under
+        torchrun, whose ranks take the visible GPUs in order.
 
         precision: "auto", "bf16" or "fp32".
         """
         gpu = torch.cuda.is_available()
         ranks = int(os.environ.get("WORLD_SIZE", "1"))
-        device = torch.device(f"cuda:{os.environ.get('LOCAL_RANK', '0')}" if gpu else "cpu")
+        place = int(os.environ.get("LOCAL_RANK", "0"))
+        if gpu and ranks == 1:
+            every = range(torch.cuda.device_count())
+            place = gpus.own([str(torch.cuda.get_device_properties(number).uuid) for number in every])
+        device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")
         return cls(device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks)
@@ -58,25 +66,41 @@ class Machine:
         return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
 
 
+def evaluation(block: dict) -> list:
+    """Return batch, threads, precision, mirror and workers (0 where left out) of the block `recognition.evaluation`.
+
+    Raises: InputError naming a missing or unknown key.
+    """
+    return pick({"workers": 0} | block, "batch", "threads", "precision", "mirror", "workers")
+
+
 @torch.inference_mode()
 def probabilities(
-    model: nn.Module, samples: ViewSamples, numbers: np.ndarray, machine: Machine, batch: int, mirror: bool = False
+    model: nn.Module,
+    samples: ViewSamples,
+    numbers: np.ndarray,
+    machine: Machine,
+    batch: int,
+    mirror: bool = False,
+    ahead: ReadAhead | None = None,
 ) -> np.ndarray:
     """Return class probabilities (len(numbers), classes) float64 of the samples `numbers`.
 
     mirror: average with the probabilities of the inputs mirrored along Doppler, which show the target turned by 180
-    degrees. Each rank gets whole batches, so that sums do not depend on the number of ranks.
+    degrees. ahead: reads the samples' images (`Unchanged`) in worker processes; without it this process reads them.
+    Each rank gets whole batches, so that sums do not depend on the number of ranks.
     """
     model.eval()
     result = torch.zeros(len(numbers), model.classes, dtype=torch.float64)
-    for index, start in enumerate(range(0, len(numbers), batch)):
-        if index % machine.ranks != machine.rank:
-            continue
-        images = torch.from_numpy(samples.views(numbers[start : start + batch])).to(machine.device)
+    mine = list(range(0, len(numbers), batch))[machine.rank :: machine.ranks]
+    ahead = ahead or ReadAhead(Unchanged(samples), 0, pin=False)
+    read = ahead([numbers[start : start + batch] for start in mine])
+    for start, found in zip(mine, read, strict=True):
+        images = found.to(machine.device, non_blocking=True)
         seen = (images, model.mirrored(images)) if mirror else (images,)
         with machine.autocast():
             logits = [model(image) for image in seen]
-        result[start : start + batch] = torch.stack([found.double().softmax(1) for found in logits]).mean(0).cpu()
+        result[start : start + batch] = torch.stack([value.double().softmax(1) for value in logits]).mean(0).cpu()
     if machine.ranks > 1:
         # Every entry is non-zero on one rank only: the sum is exact.
         result = result.to(machine.device)

@@ -117,6 +117,24 @@ class Recogniser(Fused):
         return index.flip(-2)
 
 
+def checkpoint_activations(model: Recogniser) -> None:
+    """Let the backbone keep few activations and compute the others again for the gradient, which stays the same.
+
+    Raises: InputError for a backbone that cannot, or that has batch norms, whose running means a second pass would move
+    a second time. Source: Chen et al., Training Deep Nets with Sublinear Memory Cost, 2016.
+    """
+    name = type(model.backbone).__name__
+    if any(isinstance(layer, nn.modules.batchnorm._BatchNorm) for layer in model.backbone.modules()):
+        raise InputError(
+            f"training.activation_checkpointing: the backbone {name} has batch norms, whose running means would move "
+            "twice a step; expected a backbone without, such as Swin, ConvNeXt or ViT"
+        )
+    try:
+        model.backbone.set_grad_checkpointing(True)
+    except (AttributeError, AssertionError) as error:
+        raise InputError(f"training.activation_checkpointing: timm's {name} cannot ({error})") from error
+
+
 def parameters(model: nn.Module) -> int:
     """Return the number of trainable values."""
     return sum(value.numel() for value in model.parameters() if value.requires_grad)

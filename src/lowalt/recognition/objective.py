@@ -1,4 +1,6 @@
-"""The loss of a training batch: all stations together and, by a weight, each station alone."""
+"""The loss of a training batch: all stations together and, by a weight, each station alone; and its gradient."""
+
+import contextlib
 
 import torch
 from torch import nn
@@ -23,6 +25,26 @@ def objective(
     together, alone = found
     each = criterion(alone.float(), labels.repeat_interleave(stations))
     return (criterion(together.float(), labels) + weight * each) / (1 + weight)
+
+
+def descent(
+    model: nn.Module, images: torch.Tensor, labels: torch.Tensor, block: dict, machine: Machine
+) -> torch.Tensor:
+    """Add the gradient of a batch's loss to the weights' gradients, and return the loss, which has none itself.
+
+    images, labels, block: as `objective`. The batch goes through the network in `accumulate` parts, each weighted by
+    its share of the samples, so the gradient is that of the whole batch except for rounding and batch norms. The ranks
+    exchange gradients once, with the last part.
+    """
+    parts = list(zip(images.chunk(block["accumulate"]), labels.chunk(block["accumulate"]), strict=True))
+    total = torch.zeros((), device=machine.device)
+    for number, (some, told) in enumerate(parts, start=1):
+        alone = contextlib.nullcontext() if machine.ranks == 1 or number == len(parts) else model.no_sync()
+        with alone:
+            loss = objective(model, some, told, block, machine) * (len(told) / len(labels))
+            loss.backward()
+        total += loss.detach()
+    return total
 
 
 def unwrapped(model: nn.Module) -> nn.Module:

@@ -21,7 +21,13 @@ Settings of this module, the block `recognition.training`:
     patience         validations without a better accuracy before stopping; 0 never stops
     checkpoint_s     seconds between checkpoints
     threads          CPU threads; fixed, since their number moves the last bits
-    workers          processes that read shards; 0 reads in the training process
+    workers          processes that read samples, and as many for validation; 0 reads in the training process
+and, where they are given:
+    accumulate       parts a batch is cut into, one after the other through the network; their gradients are added up.
+                     Only one part's activations are in memory. A batch norm sees one part at a time
+    activation_checkpointing  keep few activations of the backbone and compute the others again for the gradient
+    stream           share of every batch that is fresh motion models, 0..1, which come once and never again
+    stream_models    fresh motion models after which they repeat; 0 never repeats
 """
 
 import math
@@ -40,24 +46,30 @@ KEYS = (
     "label_smoothing", "alone", "ema", "precision", "channels_last", "compile", "validate_every", "patience",
     "checkpoint_s", "threads", "workers",
 )  # fmt: skip
+OPTIONAL = {"accumulate": 1, "activation_checkpointing": False, "stream": 0.0, "stream_models": 0}
+"""Keys that a block may leave out, with the values that they have then."""
 
 
-WHOLE = {"steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "patience": 0, "threads": 1, "workers": 0}
+WHOLE = {
+    "steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "patience": 0, "threads": 1, "workers": 0,
+    "accumulate": 1, "stream_models": 0,
+}  # fmt: skip
 """Smallest value of every whole number."""
 REAL = {
     "rate": math.inf, "backbone_rate": math.inf, "weight_decay": math.inf, "warmup": 1, "clip": math.inf,
-    "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf,
+    "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf, "stream": 1,
 }  # fmt: skip
 """Largest value of every real number; the smallest is 0."""
 PRECISIONS = ("auto", "bf16", "fp32")
 
 
 def check(block: dict) -> dict:
-    """Return the block if every key is there and in range.
+    """Return the block, OPTIONAL filled in, if every key is there and in range.
 
     Raises: InputError naming the key and value.
     """
-    pick(block, *KEYS)
+    block = OPTIONAL | block
+    pick(block, *KEYS, *OPTIONAL)
     for key, least in WHOLE.items():
         if not isinstance(block[key], int) or isinstance(block[key], bool) or block[key] < least:
             raise InputError(f"training: {key} is {block[key]!r}, expected a whole number >= {least}")
@@ -67,6 +79,8 @@ def check(block: dict) -> dict:
             raise InputError(f"training: {key} is {value!r}, expected a number in 0..{most}")
     if block["precision"] not in PRECISIONS:
         raise InputError(f"training: precision is {block['precision']!r}, expected one of {PRECISIONS}")
+    if block["accumulate"] > block["batch"]:
+        raise InputError(f"training: accumulate is {block['accumulate']}, expected at most batch, {block['batch']}")
     return block
 
 

@@ -19,7 +19,8 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.hardware import describe
-from lowalt.recognition import augment, checkpoint, metrics, network, predictions, recipe
+from lowalt.recognition import augment, checkpoint, inference, metrics, network, predictions, recipe
+from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
 from lowalt.recognition.schemes import SPECTRA, Scheme, columns_in
@@ -51,7 +52,7 @@ def train(
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
-        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**block, **kept}},
+        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
         samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
     )  # fmt: skip
     keys = (protocol, scheme.name)
@@ -134,16 +135,17 @@ def evaluate(
 ) -> None:
     """Write the predictions for all samples of a source, and the run's record (.json) in the same folder.
 
-    settings: {batch, threads, precision, mirror}; trained_on: the run that trained the model, where it is another;
-    more: further entries of the record.
+    settings: {batch, threads, precision, mirror}, perhaps with workers, the processes that read samples; trained_on:
+    the run that trained the model, where it is another; more: further entries of the record.
     Under torchrun the ranks share the work and rank 0 writes.
     """
-    batch, threads, precision, mirror = pick(settings, "batch", "threads", "precision", "mirror")
+    batch, threads, precision, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)
     model = trained.model.to(machine.device)
     start = time.monotonic()
-    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch, mirror)
+    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.device.type == "cuda")
+    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch, mirror, ahead)
     seconds = time.monotonic() - start
     if machine.rank:
         return

@@ -14,16 +14,16 @@ import numpy as np
 import torch
 from timm.utils import ModelEmaV3
 from torch import nn
-from torch.utils.data import DataLoader
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.progress import Reporter
-from lowalt.recognition import checkpoint
+from lowalt.recognition import checkpoint, network
+from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.metrics import Metrics
-from lowalt.recognition.objective import objective
+from lowalt.recognition.objective import descent
 from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.reader import Reader
 from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
@@ -66,12 +66,20 @@ class Trainer:
         if missing:
             names = [classes[label] for label in sorted(missing)]
             raise InputError(f"training: no training sample of {names}, expected some of each class")
+        if self.block["activation_checkpointing"]:
+            network.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
         self.model = shared.to(machine.device, memory_format=layout)
         self.ema = ModelEmaV3(self.model, decay=self.block["ema"])
         self.optimiser = optimiser(self.model, self.block)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
+        # Readers keep their workers over all epochs and validations.
+        gpu, workers = machine.device.type == "cuda", self.block["workers"]
+        reader = Reader(self.train, columns, self.augmentation, (self.seed, *keys), machine)
+        self.read, self.read_validation = (
+            ReadAhead(read, workers, pin=gpu) for read in (reader, Unchanged(self.validation))
+        )
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None
@@ -127,17 +135,6 @@ class Trainer:
                     f"since. Try a lower training.rate than {self.block['rate']}"
                 )
 
-    def _loader(self, parts: list[np.ndarray]) -> DataLoader:
-        """Batches of the rest of an epoch, read ahead by the workers; what they hold depends on the step alone."""
-        reader = Reader(self.train, self.columns, self.augmentation, (self.seed, *self.keys), self.machine)
-        numbered = list(enumerate(parts, start=self.at.steps))
-        return DataLoader(
-            reader, sampler=numbered, batch_size=None, num_workers=self.block["workers"],
-            pin_memory=self.machine.device.type == "cuda",
-            # A generator of its own: the loader must not draw from the stream that dropout draws from.
-            generator=torch.Generator(),
-        )  # fmt: skip
-
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         """Take one optimiser step on a batch and update the moving average of the weights."""
         self.step_model.train()
@@ -146,10 +143,9 @@ class Trainer:
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["factor"]
-        loss = objective(self.step_model, images, labels, self.block, self.machine)
-        loss.backward()
+        loss = descent(self.step_model, images, labels, self.block, self.machine)
         norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
-        self.at.loss_sum += float(loss.detach())
+        self.at.loss_sum += float(loss)
         self.at.loss_steps += 1
         self._finite()
         if math.isfinite(float(norm)):
@@ -174,7 +170,8 @@ class Trainer:
         self._finite_weights()
         facts = self.validation.facts
         everything = np.arange(len(facts))
-        found = probabilities(self.ema.module, self.validation, everything, self.machine, self.block["batch"])
+        batch, ahead = self.block["batch"], self.read_validation
+        found = probabilities(self.ema.module, self.validation, everything, self.machine, batch, False, ahead)
         accuracy = float(np.mean(found.argmax(1) == facts.label))
         rate = self.block["rate"] * schedule(self.at.steps / self.block["steps"], self.block["warmup"])
         row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], rate,
@@ -197,10 +194,12 @@ class Trainer:
         report = Reporter(steps, "steps")
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
-            loader = iter(self._loader(parts[self.at.batch : self.at.batch + steps - self.at.steps]))
+            rest = parts[self.at.batch : self.at.batch + steps - self.at.steps]
+            # A batch depends on its step alone, so a training resumes at any step.
+            read = self.read(list(enumerate(rest, start=self.at.steps)))
             while self.at.batch < len(parts) and self.at.steps < steps and not self.at.done:
                 asked = time.monotonic()
-                batch = next(loader)
+                batch = next(read)
                 self.waited_s += time.monotonic() - asked
                 self._step(*batch)
                 self.at.batch += 1

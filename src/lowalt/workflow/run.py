@@ -147,9 +147,17 @@ class Run:
 
     @property
     def launcher(self) -> str:
-        """The words between `python -m` and the training's module: torchrun for several processes, none for one."""
-        alone = self.processes == 1
-        return "" if alone else f"torch.distributed.run --standalone --nproc-per-node {self.processes} -m"
+        """The words between `python -m` and the training's module: GPUs and torchrun for several processes, none for
+        one, which chooses its GPU itself."""
+        count = self.processes
+        if count == 1:
+            return ""
+        return f"lowalt.recognition.gpus {count} torch.distributed.run --standalone --nproc-per-node {count} -m"
+
+    @property
+    def gpus(self) -> int:
+        """GPUs that the scheduler reserves for one training: one a process where the configuration asks for them."""
+        return self.processes if self.config["recognition"].get("gpu", False) else 0
 
     @cached_property
     def priced(self) -> list[str]:

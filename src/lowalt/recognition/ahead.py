@@ -1,0 +1,41 @@
+"""Batches read ahead by worker processes that live as long as their reader: they start once, not once an epoch."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+from torch.utils.data import DataLoader, Dataset
+
+
+class Unchanged(Dataset):
+    """Index images of samples as they are: the map from sample numbers to a batch that evaluation reads."""
+
+    def __init__(self, source: Any) -> None:
+        """source: samples, with a method `views`."""
+        self.source = source
+
+    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor:
+        """Return the index images (len(numbers), views, S, S) uint8 of the samples `numbers`."""
+        return torch.from_numpy(self.source.views(numbers))
+
+
+class ReadAhead:
+    """Calls a map for one item after the other, in worker processes where there are any, and keeps their order."""
+
+    def __init__(self, read: Dataset, workers: int, pin: bool) -> None:
+        """read: map from an item to a batch; workers: processes that call it, 0 for this one; pin: whether batches go
+        to memory from which a GPU copies."""
+        self._items: list = []
+        self._loader = DataLoader(
+            read, sampler=self._items, batch_size=None, num_workers=workers, persistent_workers=workers > 0,
+            pin_memory=pin,
+            # A generator of its own: the loader must not draw from the stream that dropout draws from.
+            generator=torch.Generator(),
+        )  # fmt: skip
+
+    def __call__(self, items: Sequence) -> Iterator:
+        """Return the batches of these items; the workers drop what they still read for an earlier call."""
+        # The loader keeps this very list, and asks it for items anew at every pass.
+        self._items[:] = items
+        return iter(self._loader)
