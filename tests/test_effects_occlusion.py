@@ -142,9 +142,10 @@ def test_built_in_targets_agree_with_slow_rays(name):
     assert found[away].mean() > 0.98
 
 
+@pytest.mark.parametrize("moving", ["rotor", "wheel"])
 @pytest.mark.parametrize("closed", [True, False])
 @pytest.mark.parametrize("count", [1, 8, 9, 64, 65, 700])
-def test_rays_through_loose_triangles_agree_with_slow_rays(count, closed):
+def test_rays_through_loose_triangles_agree_with_slow_rays(count, closed, moving):
     # Triangles of all sizes, some flat along an axis, some without an area, in two parts of which one turns.
     rng = np.random.default_rng(count)
     size = 10 ** rng.uniform(-2, 0, (count, 1, 1))
@@ -155,7 +156,7 @@ def test_rays_through_loose_triangles_agree_with_slow_rays(count, closed):
                 for half in (corners[: count // 2 + 1], corners[count // 2 + 1 :])]  # fmt: skip
     points = rng.normal(0, 1.5, (60, 3))
     view = scene(
-        points, rng.normal(0, 1, (60, 3)), surfaces, np.arange(60) % 2, ("body", "rotor"), closed, rate_hz=7.0,
+        points, rng.normal(0, 1, (60, 3)), surfaces, np.arange(60) % 2, ("body", moving), closed, rate_hz=7.0,
         x_m=40.0, y_m=9.0, z_m=70.0,
     )  # fmt: skip
     view = replace(view, times_s=NETWORK.times_s[:12])

@@ -10,7 +10,10 @@ from scipy.special import fresnel
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects.channel.shadows import GRID, capsules, triangles
+from lowalt.effects.channel.capsules import capsules
+from lowalt.effects.channel.shadow_rays import cast_rays
+from lowalt.effects.channel.shadows import GRID, balls_of, triangles
+from lowalt.effects.channel.surface_tree import tree
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
@@ -64,13 +67,44 @@ def through_blades(view: View) -> float:
     return float(np.mean(found)) if found else 0.0
 
 
-def hidden(view: View, by: str = "all") -> np.ndarray:
+def hidden(view: View, by: str = "all", known: np.ndarray | None = None) -> np.ndarray:
     """Return whether each point is hidden from the station, (N, L) bool.
 
-    by: surfaces that count: all of them, the rotors' blades, or the rest.
+    by: surfaces that count: all of them, the rotors' blades, or the rest; known: points (N, L) bool that are hidden by
+    other surfaces, and so not asked.
 
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
+    surfaces, cloud, place = _surfaces(view), view.cloud, np.asarray(view.station.position_m, float)
+    result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
+    if view.nodes:
+        capsules(place, np.ascontiguousarray(view.places), surfaces["bones"], surfaces["radius_m"], result)
+        return result
+    has_normal = np.isfinite(cloud.normals).all(axis=1)
+    offset = surfaces["offset_m"]
+    start = cloud.points + np.where(has_normal[:, None], offset[:, None] * cloud.normals, 0.0)
+    toward = np.where(has_normal, 0.0, offset / np.linalg.norm(view.aim_m - place))
+    owner = surfaces["vertex_part"]
+    blade = np.isin(owner[surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
+    faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
+    motion = view.motion._replace(points=start)
+    # Rotors turn too far from symbol to symbol for lists of directions to pay.
+    if not cloud.parts_of("rotor"):
+        return cast_rays(place, motion, toward, surfaces["vertices"], tree(surfaces, faces)) | result
+    # Project only the corners of the surfaces that count.
+    wanted = np.zeros(len(owner), np.bool_)
+    wanted[faces] = True
+    balls = balls_of(surfaces["vertices"], np.asarray(owner, np.int64), len(cloud.kinds))
+    triangles(
+        place, np.ascontiguousarray(motion.rotation), np.ascontiguousarray(motion.translation),
+        np.asarray(motion.part, np.int64), start, toward, surfaces["vertices"][wanted], owner[wanted],
+        (np.cumsum(wanted) - 1)[faces], surfaces["closed"][owner[faces[:, 0]]], balls, GRID, result,
+    )  # fmt: skip
+    return result
+
+
+def _surfaces(view: View) -> dict:
+    """The target's surfaces. Raises: InputError where they are not given or are another target's."""
     surfaces, cloud = view.occluders, view.cloud
     make = "make them with python -m lowalt.targets.occluders"
     if surfaces is None:
@@ -80,29 +114,7 @@ def hidden(view: View, by: str = "all") -> np.ndarray:
             f"effects.occlusion: surfaces of {surfaces['subtype']} with {len(surfaces['offset_m'])} points, expected "
             f"those of {cloud.subtype} with {len(cloud.points)}; {make}"
         )
-    place = np.asarray(view.station.position_m, float)
-    result = np.zeros(view.places.shape[:2], np.bool_)
-    if view.nodes:
-        capsules(place, np.ascontiguousarray(view.places), surfaces["bones"], surfaces["radius_m"], result)
-        return result
-    rotation, translation, points, part = view.motion
-    known = np.isfinite(cloud.normals).all(axis=1)
-    offset = surfaces["offset_m"]
-    start = points + np.where(known[:, None], offset[:, None] * cloud.normals, 0.0)
-    range_m = np.linalg.norm(view.aim_m - place)
-    toward = np.where(known, 0.0, offset / range_m)
-    blade = np.isin(surfaces["vertex_part"][surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
-    faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
-    owner = surfaces["vertex_part"]
-    closed = surfaces["closed"][owner[faces[:, 0]]]
-    # Project only the corners of the surfaces that count.
-    wanted = np.zeros(len(owner), np.bool_)
-    wanted[faces] = True
-    triangles(
-        place, np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.asarray(part, np.int64), start,
-        toward, surfaces["vertices"][wanted], owner[wanted], (np.cumsum(wanted) - 1)[faces], closed, GRID, result,
-    )  # fmt: skip
-    return result
+    return surfaces
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
@@ -113,7 +125,9 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
     """
     if settings["blades"] == "opaque" or view.nodes or not view.cloud.parts_of("rotor"):
         return 1.0 - settings["strength"] * hidden(view)
-    lost = hidden(view, "rest").astype(float)
     if settings["blades"] == "bent":
-        lost = np.maximum(lost, (1.0 - through_blades(view)) * hidden(view, "blades"))
+        rest = hidden(view, "rest")
+        lost = np.where(rest, 1.0, (1.0 - through_blades(view)) * hidden(view, "blades", rest))
+    else:
+        lost = hidden(view, "rest")
     return 1.0 - settings["strength"] * lost

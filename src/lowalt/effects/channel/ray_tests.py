@@ -1,0 +1,68 @@
+"""Whether rays meet the balls and triangles of a `surface_tree`: single rays, and all rays of a narrow cone."""
+
+import math
+
+from lowalt.common.jit import INLINED
+
+
+@INLINED
+def met(tree, node, x, y, z, a, b, c, spread):
+    """Whether a node's ball can be met by a ray from x, y, z whose direction is within `spread` (rad) of a, b, c.
+
+    A ray that meets it after h is at most h spread off the middle ray, and h is at most the ball's far side's distance.
+    """
+    u, v, w = tree.centre[node, 0] - x, tree.centre[node, 1] - y, tree.centre[node, 2] - z
+    along, square = u * a + v * b + w * c, u * u + v * v + w * w
+    reach = tree.radius_m[node]
+    reach += (math.sqrt(square) + reach) * spread
+    return along >= -reach and square - along * along <= reach * reach
+
+
+@INLINED
+def hit(vertices, tree, f, x, y, z, u, v, w):
+    """Whether the ray from x, y, z along u, v, w meets triangle f before its end; Moeller & Trumbore 1997."""
+    i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
+    a0, a1, a2 = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+    d0, d1, d2 = vertices[j, 0] - a0, vertices[j, 1] - a1, vertices[j, 2] - a2
+    e0, e1, e2 = vertices[k, 0] - a0, vertices[k, 1] - a1, vertices[k, 2] - a2
+    h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
+    size = d0 * h0 + d1 * h1 + d2 * h2
+    # The side of the outward normal is turned to the station where `size` is negative.
+    if size == 0.0 or (tree.closed[f] and size > 0.0):
+        return False
+    sign = 1.0 if size > 0.0 else -1.0
+    size *= sign
+    o0, o1, o2 = x - a0, y - a1, z - a2
+    one = sign * (o0 * h0 + o1 * h1 + o2 * h2)
+    q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
+    other = sign * (u * q0 + v * q1 + w * q2)
+    way = sign * (e0 * q0 + e1 * q1 + e2 * q2)
+    return one >= 0.0 and other >= 0.0 and one + other <= size and way > 0.0 and way < size
+
+
+@INLINED
+def side(i, j, k, p, q, r, a, b, c, spread):
+    """-1 or 1 where rays pass the edge between two corners on one side alone, else 0; corners from the rays' start.
+
+    The side is the sign of the corners' product with the ray's direction a, b, c. The product changes by at most its
+    length times `spread` with the direction.
+    """
+    u, v, w = j * r - k * q, k * p - i * r, i * q - j * p
+    edge = math.sqrt((p - i) ** 2 + (q - j) ** 2 + (r - k) ** 2)
+    room = math.sqrt(u * u + v * v + w * w) * spread + 1e-12 * edge
+    along = u * a + v * b + w * c
+    return 1 if along > room else (-1 if along < -room else 0)
+
+
+@INLINED
+def reached(vertices, tree, f, x, y, z, a, b, c, spread):
+    """Whether any of the rays of `met` can meet triangle f: they pass no two edges on different sides."""
+    i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
+    a0, a1, a2 = vertices[i, 0] - x, vertices[i, 1] - y, vertices[i, 2] - z
+    b0, b1, b2 = vertices[j, 0] - x, vertices[j, 1] - y, vertices[j, 2] - z
+    c0, c1, c2 = vertices[k, 0] - x, vertices[k, 1] - y, vertices[k, 2] - z
+    one = side(a0, a1, a2, b0, b1, b2, a, b, c, spread)
+    two = side(b0, b1, b2, c0, c1, c2, a, b, c, spread)
+    three = side(c0, c1, c2, a0, a1, a2, a, b, c, spread)
+    least, most = min(one, min(two, three)), max(one, max(two, three))
+    return least >= 0 or most <= 0
