@@ -18,10 +18,10 @@ FIGURES = {
         "tip_chord": "ratio", "fingers": "whole",
     }
 }  # fmt: skip
-"""Figures of a bird. `length` (bill tip to tail tip) and `span` are the living bird's, of which only the ratio is
-used: the published size sets the length. All ratios are to the length, but `wing_chord` (to half the span), `wrist`
-(where along half the span the second hinge lies) and `tip_chord` (tip to root chord). `fingers` counts the slotted
-primaries at the tip."""
+"""Figures of a bird. `length` (bill tip to tail tip) and `span` are those of the living bird; only their ratio is used,
+since the published size sets the length. Ratios are relative to the length, with three exceptions: `wing_chord` is
+relative to half the span, `wrist` is the place of the second hinge along half the span, `tip_chord` is the chord at the
+tip over that at the root. `fingers` is the number of slotted primaries at the tip."""
 
 FLAP = {"mean_deg": 15.0, "amplitude_deg": 40.0, "fold_amplitude_deg": 30.0, "fold_lag_deg": 90.0}
 """Default wing beat: shoulder mean + amplitude cos(2 pi F t), outer segment fold_amplitude cos(2 pi F t - fold_lag)."""
@@ -45,7 +45,7 @@ def fault(record: dict) -> str | None:
 
 
 def _bill(front: float, root: float, depth: float) -> Surface:
-    """The bill from its `root` (y) to its tip at y = `front`, a little hooked; `depth` is its height at the root."""
+    """The slightly hooked bill from y = `root` to its tip at y = `front`; `depth` is its height at the root."""
     sections = []
     for along, size, droop in ((0.0, 1.0, 0.0), (0.5, 0.85, 0.0), (0.88, 0.45, -0.12 * depth)):
         loop = superellipse(0.3 * size * depth, 0.5 * size * depth, 2.0, 12)
@@ -100,7 +100,8 @@ def _outer(wrist: np.ndarray, half_span: float, chord: float, f: dict) -> tuple[
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the bird a merged record describes, and the facts its cloud's record adds (flap, span)."""
+    """Return the parts of the bird that a merged record describes, and the entries `flap` and `wing_span_m` for its
+    cloud's record."""
     f = {name: value["si"] for name, value in record["figures"].items()}
     length = record["published"]["size_m"]
     half_span = length * f["span"] / f["length"] / 2
@@ -114,7 +115,7 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     for side, name in ((1, "right"), (-1, "left")):
         place = np.diag([float(side), 1.0, 1.0])
         inner, outer = (tuple(shell.mapped(place) for shell in shells) for shells in segments)
-        # About -y on the right and +y on the left, a positive angle lifts the tip.
+        # The hinge's axis is -y on the right and +y on the left, so that a positive angle lifts the tip.
         axis = (0.0, -float(side), 0.0)
         bend = (side * wrist[0], shoulder[1], shoulder[2])
         result.append(Part(f"{name} inner wing", "wing", inner, tuple(place @ shoulder), axis, weight=f["wrist"]))

@@ -2,7 +2,7 @@
 
 A cloud is a NumPy archive (.npz): it keeps float64 exactly, holds several arrays of different shape in one
 file, and NumPy, MATLAB (scipy.io) and Julia open it without our code. Frame: metres, body-centred, front +y,
-up +z. Every point belongs to one part; every part but the body moves.
+up +z. Every point belongs to one part; every part except the body moves.
 
     points      (L, 3)  float64  m
     normals     (L, 3)  float64  outward unit vectors, NaN where the source has none
@@ -10,9 +10,9 @@ up +z. Every point belongs to one part; every part but the body moves.
     part        (L,)    int64    index of the point's part
     kinds       (P,)    str      body | rotor | wing | wheel | node
     names       (P,)    str      one name a part, unique in the cloud
-    parents     (P,)    int64    the part this one's hinge rides on (an outer wing on its inner), -1 for none
+    parents     (P,)    int64    the part that this part's hinge moves with (an outer wing: its inner wing), -1 for none
     hinges      (P, 3)  float64  m, a point on the part's axis (NaN for body and node)
-    axes        (P, 3)  float64  unit vector of the axis; a rotor's sense is its sign (NaN for body and node)
+    axes        (P, 3)  float64  unit vector of the axis; its sign is a rotor's sense (NaN for body and node)
     track       (F, L, 3) float64 m, a cyclic recording of all points (F = 0 unless the parts are nodes)
     record      str     JSON: subtype, category, source, checksum, track_rate_hz, rate_factors, sizes, ...
 """
@@ -80,7 +80,7 @@ class Cloud:
 
 
 def _need(good: bool, what: str) -> None:
-    """Raise InputError with a fault's words."""
+    """Raise InputError with the message `what` unless `good`."""
     if not good:
         raise InputError(what)
 

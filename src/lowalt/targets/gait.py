@@ -1,8 +1,8 @@
 """The built-in pedestrian: a parametric walk or run that drives the 31 nodes, where no recording is given.
 
-A cyclist (`cyclist`) and a dog (`quadruped`) are made likewise, from nodes of their own. Only the human body is here:
-segment lengths, how the curves of `gait_walk` and `gait_run` turn the bones, and the cloud. Axes: x right, y front, z
-up, metres; the root's mean position is the origin.
+The modules `cyclist` and `quadruped` make a cyclist and a dog in the same way, from nodes of their own. This module
+holds the human body: the lengths of its segments, the rotations of its bones by the curves of `gait_walk` and
+`gait_run`, and the cloud. Axes: x right, y front, z up, metres; the root's mean position is the origin.
 """
 
 import hashlib
@@ -21,7 +21,7 @@ from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud,
 HIP_HEIGHT = 0.530
 """Hip (greater trochanter) above ground, in statures. Source: Drillis and Contini 1966, in Winter's handbook."""
 
-# Winter's segment lengths; how spine, neck, hand and foot divide among CMU's bones is an estimate.
+# Segment lengths are Winter's. The division of spine, neck, hand and foot among CMU's bones is an estimate.
 _RIGHT = {
     "hipjoint": (0.0955, 0, -0.045), "femur": (0, 0, -0.245), "tibia": (0, 0, -0.246),
     "foot": (0, 0.077, -0.035), "toes": (0, 0.035, -0.004),
@@ -47,9 +47,10 @@ def bones_m(stature_m: float) -> np.ndarray:
 
 
 def _toe_pitch(foot_rad: np.ndarray) -> np.ndarray:
-    """Return the toes' pitch (rad): the foot's while it points up, about a third of it where the heel is lifted.
+    """Return the toes' pitch (rad): that of the foot while it points up, about a third of it where the heel is lifted.
 
-    The ball bends at push-off, or the toes would be driven into the ground. Estimate; continuously differentiable.
+    The ball of the foot bends at push-off; otherwise the toes would enter the ground. The curve is an estimate and
+    continuously differentiable.
     """
     down, width = np.minimum(foot_rad, 0), np.radians(5)
     return np.maximum(foot_rad, 0) + 0.35 * down + 0.65 * width * (portable.exp(down / width) - 1)
@@ -62,7 +63,7 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
     chest = product(rotation("z", trunk["twist"]), rotation("x", -trunk["lean"]))
     turned = {"root": pelvis}
     for name, share in _TRUNK_SHARE.items():
-        below = 1 - share if name in ("lowerback", "upperback") else 0  # the neck comes back to straight ahead
+        below = 1 - share if name in ("lowerback", "upperback") else 0  # along the neck, the yaw falls to zero
         yaw = share * trunk["twist"] + below * trunk["turn"]
         turned[name] = product(rotation("z", yaw), rotation("x", -share * trunk["lean"]))
         turned[name] = product(turned[name], rotation("y", below * trunk["list"]))
@@ -70,8 +71,8 @@ def _rotations(phase: np.ndarray, leg, arm, trunk: dict[str, np.ndarray]) -> np.
         hip, knee, ankle = leg((phase + later) % 1.0)
         shoulder, elbow = arm((phase + later) % 1.0)
         turned[side + "hipjoint"] = pelvis
-        # The hips ride on the pelvis, but the legs swing in planes along the path: a walker abducts and turns the
-        # hip against the pelvis, or the feet would be flung sideways at 1 m/s while they carry the body.
+        # The hips move with the pelvis, but the legs swing in planes along the path. A walker abducts and turns the
+        # hip against the pelvis; otherwise the feet would move sideways at 1 m/s while they carry the body.
         turned[side + "femur"] = rotation("x", hip)
         turned[side + "tibia"] = rotation("x", hip - knee)
         turned[side + "foot"] = rotation("x", hip - knee + ankle)
@@ -116,7 +117,7 @@ def stance_speed_mps(
     """Return the mean ground speed (m/s) of the lowest foot node while it is within `height_m` of the ground.
 
     `cycle` (F, L, 3) cyclic, `feet` the numbers of the foot nodes, front +y, horizontal progress left out; `speed_mps`
-    is added back. Zero would be a foot that stands still. The ground is the feet's lowest point.
+    is added back. A foot that stands still has the speed zero. The ground is the feet's lowest point.
     """
     places = cycle[:, feet]
     velocity = (np.roll(places, -1, axis=0) - np.roll(places, 1, axis=0)) * rate_hz / 2
@@ -199,12 +200,12 @@ def record_files(record: dict) -> list[str]:
 def gait_cloud(record: dict, seed: int) -> Cloud:
     """Return the cloud of a built-in pedestrian, cyclist or dog: one cycle of its nodes.
 
-    `record` is a merged record that `check_record` has passed. The cloud's record says cycle (s), stride (m),
-    cadence, height of the origin above ground (m) and foot speed in stance (m/s). The model has no randomness, so
-    `seed` is only noted.
+    `record` is a merged record that `check_record` has passed. The cloud's record gets cycle (s), stride (m), cadence,
+    height of the origin above ground (m) and foot speed in stance (m/s). The model draws no random numbers; `seed` is
+    only written into the record.
     """
     duration = _cycle(record, 2)[2]
-    # A whole number of frames a cycle: the rate gives way by less than a frame, the duration does not.
+    # A cycle has a whole number of frames and keeps its duration, so the frame rate is adjusted a little.
     track, names, duration, stride = _cycle(record, max(2, round(duration * record["rate_hz"])))
     rate = len(track) / duration
     facts = {

@@ -1,13 +1,13 @@
 """Running angles over one cycle at about 3 m/s, and where each figure comes from.
 
-Phase 0 is the right foot's first contact; control points are joined by the same monotone periodic curves as the
-walk's. Angles in degrees here, radians outside; flexion is positive. Sources:
+Phase 0 is the right foot's first contact. Control points are joined by the same monotone periodic curves as those of
+the walk. The tables are in degrees, the functions return radians; flexion is positive. Sources:
 [H] Heiderscheit et al. 2011, Med Sci Sports Exerc 43(2) 296-302, table 3, preferred step rate;
 [L] Lieberman et al. 2015, J Exp Biol 218, 3406-3414: 84.8 strides a minute at 3.0 m/s;
 [N] Novacheck 1998, "The biomechanics of running", Gait and Posture 7, 77-95: toe-off at 39 % of the cycle, swing
 knee about 90 degrees, ankle from about 25 degrees up in mid-stance to 20 down at toe-off (read from curves);
-[E] estimate; those of the leg are fitted so that the foot slides least and keeps to the ground at 3 m/s.
-The hip's angles are those of the thigh against the vertical: [H] less the 1 degree that fits the pelvis.
+[E] estimate; estimates for the leg are fitted so that at 3 m/s the foot stays on the ground and slides least.
+Hip angles are those of the thigh against the vertical: [H] minus 1 degree, which is fitted to the pelvis.
 """
 
 import numpy as np

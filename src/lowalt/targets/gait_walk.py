@@ -1,8 +1,8 @@
-"""Walking angles over one cycle: the curves of Boulic, Magnenat-Thalmann and Thalmann, and nothing else.
+"""Walking angles over one cycle: the curves of Boulic, Magnenat-Thalmann and Thalmann.
 
 Source: "A global human walking model with real-time kinematic personification", The Visual Computer 6 (1990)
 344-358. Everything depends on the relative speed rv = v / (hip height), 0 < rv <= 3, and on the phase in [0, 1),
-0 at the right heel strike. Angles come in degrees there and leave in radians here; flexion is positive.
+0 at the right heel strike. The paper has degrees, the functions return radians; flexion is positive.
 """
 
 import numpy as np
@@ -14,7 +14,8 @@ from lowalt.common.portable import sine_cosine_turns
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:
     """Return a periodic, continuously differentiable curve through (phase, value) control points, at `phase`.
 
-    Monotone between control points (Fritsch and Carlson 1980), so no overshoot; any values of `phase`.
+    The curve is monotone between control points (Fritsch and Carlson 1980), so it does not overshoot. `phase` may
+    have any values.
     """
     times, values = np.array(sorted((time % 1.0, value) for time, value in points)).T
     phase = np.asarray(phase) % 1.0
@@ -47,8 +48,8 @@ def timing(rv: float) -> tuple[float, float, float]:
 def leg(rv: float, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return flexion (rad) of hip, knee and ankle of the right leg, each shaped like `phase`.
 
-    The left leg is half a cycle later. Three speed ranges: up to 0.5 the amplitudes grow with speed, up to 1.3
-    they stay, up to 3 they change a little again.
+    The left leg is half a cycle later. There are three ranges of relative speed: the amplitudes grow up to 0.5, stay
+    constant up to 1.3, and change a little up to 3.
     """
     _, _, support = timing(rv)
     slow, fast = min(rv, 0.5) / 0.5, max(rv - 1.3, 0) / 1.7

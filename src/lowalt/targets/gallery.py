@@ -1,4 +1,4 @@
-"""Gallery: all clouds in one picture, coloured by part: a line-up at one scale a category, then each by itself."""
+"""Gallery: all clouds in one picture, coloured by part: each category in a row at one scale, then each cloud alone."""
 
 import argparse
 from itertools import pairwise
@@ -14,7 +14,7 @@ from lowalt.targets.skeleton import NODES, PARENTS
 
 COLUMNS = 5
 VIEWS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
-"""Azimuth from the front towards the right and elevation of the viewer (degrees): where each category shows best."""
+"""The viewer's azimuth, from the front towards the right, and elevation (degrees), chosen for each category."""
 
 BODY_COLOUR = "#52525b"
 PART_COLOURS = ("#d1495b", "#0077b6", "#e09f1f", "#2a9d8f", "#8e44ad", "#5f8a1f", "#e76f51", "#264653")
@@ -31,14 +31,17 @@ def axes_of(kind: str) -> np.ndarray:
 
 
 def shown(cloud: Cloud) -> np.ndarray:
-    """Return the points as seen (L, 3), right, up, toward (m): a recording's first frame, or the cloud at rest."""
+    """Return the points (L, 3) as (right, up, toward the viewer) in m: a recording's first frame, or the cloud at rest."""
     points = cloud.track[0] if len(cloud.track) else cloud.points
     seen = points @ axes_of(cloud.like).T
     return seen - [*((seen.max(0) + seen.min(0))[:2] / 2), 0]
 
 
 def colours(cloud: Cloud) -> np.ndarray:
-    """Return one colour a point, RGBA (L, 4): grey for the body, the parts in turn, faint where it faces away."""
+    """Return the RGBA colour of each point (L, 4): grey for the body, one of PART_COLOURS for each other part.
+
+    Points that face away from the viewer are faint.
+    """
     from matplotlib.colors import to_rgba
 
     names = [
@@ -46,7 +49,7 @@ def colours(cloud: Cloud) -> np.ndarray:
     ]
     result = np.array([to_rgba(name) for name in names])[cloud.part]
     toward = cloud.normals @ axes_of(cloud.like)[2]
-    # Points without a normal compare false and stay full.
+    # A comparison with NaN is false, so points without a normal stay opaque.
     result[toward < -0.05, 3] = FAINT
     return result
 
@@ -64,7 +67,7 @@ def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
     """Draw one cloud into matplotlib axes in metres, `shift` (m) to the right, nearer points in front."""
     seen = shown(cloud)
     order = np.argsort(seen[:, 2])
-    # Nodes of a skeleton are told apart by the bones between them.
+    # Bones between nodes show which nodes belong together.
     for bone in bones(cloud.names):
         x, y = seen[list(bone), :2].T
         axes.plot(x + shift, y, color="#a1a1aa", linewidth=0.3 * size**0.5, zorder=0)
@@ -72,7 +75,7 @@ def draw(axes, cloud: Cloud, size: float, shift: float = 0.0) -> None:
 
 
 def caption(cloud: Cloud) -> str:
-    """Return a cloud's name, points, source and size, and how far apart the ends of a recording's cycle are."""
+    """Return a cloud's name, points, source and size, and the distance between the ends of a recording's cycle."""
     size = " x ".join(f"{value:.2g}" for value in np.ptp(cloud.points, axis=0))
     source, gap = cloud.record["source"], cloud.record.get("loop_mismatch_m")
     closes = "" if source != "mocap" or gap is None else f" (closes to {100 * gap:.2g} cm)"
@@ -138,7 +141,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, type=Path, help="picture to write (.png)")
     given = line.parse_args(arguments)
     with replacing(given.out) as temporary:
-        # No version or date in the file: equal clouds give equal bytes.
+        # The file holds no version or date, so that equal clouds give equal bytes.
         figure([read(path) for path in given.clouds]).savefig(temporary, metadata={"Software": None})
 
 

@@ -1,7 +1,7 @@
 """The pieces of a mesh file by name: a scene's geometries and instances, and the objects and groups of an OBJ file.
 
-trimesh reads all five formats and places a scene's geometries (pymeshlab flattens scenes and drops their names). Every
-fault is named by file and reason. Nothing here repairs a surface or knows a target.
+trimesh reads all five formats and places a scene's geometries; pymeshlab would flatten scenes and drop their names.
+Every error names the file and the reason. This module repairs no surface and knows no target.
 """
 
 import logging
@@ -43,7 +43,7 @@ def pieces(path: Path, groups: bool = False) -> list[Piece]:
     `groups`: whether an OBJ file is split by its objects and groups, under their names, not by its materials.
     Raises: InputError naming the file and the reason where it cannot be read.
     """
-    import trimesh  # only records with a mesh pay for the import
+    import trimesh  # slow to import, and only records with a mesh need it
 
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
@@ -65,16 +65,16 @@ def pieces(path: Path, groups: bool = False) -> list[Piece]:
                 faces = np.asarray(mesh.faces)
                 faces = faces[:, ::-1] if np.linalg.det(place[:3, :3]) < 0 else faces
                 found.append(Piece(name, str(node), vertices, faces))
-    except Exception as error:  # trimesh's readers raise whatever their format brings
+    except Exception as error:  # trimesh's readers raise exceptions of many types
         raise InputError(f"{path}: not a readable {path.suffix} mesh ({type(error).__name__}: {error})") from None
     return found
 
 
 def selected(path: Path, names: list[str] | None) -> list[Piece]:
-    """Return the pieces of a file that `names` call by geometry or instance, all by default.
+    """Return the pieces of a file whose geometry or instance is one of `names`; all pieces where names is None.
 
-    The names of an OBJ file are those of its objects and groups or, where one is not among them, of its materials'
-    surfaces. Split by materials, a file of one material is a whole under the name of its first object.
+    An OBJ file is split by its objects and groups. Where one of `names` is none of these, it is split by its materials;
+    a file of one material is then one piece with the name of its first object.
     Raises: InputError naming the file, the names that are not in it and those that are.
     """
     if names is None:

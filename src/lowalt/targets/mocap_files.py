@@ -1,6 +1,6 @@
-"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays, with every fault named by file and frame.
+"""Reading CMU's skeleton (.asf) and motion (.amc) text files into arrays; every error names the file and the frame.
 
-Only the formats are here; what the angles do to the bones is in `mocap`. File axes: x left, y up, z front.
+This module knows only the formats; `mocap` turns the bones by the angles. File axes: x left, y up, z front.
 Source: Acclaim's ASF/AMC format as the CMU Graphics Lab Motion Capture Database writes it.
 """
 
@@ -21,8 +21,11 @@ _DOF = ("tx", "ty", "tz", "rx", "ry", "rz")
 
 @dataclass(frozen=True)
 class Skeleton:
-    """A skeleton file: bones (31, 3) in file units and file axes, `axes_rad` (31, 3) each bone's own frame, `dofs` the
-    channels of each node in the order of the file, `unit_m` metres a file unit."""
+    """The contents of a skeleton file.
+
+    bones: (31, 3) in file units and file axes; axes_rad: (31, 3), angles of each bone's own frame; dofs: the channels of
+    each node in the order of the file; unit_m: metres per file unit.
+    """
 
     bones: np.ndarray
     axes_rad: np.ndarray
@@ -106,7 +109,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
 
 
 def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
-    """Return (frame number, words) of every line of data up to frame `last`; what follows is never looked at."""
+    """Return (frame number, words) of every line of data up to frame `last`; later lines are not read."""
     result, frame = [], 0
     for line in path.read_text(errors="replace").splitlines():
         words = line.split()
@@ -155,7 +158,7 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     """Return the channels (F, channels) of each node that has any, frames `first` to `last` (1-based, inclusive).
 
     Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside first..last are not
-    checked, so a record can trim known faults.
+    checked, so that a record can leave out frames with known faults.
     Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a value that is no
     finite number, an all-zero root, a frame equal to the one before it, fewer than two frames left.
     """

@@ -1,8 +1,8 @@
 """Command line of an extra product of the stage: a target's opaque surfaces, for scenes with self-occlusion.
 
-Triangles for targets with a surface, each vertex riding on the part it belongs to; capsules along the bones for
-recordings, whose nodes have none. Built-in shapes keep all their triangles, so that points lie exactly on them; user's
-meshes are simplified, and the file says how far each point then lies off.
+A target with a surface has triangles; each vertex moves with the part that it belongs to. A recording has nodes without
+surfaces, so it gets capsules along its bones. Built-in shapes keep all their triangles, so that points lie exactly on
+them. A user's mesh is simplified, and the file holds each point's distance from the simplified surface.
 """
 
 import json
@@ -24,9 +24,9 @@ from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged
 
 ARRAYS = ("vertices", "vertex_part", "faces", "offset_m", "closed", "bones", "radius_m")
-"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) vertices; offset_m (L,) m, how far off the
-surface each of the cloud's points is to start; closed (P,) bool, whether a part's surface is closed; bones (B, 2)
-nodes at the ends of capsules; radius_m (B,) m."""
+"""vertices (V, 3) m in the cloud's axes; vertex_part (V,); faces (F, 3) numbers of vertices; offset_m (L,) m, distance
+from each of the cloud's points at which its line of sight starts; closed (P,) bool, whether a part's surface is closed;
+bones (B, 2) nodes at the ends of capsules; radius_m (B,) m."""
 
 STATURE_M = 1.756
 RADII_M = {
@@ -38,7 +38,7 @@ RADII_M = {
 Anthropometric Survey of U.S. Army Personnel, men's means, rounded; torso: mean of half breadth and half depth."""
 
 GRAIN = 30
-"""Triangles that a cut goes through are divided down to this fraction of the part's extent."""
+"""Triangles across the border of a cut are divided until their edges are shorter than the part's extent / GRAIN."""
 
 
 def longest_edge(corners: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
             apart = ((corners.max(axis=1) <= low) | (corners.min(axis=1) >= high)).any(axis=1)
             within = inside(volume, corners.reshape(-1, 3)).reshape(-1, 3)
             size = longest_edge(corners)
-            # Three corners outside do not say that a large triangle is.
+            # A large triangle may reach into the cut although all its corners lie outside.
             outside = apart | (~within.any(axis=1) & (size < 0.3 * (high - low).min()))
             small = ~within.all(axis=1) & ~outside & (size <= grain)
             small[small] = ~inside(volume, corners[small].mean(axis=1))
@@ -77,7 +77,7 @@ def cut_away(surface: Surface, cuts: tuple[Surface, ...]) -> Surface:
 
 
 def part_surface(part: Part) -> Surface:
-    """Return a built-in part's whole surface: all its shells, cut away, and their copies round the hinge."""
+    """Return a built-in part's whole surface: all its shells without its cuts, and their copies around the hinge."""
     shells = merged(part.shells)
     if part.cuts:
         shells = cut_away(shells, part.cuts)
@@ -121,7 +121,8 @@ def make(record: dict, inputs: Path | None, seed: int) -> dict[str, np.ndarray]:
 
         parts = MODULES[like(record)].parts(record)[0]
         surfaces = [part_surface(part) for part in parts]
-        # Clears a point's own triangle by more than rounding, and stays on it where a point stands by its corner.
+        # The offset is larger than rounding, so that a point's own triangle does not hide it, and small enough that a
+        # point near a corner stays next to its triangle.
         offset = 1e-9 * np.ptp(merged(surfaces).vertices, axis=0).max()
         return from_surfaces(surfaces, np.full(record["points"], offset), np.array([not part.cuts for part in parts]))
     if record.get("gait") in ("cycle", "trot"):
@@ -146,7 +147,7 @@ def write(path: str | Path, arrays: dict[str, np.ndarray], subtype: str) -> None
 def read(path: str | Path) -> dict:
     """Return a file's arrays (ARRAYS) and its `subtype`.
 
-    Raises: InputError where the file is missing or no file of occluders.
+    Raises: InputError where the file is missing or holds no occluders.
     """
     existing(path, "occluders")
     try:

@@ -1,7 +1,7 @@
-"""Closed triangle surfaces from parametric primitives, and what can be asked of one.
+"""Closed triangle surfaces from parametric primitives, their volume, and a test whether points lie inside.
 
-Geometry only: nothing here knows a target, a part or a record. Every primitive is one closed shell with outward
-normals (right-hand rule), in the caller's unit. Built-in models place several overlapping shells side by side.
+This module is geometry only: it knows no target, part or record. Every primitive is one closed shell with outward
+normals (right-hand rule), in the caller's unit. Built-in models consist of several shells, which may overlap.
 """
 
 from collections.abc import Iterable
@@ -68,8 +68,8 @@ def inside(surface: Surface, points: np.ndarray) -> np.ndarray:
 def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     """Return the closed skin over a row of sections (K, S, 3), each a loop of S points in the same sense.
 
-    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. Whichever way the
-    loops run, the normals come out outward.
+    Each end is closed by a fan from `tips` (2, 3), by default the middle of the end section. The normals point outward
+    for either sense of the loops.
     """
     sections = np.asarray(sections, float)
     rows, sides, _ = sections.shape
@@ -78,8 +78,8 @@ def loft(sections: np.ndarray, tips: np.ndarray | None = None) -> Surface:
     a, b = grid[:-1], np.roll(grid[:-1], -1, 1)
     c, d = np.roll(grid[1:], -1, 1), grid[1:]
     first, last = rows * sides, rows * sides + 1
-    # The two halves of a loop are split along mirrored diagonals, or upper and lower side of a twisted blade would
-    # cut through each other at its thin edge.
+    # The two halves of a loop are split along mirrored diagonals. Otherwise the upper and the lower side of a twisted
+    # blade would cut through each other at its thin edge.
     half = np.arange(sides)[None, :, None] < sides // 2
     faces = [
         np.where(half, np.stack([a, b, c], -1), np.stack([a, b, d], -1)).reshape(-1, 3),
@@ -113,7 +113,7 @@ def tube(path: np.ndarray, radii: np.ndarray | float, sides: int = 10) -> Surfac
     radii = np.broadcast_to(np.asarray(radii, float), len(path))
     tangents = np.gradient(path, axis=0)
     tangents /= portable.norm(tangents)[:, None]
-    # One reference direction for all sections, the one least along the path, keeps the loops from twisting.
+    # All sections share the axis that the path follows least as their reference, so that the loops do not twist.
     reference = np.eye(3)[np.argmin(abs(tangents).max(0))]
     first = np.cross(tangents, reference)
     first /= portable.norm(first)[:, None]
@@ -145,7 +145,7 @@ def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow:
 
 
 def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0) -> Surface:
-    """Return a box of full edge lengths `size` (x, y, z) with its edges along y rounded by the exponent."""
+    """Return a box with edges of the lengths `size` (x, y, z); those along y are rounded by the superellipse's exponent."""
     x, y, z = (float(value) / 2 for value in size)
     return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
 
@@ -168,7 +168,7 @@ def ring(profile: np.ndarray, sides: int = 32) -> Surface:
 def airfoil(chord: float, thickness: float, panels: int = 6) -> np.ndarray:
     """Return a symmetric section (2 panels + 1, 2) of (along chord, across), leading edge at +chord/4, as a loop.
 
-    `thickness` is the largest thickness over the chord; the trailing edge is blunt, a fiftieth of that thick.
+    `thickness` is the largest thickness over the chord. The blunt trailing edge has a fiftieth of that thickness.
     Source: NACA four-digit thickness distribution, Abbott & von Doenhoff 1959.
     """
     x = (1 - portable.sine_cosine_turns(np.arange(panels + 1) / (2 * panels))[1]) / 2

@@ -1,7 +1,7 @@
 """Built-in multirotor layouts: frame, motors, ducts, legs, payload and turning propellers as closed shells.
 
-Axes: front +y, right +x, up +z, metres; the origin lies in the middle of the rotor plane's plan, at mid body.
-What a layout needs is in FIGURES; where a number below is a plain factor it only rounds or joins shells.
+Axes: front +y, right +x, up +z, metres. The origin lies in the middle between all rotors, seen from above, at half the
+body's height. FIGURES lists the figures that each layout needs. A plain factor in the code only rounds or joins shells.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from lowalt.targets.surfaces import box, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
 DIAGONALS = ("motor diagonal", "span over ducts", "span over rotors")
-"""Meanings of a multirotor's published size: largest distance between motor axes, over the ducts or over blade tips."""
+"""Meanings of a multirotor's published size: the largest distance between motor axes, or across ducts or blade tips."""
 SIZES = (*DIAGONALS, *dict.fromkeys(aircraft.SIZES.values()))
 """Meanings of the published size of all craft."""
 
@@ -106,7 +106,7 @@ def ducted(record: dict, f: dict) -> list[Part]:
 
 
 def raised(record: dict, f: dict) -> list[Part]:
-    """Return an H-frame craft in flight: side booms raised over the pod on a cross tube, big gimbal below the nose."""
+    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a large gimbal below the nose."""
     places = hubs(record, f["spacing_ratio"])
     boom, arm = f["frame_rise"], f["arm_diameter"] / 2
     reach_x, reach_y = abs(places).max(0)
@@ -126,7 +126,7 @@ def raised(record: dict, f: dict) -> list[Part]:
 
 
 def radial(record: dict, f: dict) -> list[Part]:
-    """Return a radial multirotor: round centre with its ring of batteries, straight arms, two skids, gimbal."""
+    """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids and a gimbal."""
     places, arm = hubs(record, None), f["arm_diameter"] / 2
     centre = hull([(y * f["body_length"], w * f["body_width"] / 2, -h * f["body_height"], h * f["body_height"])
                    for y, w, h in ((0.5, 0.25, 0.3), (0.42, 0.6, 0.42), (0.2, 0.95, 0.5), (-0.2, 0.95, 0.5),
@@ -136,7 +136,7 @@ def radial(record: dict, f: dict) -> list[Part]:
     cell = f["battery_length"]
     for x, y in places:
         shells.append(tube([(0.2 * x, 0.2 * y, 0), (x, y, 0)], arm))
-        # From the front to the arm's direction: the arm's angle less a quarter turn.
+        # Turn from the front to the arm's direction, by the arm's angle minus a quarter turn.
         far = np.sqrt(x * x + y * y)
         sine, cosine = -x / far, y / far
         spin = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
@@ -207,5 +207,5 @@ LAYOUTS = {
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the craft a merged record describes, and the facts its cloud's record adds (none)."""
+    """Return the parts of the craft that a merged record describes, and the entries for its cloud's record (none)."""
     return LAYOUTS[record["model"]](record, {name: value["si"] for name, value in record["figures"].items()}), {}

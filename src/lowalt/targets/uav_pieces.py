@@ -23,8 +23,8 @@ def motor_diagonal(record: dict) -> float:
 def hubs(record: dict, ratio: float | None) -> np.ndarray:
     """Return the motor axes' places (R, 2) in plan (m), counted anticlockwise seen from above.
 
-    With a `ratio` (lateral over longitudinal spacing) four at the corners of a rectangle, else evenly on a circle
-    with the front between two of them.
+    With a `ratio` (lateral over longitudinal spacing) four axes stand at the corners of a rectangle. Otherwise they
+    stand evenly on a circle, with the front half-way between two of them.
     """
     reach = motor_diagonal(record) / 2
     count = record["published"]["n_rotors_or_wings"]
@@ -40,7 +40,7 @@ def hubs(record: dict, ratio: float | None) -> np.ndarray:
 def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
     """Return one propeller blade along +x for a rotor turning anticlockwise (leading edge at +y), hub at the origin.
 
-    Twist follows a constant pitch of two thirds of the diameter, chord is largest at 0.35 of the radius.
+    The twist follows a constant pitch of two thirds of the diameter; the chord is largest at 0.35 of the radius.
     """
     stations = np.array([root, 0.2, 0.35, 0.55, 0.75, 0.92, 1.0])
     chords = chord * np.array([0.55, 0.85, 1.0, 0.88, 0.68, 0.5, 0.25])
@@ -49,11 +49,12 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
 
 
 def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
-    """Return the rotor part about `hub` (3,): equal blades, axis `sense` times up, first blade square to its arm."""
+    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade at right angles to its
+    arm."""
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
-    # The hub's direction and a quarter turn more.
+    # Turn the blade to the hub's direction and by a quarter turn more.
     far = np.sqrt(hub[0] * hub[0] + hub[1] * hub[1])
     sine, cosine = (hub[0] / far, -hub[1] / far) if far > 0 else (1.0, 0.0)
     turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
@@ -64,7 +65,7 @@ def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
 def rotors(places: np.ndarray, height: float, figure: dict, gap: float = 0.0) -> list[Part]:
     """Return the rotors on the motor axes (R, 2) at `height`; neighbours turn in opposite senses.
 
-    With a `gap` (m) each axis carries a coaxial pair, the lower one turning against the upper.
+    With a `gap` (m) each axis carries a coaxial pair, whose lower rotor turns against the upper one.
     """
     parts = []
     for index, (x, y) in enumerate(places):
@@ -76,7 +77,7 @@ def rotors(places: np.ndarray, height: float, figure: dict, gap: float = 0.0) ->
 
 
 def motors(places: np.ndarray, top: float, figure: dict) -> list[Surface]:
-    """Return the motor cans under the rotors (R, 2), reaching up to `top`."""
+    """Return the motors as cylinders below the rotors (R, 2); their upper ends are at the height `top` (m)."""
     low, radius = top - figure["motor_height"], figure["motor_diameter"] / 2
     return [cylinder(radius, (x, y, low), (x, y, top)) for x, y in places]
 
@@ -90,7 +91,7 @@ def fuselage(figure: dict, taper: float = 0.55) -> Surface:
 
 
 def camera(figure: dict, y: float, z: float) -> list[Surface]:
-    """Return a gimbal: a ball with its lens, hung from a short bar at (0, y, z)."""
+    """Return a gimbal: a ball at (0, y, z) with its lens, below a short vertical bar."""
     d = figure["camera_diameter"]
     lens = cylinder(d * 0.28, (0, y + 0.3 * d, z), (0, y + 0.62 * d, z))
     return [ellipsoid((d / 2, d / 2, d / 2), (0, y, z)), lens, cylinder(d * 0.12, (0, y, z), (0, y, z + 0.9 * d), 8)]

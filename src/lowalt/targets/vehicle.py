@@ -1,7 +1,7 @@
-"""Built-in car models: a lower body and a greenhouse after the car's profile, and four turning wheels.
+"""Built-in car models: a lower body and a greenhouse by the car's profile, and four turning wheels; a bus is one box.
 
-Axes: front +y, right +x, up +z, metres; the origin lies in the middle of length, width and height, so that it stands
-half the height above the ground.
+Axes: front +y, right +x, up +z, metres. The origin lies in the middle of length, width and height, so that it is half
+the height above the ground.
 """
 
 import numpy as np
@@ -22,10 +22,10 @@ FIGURES = {
         "front_overhang": "length", "ground_clearance": "length",
     },
 }  # fmt: skip
-"""Figures of a car, and of a bus, which is one box. Heights are ratios to its height, stations along the car ratios to
-its length from the front bumper, `roof_width` to its width. Length, width and height are the published ones.
-`rolling_diameter` is the tyre's, used where the record says `wheel_size: rolling`; by default the wheel has the
-published (rim) diameter."""
+"""Figures of a car, and of a bus, which is one box. Heights are relative to its height; stations along the car are
+distances from the front bumper, relative to its length; `roof_width` is relative to its width. Length, width and height
+are the published ones. `rolling_diameter` is that of the tyre, used where the record says `wheel_size: rolling`; by
+default the wheel has the published (rim) diameter."""
 
 SPOKES = 5
 MOVING_SHARE = 0.35
@@ -105,11 +105,12 @@ def _coach(length: float, width: float, height: float, f: dict) -> Surface:
 
 
 def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
-    """Return a wheel about the x axis at the origin: tyre, hub and spokes, closed shells; it touches -diameter/2."""
+    """Return a wheel about the x axis at the origin, as closed shells: tyre, hub and spokes; its lowest point is at
+    z = -diameter / 2."""
     radius, half = diameter / 2, tyre_width / 2
     inner = 0.62 * radius
     loop = superellipse((radius - inner) / 2, half, 3.5, 16) + np.array([(radius + inner) / 2, 0])
-    # The ring turns about z; carried over to x with a section vertex straight down.
+    # `ring` turns about z. The map takes z to x, so that one section of the tyre points straight down.
     to_x = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     shells = [ring(loop, 32).mapped(to_x), cylinder(0.16 * radius, (-0.5 * half, 0, 0), (0.6 * half, 0, 0))]
     for k in range(SPOKES):
@@ -125,10 +126,10 @@ def wheel(diameter: float, tyre_width: float) -> tuple[Surface, ...]:
 
 
 def parts(record: dict) -> tuple[list[Part], dict]:
-    """Return the parts of the car a merged record describes, and the facts its cloud's record adds.
+    """Return the parts of the car that a merged record describes, and the entries for its cloud's record.
 
-    Added: `wheel_diameter_m` (the one that sets the wheels' rate) and `origin_height_m`, the height of the origin
-    above the ground at which the wheels touch it.
+    The entries are `wheel_diameter_m`, which sets the wheels' rate, and `origin_height_m`, the height of the origin
+    above the ground on which the wheels stand.
     """
     f = {name: value["si"] for name, value in record["figures"].items()}
     table = record["published"]

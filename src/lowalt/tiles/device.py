@@ -1,8 +1,8 @@
 """The renderer on any PyTorch device, batched: the same pixels as `lowalt.tiles.render`, bit for bit.
 
 Every step is one elementwise operation of IEEE 754 (add, multiply, divide, square root, compare) in the order of the
-compiled kernels, and eager PyTorch rounds after each. Compiling this would let products and sums be fused, which
-changes the last digit, so it must run eagerly. This is the only module of the stage that needs PyTorch.
+compiled kernels, and eager PyTorch rounds after each. These functions must run eagerly: a compiler may fuse products
+and sums, which changes the last digit. This is the only module of the stage that needs PyTorch.
 """
 
 import functools
@@ -26,7 +26,7 @@ def _normalised(parts: Tensor) -> Tensor:
     """Signals (..., 2, symbols), real and imaginary part, divided by the power of two that brings them below 1."""
     largest = parts.abs().amax(dim=(-2, -1), keepdim=True)
     exponent = torch.where(largest > 0, torch.frexp(largest).exponent, 0)
-    # In two steps, since a single power would leave the range of float32 for the smallest signals.
+    # Two steps: for the smallest signals, a single power of two would be outside the range of float32.
     half = exponent // 2
     return parts * _power_of_two(-half) * _power_of_two(half - exponent)
 
@@ -90,6 +90,7 @@ class DeviceRenderer:
 
     @staticmethod
     def _across(values: Tensor, source: Tensor, weights: Tensor) -> Tensor:
+        """Rows of the image from rows of the spectrum `source` (size, taps) with `weights` (size, taps)."""
         result = weights[:, 0, None] * values[..., source[:, 0], :]
         for tap in range(1, source.shape[1]):
             result = result + weights[:, tap, None] * values[..., source[:, tap], :]
@@ -97,11 +98,13 @@ class DeviceRenderer:
 
     @staticmethod
     def _along(values: Tensor, columns: Tensor, shares: Tensor) -> Tensor:
+        """Columns of the image from `columns` (taps, size) of the spectrum with `shares` (taps, size), taps in pairs."""
         pairs = (shares[tap] * values[..., columns[tap]] + shares[tap + 1] * values[..., columns[tap + 1]]
                  for tap in range(0, columns.shape[0], 2))  # fmt: skip
         return functools.reduce(torch.add, pairs)
 
     def _index(self, values: Tensor, name: str) -> Tensor:
+        """Index images (uint8) of values (..., S, S), each relative to its own largest magnitude."""
         largest = values.abs().amax(dim=(-2, -1), keepdim=True)
         x = values.abs() / torch.where(largest > 0, largest, 1)
         steps = torch.searchsorted(self._thresholds[name], x, right=True)

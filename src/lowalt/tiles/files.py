@@ -1,7 +1,7 @@
 """The tiles file of a chunk: all its PNGs one after the other, (`data` uint8, `offsets` int64) in an .npz.
 
-The archive is stored, not compressed, so that it is written as a stream and read image by image: neither needs more
-memory than one sample.
+The archive is stored without compression, so that it is written as a stream and read image by image. Neither needs
+more memory than one sample.
 """
 
 import os
@@ -19,7 +19,7 @@ from lowalt.common.files import existing, replacing
 
 
 def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:
-    """Return the .npy header (format 1.0) of an array; NumPy's own has paddings that changed between versions."""
+    """Return the .npy header (format 1.0) of an array; the padding of NumPy's own changed between versions."""
     text = f"{{'descr': '{dtype}', 'fortran_order': False, 'shape': {tuple(map(int, shape))}, }}"
     text = text.ljust(-(-(11 + len(text)) // 64) * 64 - 11) + "\n"
     return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text.encode()
@@ -43,8 +43,8 @@ def write(path: str | Path, images: Iterable[bytes]) -> tuple[int, int]:
             for image in images:
                 member.write(image)
                 offsets.append(offsets[-1] + len(image))
-        # The array's length is known only now; its header has room for it. A CRC is linear, so what the header
-        # changes in it does not depend on the data.
+        # The array's length is known only now; its header has room for it. A CRC is linear, so the change of the CRC
+        # by a new header does not depend on the data.
         header = npy_header("|u1", (offsets[-1],))
         info.CRC ^= _crc_behind(blank, offsets[-1]) ^ _crc_behind(header, offsets[-1])
         assert archive.fp is not None  # open until the block ends

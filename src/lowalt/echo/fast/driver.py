@@ -1,4 +1,4 @@
-"""The fast kernel's driver: segments of symbols, tiles of points, certified strongest cells.
+"""The fast kernel's driver: segments of symbols, strips of points, certified strongest cells.
 
 All smooth factors are the plan's polynomials; `vector_loops` holds the loops. Everything here is compiled without
 counted references (they took a quarter of the time), so nothing here may allocate: see `workspace`.
@@ -14,19 +14,19 @@ from lowalt.echo.fast.cell_kernel import PLACES, SIDE
 from lowalt.echo.fast.error_model import SINGLE_BLOCK
 from lowalt.echo.fast.range_bounds import END, MEAN, SIZE, SPREAD, START
 from lowalt.echo.fast.segment import constants, fill_offsets, fit_gains
+from lowalt.echo.fast.strip import STRIP, strip_size
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN, certify
-from lowalt.echo.fast.vector_loops import TILE
 from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN
 from lowalt.echo.pointwise.terms import cell_phase
 
 
 @INLINED
-def add_moments(tile, size, block, moments):
-    """Add the tile's moments to moments (2, orders), orders a multiple of four, `block` points at a time."""
+def add_moments(strip, size, block, moments):
+    """Add the strip's moments to moments (2, orders), orders a multiple of four, `block` points at a time."""
     for at in range(0, size, block):
         many = min(block, size - at)
         for order in range(0, moments.shape[1], 4):
-            a0, a1, a2, a3, b0, b1, b2, b3 = vector_loops.moments(tile, at, many)
+            a0, a1, a2, a3, b0, b1, b2, b3 = vector_loops.moments(strip, at, many)
             moments[0, order] += a0
             moments[0, order + 1] += a1
             moments[0, order + 2] += a2
@@ -38,20 +38,20 @@ def add_moments(tile, size, block, moments):
 
 
 @INLINED
-def add_amplitudes(tile, share, point, functions, size):
-    """Fill the tile's amplitudes by polynomials of the plan's degree; returns sums of |z| and of |z| v^2."""
+def add_amplitudes(strip, share, point, functions, size):
+    """Fill the strip's amplitudes by polynomials of the plan's degree; returns sums of |z| and of |z| v^2."""
     c, s = functions.cosine, functions.sine
     if len(c) == 6:
         return vector_loops.amplitudes(
-            tile, share, point, (c[0], c[1], c[2], c[3], c[4], c[5]), (s[0], s[1], s[2], s[3], s[4], s[5]), size
+            strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5]), (s[0], s[1], s[2], s[3], s[4], s[5]), size
         )
     if len(c) == 8:
         return vector_loops.amplitudes(
-            tile, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
+            strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
             (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]), size,
         )  # fmt: skip
     return vector_loops.amplitudes(
-        tile, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]),
+        strip, share, point, (c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9], c[10]),
         (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10]), size,
     )  # fmt: skip
 
@@ -61,39 +61,39 @@ def sum_points(scene, lay, radar, q, n, r, geometry, placing, degrees, plan, blo
     """Fill work.moments with symbol n's moments, over lay.total / r^2; returns the sums of |z| and of |z| v^2 likewise.
 
     q: part (or point, without rotations) whose translation is the reference, r (m) away; geometry, placing: of
-    `segment.constants`; degrees: of the gains' polynomials; block: most points added in the tile's type.
+    `segment.constants`; degrees: of the gains' polynomials; block: most points added in the strip's type.
     """
-    tile, offsets = work.tile, work.offsets
+    strip, offsets = work.strip, work.offsets
     padded = len(work.share)
-    chunk = vector_loops.tile_size(padded)
+    length = strip_size(padded)
     for order in range(work.moments.shape[1]):
         work.moments[0, order], work.moments[1, order] = 0.0, 0.0
     total, second = 0.0, 0.0
-    for point in range(0, padded, chunk):
-        size = min(chunk, padded - point)
+    for point in range(0, padded, length):
+        size = min(length, padded - point)
         fill_offsets(scene, lay, radar, q, n, r, point, size, placing, offsets)
         if plan.near:
-            vector_loops.near_geometry(offsets, geometry, plan.functions.excess, plan.functions.inverse, size, tile)
+            vector_loops.near_geometry(offsets, geometry, plan.functions.excess, plan.functions.inverse, size, strip)
         else:
-            vector_loops.geometry(offsets, geometry, size, tile)
-        vector_loops.horner(tile.psi, work.typed, 0, degrees[0], tile.gain_h, size)
-        vector_loops.horner(tile.omega, work.typed, 1, degrees[1], tile.gain_v, size)
-        a, b = add_amplitudes(tile, work.share, point, plan.functions, size)
+            vector_loops.geometry(offsets, geometry, size, strip)
+        vector_loops.horner(strip.psi, work.typed, 0, degrees[0], strip.gain_h, size)
+        vector_loops.horner(strip.omega, work.typed, 1, degrees[1], strip.gain_v, size)
+        a, b = add_amplitudes(strip, work.share, point, plan.functions, size)
         total += a
         second += b
-        add_moments(tile, size, block, work.moments)
+        add_moments(strip, size, block, work.moments)
     return total, second
 
 
 @INLINED
 def precision(plan, padded, orders):
-    """Return (unit rounding of the tile's type, most points added in it, relative rounding of a moment).
+    """Return (unit rounding of the strip's type, most points added in it, relative rounding of a moment).
 
     A moment of order k takes 3 k + 1 roundings of a power and its argument, one of the product, and those of the sums.
     """
     unit = 2.0**-24 if plan.single else 2.0**-53
-    block = SINGLE_BLOCK if plan.single else TILE
-    return unit, block, unit * (min(block, vector_loops.tile_size(padded)) + 3 * orders + 4 + padded / 2**20)
+    block = SINGLE_BLOCK if plan.single else STRIP
+    return unit, block, unit * (min(block, strip_size(padded)) + 3 * orders + 4 + padded / 2**20)
 
 
 @LEAN
@@ -108,7 +108,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
     padded = len(work.share)
     unit, block, rounding = precision(plan, padded, orders)
-    chunk = vector_loops.tile_size(padded)
+    length = strip_size(padded)
     refs, extents, moments = symbols.refs, symbols.extents, work.moments
     for index in range(len(symbols.segments)):
         segment = symbols.segments[index]
@@ -122,8 +122,7 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             continue
         for i in range(start, end):
             n, r = symbols.index[i], refs[i, RANGE]
-            place = int(np.rint((refs[i, REST] + 0.5) * PLACES))
-            place = max(0, min(place, PLACES))
+            place = max(0, min(int(np.rint((refs[i, REST] + 0.5) * PLACES)), PLACES))
             centre = place / PLACES - 0.5
             geometry, placing = constants(radar, refs[i], segment, aims, centre, half)
             total, second = sum_points(
@@ -134,8 +133,8 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             for order in range(orders):
                 moments[0, order] *= scale
                 moments[1, order] *= scale
-            total *= scale * (1.0 + unit * (chunk + 20))
-            second *= scale * (1.0 + unit * (chunk + 24))
+            total *= scale * (1.0 + unit * (length + 20))
+            second *= scale * (1.0 + unit * (length + 24))
             peaks = scale / (1.0 - extents[i, SPREAD]) ** 2
             # The amplitudes summed are approximated ones: the sum of the true ones may be larger by their error.
             total += total * plan.share + peaks * (plan.peak + gains)
@@ -145,11 +144,8 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             if len(slow.moments):
                 away = (refs[i, REST] - centre) / half
                 add_slow(slow.moments[i], refs[i, TURN], away, 1.0 / (r * r), moments)
-                more = slow.sums[i, 0] / (r * r)
-                bound += slow.errors[i] / (r * r) + more * table.error
-                second += slow.sums[i, 1] / (r * r)
-                second += abs(away) * (2.0 * math.sqrt(more * slow.sums[i, 1] / (r * r)) + abs(away) * more)
-                total += more
+                more, more_second, error = slow_sums(slow, i, away, r * r)
+                total, second, bound = total + more, second + more_second, bound + (error + more * table.error)
             found.totals[n], found.bounds[n] = total, bound
             state, row, tie, lead = certify(
                 table, place, centre, moments, extents[i, SIZE] * radar.cells, (total, second),
@@ -160,9 +156,29 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
                 state = UNCERTAIN
             found.state[n] = state
             if state == CERTAIN:
-                whole = int(refs[i, CELL]) + row - SIDE
-                found.values[n] = complex(work.sums[row, 0], work.sums[row, 1]) * cell_phase(whole, radar.subcarriers)
-                found.cells[n], found.ties[n], found.gaps[n] = whole % radar.subcarriers, tie, max(lead, 0.0)
+                keep(found, n, int(refs[i, CELL]) + row - SIDE, work.sums[row], radar.subcarriers, tie, lead)
+
+
+@INLINED
+def keep(found, n, cell, value, subcarriers, tie, lead):
+    """Write symbol n's strongest cell into `found`.
+
+    cell: its number, before whole multiples of M are taken off; value: its real and imaginary part, before the cell's
+    own phase; tie, lead: of `strongest_cell.certify`.
+    """
+    found.values[n] = complex(value[0], value[1]) * cell_phase(cell, subcarriers)
+    found.cells[n], found.ties[n], found.gaps[n] = cell % subcarriers, tie, max(lead, 0.0)
+
+
+@INLINED
+def slow_sums(slow, i, away, square):
+    """Return a symbol's interpolated sums of |z| and of |z| (v + away)^2, and the error of its moments, all over r^2.
+
+    square: r^2 (m2). The second sum is a bound, by Cauchy and Schwarz.
+    """
+    total, second = slow.sums[i, 0] / square, slow.sums[i, 1] / square
+    moved = abs(away) * (2.0 * math.sqrt(total * second) + abs(away) * total)
+    return total, second + moved, slow.errors[i] / square
 
 
 @INLINED
@@ -196,7 +212,7 @@ def moments_at(scene, lay, radar, q, symbols, aims, approximation, work, out):
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
     padded = len(work.share)
     unit, block, rounding = precision(plan, padded, orders)
-    chunk = vector_loops.tile_size(padded)
+    length = strip_size(padded)
     for index in range(len(symbols.segments)):
         segment = symbols.segments[index]
         degree_h, degree_v, gains = fit_gains(
@@ -213,8 +229,8 @@ def moments_at(scene, lay, radar, q, symbols, aims, approximation, work, out):
             for order in range(orders):
                 out.moments[i, 0, order] = work.moments[0, order] * lay.total
                 out.moments[i, 1, order] = work.moments[1, order] * lay.total
-            total *= lay.total * (1.0 + unit * (chunk + 20))
-            second *= lay.total * (1.0 + unit * (chunk + 24))
+            total *= lay.total * (1.0 + unit * (length + 20))
+            second *= lay.total * (1.0 + unit * (length + 24))
             out.sums[i, 0], out.sums[i, 1] = total, second
             peaks = lay.total / (1.0 - symbols.extents[i, SPREAD]) ** 2
             out.errors[i] = total * plan.share + peaks * (plan.peak + gains)

@@ -85,7 +85,7 @@ def echo_plan(radar: Radar, spread: float, size_m: float, points: int, error: fl
 
 
 @lru_cache(maxsize=4096)
-def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> EchoPlan:
+def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, strips, error) -> EchoPlan:
     """Compute the plan for rounded sizes, so that many samples share it."""
     wave = 2 * np.pi * turns * 2 * size_m
     array_phase = np.pi * kappa / 2 * (rate_h + rate_v)
@@ -105,7 +105,7 @@ def _echo_plan(turns, kappa, rate_h, rate_v, reach, size_m, tiles, error) -> Ech
             break
     # Order k of cosine and sine rounds 2 k + 2 times: at half a turn at most 85 roundings in both; the turn itself
     # and the products that make the amplitude another 16.
-    rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + tiles * unit
+    rounding = (8 * array_phase + 30) * unit + (85 + 16) * coarse + strips * unit
     share = wave * excess_error + (2 + array_phase) * inverse_error + cosine_error + 0.5 * sine_error + rounding
     kind = np.float32 if single else np.float64
     functions = Functions(excess, inverse, cosine.astype(kind), sine.astype(kind))

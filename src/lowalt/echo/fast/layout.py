@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.jit import LEAN
-from lowalt.echo.fast.vector_loops import MULTIPLE, tile_size
+from lowalt.echo.fast.strip import MULTIPLE, strip_size
 from lowalt.echo.scene import EchoScene
 
 
@@ -20,7 +20,7 @@ class Layout(NamedTuple):
     amplitude: np.ndarray
     """(padded L,) sqrt(rcs) times the radar's scale and the arrays' peak gain; zero in the padding."""
     parts: np.ndarray
-    """(groups,) part of each group: successive points of one part within one tile."""
+    """(groups,) part of each group: successive points of one part within one strip."""
     starts: np.ndarray
     """(groups + 1,) first point of each group, and the number of points."""
     centres: np.ndarray
@@ -39,12 +39,12 @@ class Layout(NamedTuple):
 
 
 @LEAN
-def _group(points, part, share, tile, x, y, z, starts, parts, centres, radii, weights, strays):
+def _group(points, part, share, strip, x, y, z, starts, parts, centres, radii, weights, strays):
     """Copy the points by coordinate and cut them into groups of one part; returns how many groups there are."""
     count, groups = len(points), 0
     for i in range(count):
         x[i], y[i], z[i] = points[i, 0], points[i, 1], points[i, 2]
-        if i == 0 or part[i] != part[i - 1] or i % tile == 0:
+        if i == 0 or part[i] != part[i - 1] or i % strip == 0:
             starts[groups], parts[groups] = i, part[i]
             groups += 1
     starts[groups] = count
@@ -95,7 +95,7 @@ def layout(scene: EchoScene, peak: float) -> Layout:
     starts, parts = np.empty(count + 1, np.int64), np.empty(count, np.int64)
     centres, (radii, weights, strays) = np.empty((count, 3)), np.empty((3, count))
     groups = _group(
-        points, part, share, tile_size(len(amplitude)), x, y, z, starts, parts, centres, radii, weights, strays
+        points, part, share, strip_size(len(amplitude)), x, y, z, starts, parts, centres, radii, weights, strays
     )
     return Layout(
         x,

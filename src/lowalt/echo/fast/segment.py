@@ -1,4 +1,4 @@
-"""The inputs of one symbol: its segment's gain polynomials, its own constants, and its points, a tile at a time.
+"""The inputs of one symbol: its segment's gain polynomials, its own constants, and its points, a strip at a time.
 
 A segment is a number of successive symbols over which the array gains are short polynomials (`range_bounds`).
 """
@@ -9,7 +9,7 @@ from lowalt.common.jit import INLINED
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.polynomials import TOP, degree_for, economised, tail
 from lowalt.echo.fast.range_bounds import OMEGA_CENTRE, OMEGA_HALF, PSI_CENTRE, PSI_HALF
-from lowalt.echo.fast.vector_loops import Geometry, PartPose, Placing
+from lowalt.echo.fast.strip import Geometry, PartPose, Placing
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN, X, Y, Z
 
 

@@ -1,106 +1,22 @@
-"""The fast kernel's loops over a tile of one symbol's points, which the compiler turns into vector instructions.
+"""The fast kernel's loops over a strip of one symbol's points, which the compiler turns into vector instructions.
 
-A tile's arrays stay in the first-level cache. Every smooth factor is a polynomial whose degree the plan has chosen
+Every smooth factor is a polynomial whose degree the plan has chosen
 by its bound, so that the same loops serve the exact mode and every tolerance, in float64 or float32.
 Sums may be reordered and products fused: no bound here depends on the order of roundings. Indices are unsigned: a
 signed one may be negative, and Python's meaning of negative indices would keep the loops from becoming vectors.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import LEAN, VECTOR
-
-TILE = 256
-"""Most points worked on at a time: a dozen arrays of 2 kB stay in the nearest cache."""
-MULTIPLE = 16
-"""Tiles hold whole multiples of this many points; the padding has no amplitude."""
-TILE_ROOM = TILE + MULTIPLE + 8
-"""Length of a work array: a tile, and what the last group of a part may write beyond it. It is no power of two:
-arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
-
-
-class Placing(NamedTuple):
-    """Constants that place the points: twice the unit vector to the reference (array's axes), and how horizontal and
-    vertical coordinates become direction cosines on [-1, 1] before the division by r."""
-
-    twice_x: float
-    twice_y: float
-    twice_z: float
-    y_scale: float
-    y_shift: float
-    z_scale: float
-    z_shift: float
-
-
-class PartPose(NamedTuple):
-    """A part's matrix and its offset from the reference, in the array's axes (normal, horizontal, up), over r_ref."""
-
-    xx: float
-    xy: float
-    xz: float
-    yx: float
-    yy: float
-    yz: float
-    zx: float
-    zy: float
-    zz: float
-    x: float
-    y: float
-    z: float
-
-
-class Geometry(NamedTuple):
-    """One symbol's constants: shifts of the scaled direction cosines psi and omega; scale and shift that take the
-    relative range difference to [-1, 1]; turns of phase per relative range difference, per psi and per omega; the
-    reference's turn."""
-
-    psi_shift: float
-    omega_shift: float
-    cell_scale: float
-    cell_shift: float
-    turn_range: float
-    turn_psi: float
-    turn_omega: float
-    turn_start: float
-
-
-class Offsets(NamedTuple):
-    """A tile's points in float64 (TILE_ROOM,): eps = r^2 / r_ref^2 - 1, scaled horizontal and vertical coordinates."""
-
-    eps: np.ndarray
-    y: np.ndarray
-    z: np.ndarray
-
-
-class Tile(NamedTuple):
-    """A tile's points in the type of the sums (TILE_ROOM,): direction cosines and ranges on [-1, 1], turns on
-    [-1/2, 1/2], (r_ref / r)^2, array gains, and real and imaginary part of the amplitudes."""
-
-    psi: np.ndarray
-    omega: np.ndarray
-    cells: np.ndarray
-    turn: np.ndarray
-    square: np.ndarray
-    gain_h: np.ndarray
-    gain_v: np.ndarray
-    real: np.ndarray
-    imag: np.ndarray
-
-
-@LEAN
-def tile_size(points: int) -> int:
-    """Return the points of a tile when a target has `points` (padded): equal shares of at most TILE, whole multiples
-    of MULTIPLE."""
-    shares = -(-points // TILE)
-    return -(-points // (shares * MULTIPLE)) * MULTIPLE
+from lowalt.common.jit import VECTOR
+from lowalt.echo.fast.strip import MULTIPLE
 
 
 @VECTOR
 def horner(x, c, row, degree, out, size):
-    """Fill out[:size] with the sum of c[row, k] x^k for k up to `degree`, four orders a pass over the tile."""
+    """Fill out[:size] with the sum of c[row, k] x^k for k up to `degree`, four orders a pass over the strip."""
     top = c[row, degree]
     first = degree & 3
     if first == 0:
@@ -180,14 +96,14 @@ def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offs
 
 
 @VECTOR
-def geometry(offsets, constants, size, tile):
-    """Fill psi, omega, cells, turn and square of the tile, by one root and one quotient a point.
+def geometry(offsets, constants, size, strip):
+    """Fill psi, omega, cells, turn and square of the strip, by one root and one quotient a point.
 
     constants: a `Geometry`. The range difference is eps / (1 + sqrt(1 + eps)), in which nothing cancels.
     """
     cp, co, su, cu, td, tp, to, t0 = constants
     eps, ey, ez = offsets
-    psi, omega, cells, turn, square = tile.psi, tile.omega, tile.cells, tile.turn, tile.square
+    psi, omega, cells, turn, square = strip.psi, strip.omega, strip.cells, strip.turn, strip.square
     for i in range(np.uint64(size)):
         e = eps[i]
         r = math.sqrt(1.0 + e)
@@ -203,13 +119,13 @@ def geometry(offsets, constants, size, tile):
 
 
 @VECTOR
-def near_geometry(offsets, constants, excess, inverse, size, tile):
+def near_geometry(offsets, constants, excess, inverse, size, strip):
     """Do as `geometry`, with polynomials in eps for the range difference over eps (degree 4) and r_ref / r (3)."""
     cp, co, su, cu, td, tp, to, t0 = constants
     c0, c1, c2, c3, c4 = excess[0], excess[1], excess[2], excess[3], excess[4]
     f0, f1, f2, f3 = inverse[0], inverse[1], inverse[2], inverse[3]
     eps, ey, ez = offsets
-    psi, omega, cells, turn, square = tile.psi, tile.omega, tile.cells, tile.turn, tile.square
+    psi, omega, cells, turn, square = strip.psi, strip.omega, strip.cells, strip.turn, strip.square
     for i in range(np.uint64(size)):
         e = eps[i]
         d = e * ((((c4 * e + c3) * e + c2) * e + c1) * e + c0)
@@ -224,14 +140,14 @@ def near_geometry(offsets, constants, excess, inverse, size, tile):
 
 
 @VECTOR
-def amplitudes(tile, share, first, cosine, sine, size):
-    """Fill real and imag of the tile: share of amplitude times gains times (cosine, sine) of the turn.
+def amplitudes(strip, share, first, cosine, sine, size):
+    """Fill real and imag of the strip: share of amplitude times gains times (cosine, sine) of the turn.
 
     share: all points' amplitudes over their sum; cosine, sine: tuples of the coefficients of cos(2 pi t) and
     sin(2 pi t) / t in t^2. Returns the sums of |amplitude| and of |amplitude| times cells^2.
     """
-    turn, cells, square, gain_h, gain_v = tile.turn, tile.cells, tile.square, tile.gain_h, tile.gain_v
-    real, imag = tile.real, tile.imag
+    turn, cells, square, gain_h, gain_v = strip.turn, strip.cells, strip.square, strip.gain_h, strip.gain_v
+    real, imag = strip.real, strip.imag
     total, second = cosine[0] - cosine[0], cosine[0] - cosine[0]
     first = np.uint64(first)
     top = len(cosine) - 1
@@ -253,12 +169,12 @@ def amplitudes(tile, share, first, cosine, sine, size):
 
 
 @VECTOR
-def moments(tile, at, size):
+def moments(strip, at, size):
     """Return the sums of real and of imag times 1, v, v^2, v^3, v = cells, over `size` points from `at`.
 
     real and imag are then multiplied by v^4, for the next four orders.
     """
-    real, imag, cells = tile.real, tile.imag, tile.cells
+    real, imag, cells = strip.real, strip.imag, strip.cells
     a = real[0] - real[0]
     a0, a1, a2, a3, b0, b1, b2, b3 = a, a, a, a, a, a, a, a
     at = np.uint64(at)

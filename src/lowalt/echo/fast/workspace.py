@@ -10,7 +10,7 @@ import numpy as np
 from lowalt.echo.fast.cell_kernel import SIDE, CellPolynomials
 from lowalt.echo.fast.error_model import ArrayGains, EchoPlan
 from lowalt.echo.fast.polynomials import TOP
-from lowalt.echo.fast.vector_loops import TILE_ROOM, Offsets, Tile
+from lowalt.echo.fast.strip import STRIP_ROOM, Offsets, Strip
 
 
 class Approximation(NamedTuple):
@@ -65,8 +65,8 @@ class Found(NamedTuple):
 
 class Workspace(NamedTuple):
     """Work arrays: Taylor terms of a gain (3, rates); moments (2, orders); gain coefficients (2, TOP + 1), in float64
-    and in the tile's type; cell sums (2 SIDE + 1, 2); bounds for far cells (4,); a tile's arrays; and every point's
-    share (padded L,) of the sum of amplitudes, in the tile's type."""
+    and in the strip's type; cell sums (2 SIDE + 1, 2); bounds for far cells (4,); a strip's arrays; and every point's
+    share (padded L,) of the sum of amplitudes, in the strip's type."""
 
     taylor: np.ndarray
     moments: np.ndarray
@@ -75,14 +75,14 @@ class Workspace(NamedTuple):
     sums: np.ndarray
     far: np.ndarray
     offsets: Offsets
-    tile: Tile
+    strip: Strip
     share: np.ndarray
 
 
 def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     """Return work arrays for an approximation and the points' amplitudes (padded L,).
 
-    The tile's arrays are separate and of odd length. Rows of one array would lie a whole 4096 bytes apart, and
+    The strip's arrays are separate and of odd length. Rows of one array would lie a whole 4096 bytes apart, and
     loads would then wait for unrelated stores.
     """
     kind = np.float32 if approximation.plan.single else np.float64
@@ -92,7 +92,7 @@ def workspace(approximation: Approximation, amplitude: np.ndarray) -> Workspace:
     return Workspace(
         np.empty((3, rates)), np.empty((2, approximation.cells.kernels.shape[2])), np.empty((2, TOP + 1)),
         np.empty((2, TOP + 1), kind), np.empty((2 * SIDE + 1, 2)), np.empty(4),
-        Offsets(*(np.empty(TILE_ROOM) for _ in Offsets._fields)),
-        Tile(*(np.empty(TILE_ROOM, kind) for _ in Tile._fields)),
+        Offsets(*(np.empty(STRIP_ROOM) for _ in Offsets._fields)),
+        Strip(*(np.empty(STRIP_ROOM, kind) for _ in Strip._fields)),
         (amplitude / total if total > 0 else amplitude).astype(kind),
     )  # fmt: skip

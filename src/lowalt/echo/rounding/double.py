@@ -11,7 +11,7 @@ from lowalt.common.exact.arithmetic import scale
 from lowalt.common.exact.constants import taylor
 from lowalt.common.exact.sines import fraction, odd_sign
 from lowalt.common.jit import INLINED, LEAN
-from lowalt.echo.rounding.sums import constants_of, phase_of, seen
+from lowalt.echo.rounding.sums import constants_of, patterns, phase_of, seen
 
 LANES = 8
 """Sums that run side by side: point i is added to sum i modulo 8. The padding of points is a multiple of it."""
@@ -100,18 +100,13 @@ def added(work, row, points):
 @LEAN
 def cell_value(scene, lay, radar, n, cell, work):
     """Return the real and imaginary part of range cell `cell` at symbol n; arguments as `sums.cell_value`."""
-    points, count = len(lay.root), float(radar.subcarriers)
+    points = len(lay.root)
     seen(scene, lay, radar, n, cell, work)
-    for row, transmit, receive in (
-        (6, radar.transmit_h, radar.receive_h),
-        (8, radar.transmit_v, radar.receive_v),
-    ):
-        times_dirichlet(work, row, float(transmit), transmit == receive, points)
-        if transmit != receive:
-            times_dirichlet(work, row, float(receive), False, points)
-    times_dirichlet(work, 12, count, False, points)
+    for row, elements, squared in patterns(radar):
+        if elements > 1.0:
+            times_dirichlet(work, row, elements, squared, points)
     wave(work, points)
-    factor = constants_of(radar.exact).scale[0] / count
+    factor = constants_of(radar.exact).scale[0] / float(radar.subcarriers)
     real, imag = factor * added(work, 12, points), factor * added(work, 13, points)
     s, c = phase_of(cell, radar.subcarriers)
     return real * c[0] - imag * s[0], real * s[0] + imag * c[0]

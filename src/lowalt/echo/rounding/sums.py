@@ -72,6 +72,24 @@ def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
         work[14, i], work[15, i] = multiply((high, low), multiply(inverse, inverse))
 
 
+@INLINED
+def patterns(radar):
+    """Return the five Dirichlet kernels that a point's amplitude is multiplied by: (row, elements, squared) of each.
+
+    They are the patterns of both arrays, horizontal and vertical, and of the subcarriers; row: that of the half turns
+    in the work array; squared: where both arrays are alike, one kernel is squared and the other one has one element,
+    which makes it 1.
+    """
+    like_h, like_v = radar.transmit_h == radar.receive_h, radar.transmit_v == radar.receive_v
+    return (
+        (6, float(radar.transmit_h), like_h),
+        (6, 1.0 if like_h else float(radar.receive_h), False),
+        (8, float(radar.transmit_v), like_v),
+        (8, 1.0 if like_v else float(radar.receive_v), False),
+        (12, float(radar.subcarriers), False),
+    )
+
+
 @LEAN
 def times_dirichlet(work, row, count, twice, points):
     """Multiply the amplitudes by U_{count-1} of a row's half turns, or by its square."""
@@ -117,21 +135,16 @@ def cell_value(scene, lay, radar, n, cell, work):
     radar: `radar.Radar`, of which whole numbers, the station's position and the double-doubles are used; work (ROWS,
     padded L + 4): work array. No point may stand in the station.
     """
-    points, count = len(lay.root), float(radar.subcarriers)
+    points = len(lay.root)
     seen(scene, lay, radar, n, cell, work)
-    for row, transmit, receive in (
-        (6, radar.transmit_h, radar.receive_h),
-        (8, radar.transmit_v, radar.receive_v),
-    ):
-        times_dirichlet(work, row, float(transmit), transmit == receive, points)
-        if transmit != receive:
-            times_dirichlet(work, row, float(receive), False, points)
-    times_dirichlet(work, 12, count, False, points)
+    for row, elements, squared in patterns(radar):
+        if elements > 1.0:
+            times_dirichlet(work, row, elements, squared, points)
     wave(work, points)
     real, imag = (0.0, 0.0), (0.0, 0.0)
     for i in range(points):
         real, imag = add(real, (work[10, i], work[11, i])), add(imag, (work[12, i], work[13, i]))
-    factor = divide(constants_of(radar.exact).scale, (count, 0.0))
+    factor = divide(constants_of(radar.exact).scale, (float(radar.subcarriers), 0.0))
     real, imag = multiply(real, factor), multiply(imag, factor)
     s, c = phase_of(cell, radar.subcarriers)
     return subtract(multiply(real, c), multiply(imag, s)), add(multiply(real, s), multiply(imag, c))

@@ -4,9 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.echo.fast import driver, vector_loops
+from lowalt.echo.fast import driver
 from lowalt.echo.fast.layout import Layout, layout
 from lowalt.echo.fast.range_bounds import SIZE, SPREAD, cut_segments, fill_extents
+from lowalt.echo.fast.strip import MULTIPLE
 from lowalt.echo.fast.workspace import Approximation, SlowMoments, Symbols, workspace
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.radar import Radar
@@ -35,7 +36,7 @@ def slow_parts(scene: EchoScene, radar: Radar, lay: Layout) -> SlowParts | None:
     steps = min(len(scene.translation), pose_series.BLOCK)
     if not len(scene.rotation) or len(scene.points) * steps < pose_series.INTERPOLATION_COST:
         return None
-    chosen = pose_series.candidates(scene.rotation, lay, steps, radar.turns, 2 * vector_loops.MULTIPLE)
+    chosen = pose_series.candidates(scene.rotation, lay, steps, radar.turns, 2 * MULTIPLE)
     if not chosen.any():
         return None
     mask, groups = chosen[scene.part], chosen[lay.parts]
