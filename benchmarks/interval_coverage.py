@@ -43,6 +43,7 @@ NAMES = np.repeat(np.arange(SUBTYPES), MODELS).astype(str)
 
 
 def _schemes(case: Case, generator: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Accuracies (seeds, motion models) of two schemes, drawn with the spreads of a case."""
     shape = (case.seeds, SUBTYPES * MODELS)
     apart = np.repeat(case.subtype * generator.standard_normal(SUBTYPES), MODELS)
     apart += case.model * generator.standard_normal(SUBTYPES * MODELS)

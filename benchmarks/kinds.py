@@ -1,4 +1,4 @@
-"""What each kind of shards and samples made on the spot cost: bytes, time a sample, and how long a training waits.
+"""The cost of each kind of shards, and of samples made on the spot: bytes, time a sample, and a training's wait.
 
     python benchmarks/kinds.py --out results/benchmarks/kinds.csv
 

@@ -1,4 +1,4 @@
-"""What correct rounding of the echo costs, and how many values need a second and a third computation.
+"""The cost of correct rounding of the echo, and how many values need a second and a third computation.
 
     python benchmarks/rounding.py --out results/benchmarks/rounding.csv
 

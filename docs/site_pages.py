@@ -36,6 +36,7 @@ def relinked(text: str, path: str) -> str:
     here, place = posixpath.dirname(path), posixpath.dirname(in_site(path))
 
     def turned(match: re.Match) -> str:
+        """The link of a match as it must read in the site; unchanged where it names no file of the repository."""
         target = posixpath.normpath(posixpath.join(here, match[1]))
         if (ROOT / target).is_dir():
             target = f"{target}/README.md"

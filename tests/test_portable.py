@@ -9,7 +9,7 @@ import pytest
 from lowalt.common import portable
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
-from lowalt.common.rotations import nearest_rotations, thinnest
+from lowalt.common.matrices import nearest_rotations, thinnest
 
 RNG = np.random.default_rng(5)
 WIDE = RNG.uniform(-1e5, 1e5, 300)

@@ -80,7 +80,7 @@ def trial(folder, candidate, fold, seed, lost):
     about = {"candidate": candidate, "fold": fold, "seed": seed, "held": held, "train_processor_s": 10.0 + fold,
              "steps": 7, "batch": 3, "size": 24, "hardware": "test bench"}  # fmt: skip
     path.with_suffix(".json").write_text(json.dumps(about))
-    return choose.Trial(path)
+    return choose.CandidateTrial(path)
 
 
 def test_tables_say_what_the_predictions_say(tmp_path):
@@ -119,7 +119,7 @@ def test_a_trial_from_the_command_line_trains_without_what_it_predicts(tmp_path,
     given = ["--settings", json.dumps(block), "--views", str(tmp_path / "views.npz"), "--candidate", "quick",
              "--candidates", str(tmp_path / "choices.yaml"), "--fold", "1", "--stations", *"ABC"]  # fmt: skip
     trial_main([*given, "--out", str(tmp_path)])
-    made = choose.Trial(tmp_path / "predictions.csv")
+    made = choose.CandidateTrial(tmp_path / "predictions.csv")
     assert set(made.held.subtype.tolist()) == set(choose.held_out(found, 1, 3)) == set(made.about["held"])
     assert set(made.kept.fold.tolist()) == {"val"} and not set(made.kept.subtype.tolist()) & set(made.about["held"])
     assert made.about["train_samples"] == (20 - 8) * 2 * 2 and made.about["steps"] == 3
@@ -128,6 +128,6 @@ def test_a_trial_from_the_command_line_trains_without_what_it_predicts(tmp_path,
     other = facts(models=6, folds=("train",))
     samples.write(tmp_path / "extra.npz", views[:1].repeat(len(other), 0), other)
     trial_main([*given, "--extra", str(tmp_path / "extra.npz"), "--out", str(tmp_path / "more")])
-    more = choose.Trial(tmp_path / "more/predictions.csv")
+    more = choose.CandidateTrial(tmp_path / "more/predictions.csv")
     assert more.about["train_samples"] == (20 - 8) * 2 * (2 + 6)
     assert sorted(more.held.key.tolist()) == sorted(made.held.key.tolist())

@@ -11,7 +11,7 @@ import torch
 from lowalt.common.streams import stream
 from lowalt.recognition import augment, checkpoint, inference, predictions, recipe, runs, statistics, tables
 from lowalt.recognition import training as loop
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.objective import objective
 from lowalt.recognition.reader import Reader
 from made_predictions import facts, read_rows, run_files
@@ -176,7 +176,7 @@ def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_jud
     rest = np.repeat(((1 - score) / 3)[:, None], 3, 1)
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
     predictions.write(path, predictions.from_facts(found, (0,), np.column_stack([score, rest])))
-    tables.write([Run(path)], ["A:VT"], {}, tmp_path, 1)
+    tables.write([Evaluated(path)], ["A:VT"], {}, tmp_path, 1)
     uav = found.label == 0
     levels = {
         fold: statistics.threshold(score[found.fold == fold], found.label[found.fold == fold], 0.8)
@@ -199,7 +199,7 @@ def test_thresholds_come_from_validation_samples_and_not_from_those_they_are_jud
 
 def test_a_comparison_averages_all_seeds_and_not_the_first(tmp_path):
     one, other = (
-        [Run(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
+        [Evaluated(run_files(tmp_path, "seen", name, share, seed=seed)[0]) for seed, share in enumerate(shares)]
         for name, shares in (("ABC:VRP+TRP+VT", (0.9, 0.6, 0.3)), ("A:VRP+TRP+VT", (0.5, 0.5, 0.5)))
     )
     ((resampled, seeds, difference, low, high),) = tables.comparison_rows(one, other, 1)

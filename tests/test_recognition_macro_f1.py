@@ -5,7 +5,7 @@ import pytest
 
 from lowalt.common.streams import stream
 from lowalt.recognition import schemes, tables
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1
 from lowalt.report.tables import macro_f1 as in_words
 from made_predictions import read_rows, run_files
@@ -31,7 +31,7 @@ def test_macro_f1_is_scikit_learns():
 
 def test_the_table_holds_macro_f1_within_its_interval_and_the_report_reads_it(tmp_path):
     paths = [run_files(tmp_path, "seen", "A:VT", share, seed)[0] for seed, share in ((0, 0.8), (1, 0.7))]
-    runs = [Run(path) for path in paths]
+    runs = [Evaluated(path) for path in paths]
     tables.write(runs, schemes.names("config/schemes.csv"), {}, tmp_path / "out", seed=1)
     rows = read_rows(tmp_path / "out/accuracy.csv")
     for row in rows[:3]:
@@ -52,7 +52,7 @@ def test_the_table_holds_macro_f1_within_its_interval_and_the_report_reads_it(tm
 
 
 def test_whole_subtypes_give_the_wider_interval_where_subtypes_differ(tmp_path):
-    found = Run(run_files(tmp_path, "unseen", "A:VT", 0.9)[0]).test
+    found = Evaluated(run_files(tmp_path, "unseen", "A:VT", 0.9)[0]).test
     worst = found.subtype == "Owl"
     found.probabilities[worst] = np.roll(np.eye(4)[found.label[worst]], 1, axis=1)
     width = {}

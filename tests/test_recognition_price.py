@@ -14,7 +14,7 @@ from PIL import Image
 from lowalt.common.errors import InputError
 from lowalt.measure import accuracy_cost, network_speed
 from lowalt.recognition import predictions, samples, schemes, statistics
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.report.figures.accuracy_cost import draw
 
 SNRS = (3.0, np.inf)
@@ -52,7 +52,7 @@ def run_of(folder, name, wrong, count=40):
     path.with_suffix(".json").write_text(json.dumps(
         {"protocol": "unseen", "scheme": name, "seed": 0, "hardware": "here", "steps": 30, "train_samples": 77,
          "train_processor_s": 12.5}))  # fmt: skip
-    return Run(path)
+    return Evaluated(path)
 
 
 def speed_of(folder, name, fast):

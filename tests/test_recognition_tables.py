@@ -6,7 +6,7 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.recognition import orderings, predictions, protocols, schemes, tables
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from made_predictions import read_rows, run_files
 
 PUBLISHED = orderings.read_published("config/published_accuracy.csv")
@@ -41,7 +41,7 @@ def test_tables_say_what_the_predictions_say(tmp_path):
     weak, _, weak_guess = run_files(tmp_path, "seen", "A:VRP+TRP+VT", 0.6, seed=3)
     weak.with_suffix(".json").write_text(weak.with_suffix(".json").read_text().replace('"seed": 3', '"seed": 0'))
     unseen, *_ = run_files(tmp_path, "unseen", "A:VT", 0.7)
-    tables.write([Run(p) for p in (unseen, weak, path)], names, PUBLISHED, tmp_path / "out", seed=1)
+    tables.write([Evaluated(p) for p in (unseen, weak, path)], names, PUBLISHED, tmp_path / "out", seed=1)
     test = found.fold == "test"
     accuracy = read_rows(tmp_path / "out/accuracy.csv")
     assert [row["scheme"] for row in accuracy] == ["A:VRP+TRP+VT"] * 4 + ["ABC:VRP+TRP+VT"] * 4 + ["A:VT"] * 4
@@ -84,16 +84,16 @@ def test_two_runs_of_one_seed_and_unknown_schemes_are_refused(tmp_path):
     names = schemes.names("config/schemes.csv")
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.9)
     with pytest.raises(InputError, match="two prediction files"):
-        tables.write([Run(path), Run(path)], names, {}, tmp_path, 1)
+        tables.write([Evaluated(path), Evaluated(path)], names, {}, tmp_path, 1)
     other, *_ = run_files(tmp_path, "seen", "D:VT", 0.9)
     with pytest.raises(InputError, match="D:VT"):
-        tables.write([Run(other)], names, {}, tmp_path, 1)
+        tables.write([Evaluated(other)], names, {}, tmp_path, 1)
 
 
 def test_several_seeds_are_averaged(tmp_path):
     names = schemes.names("config/schemes.csv")
     paths = [run_files(tmp_path, "seen", "A:VT", 0.9, seed=seed)[0] for seed in (0, 1, 2)]
-    tables.write([Run(path) for path in paths], names, {}, tmp_path, 1)
+    tables.write([Evaluated(path) for path in paths], names, {}, tmp_path, 1)
     trainings = read_rows(tmp_path / "seeds.csv")
     assert [(row["seed"], row["train_s"], row["hardware"]) for row in trainings[1:]] == [
         ("1", "12.5", "test bench"), ("2", "12.5", "test bench"),
@@ -107,7 +107,7 @@ def test_several_seeds_are_averaged(tmp_path):
     (calibrated,) = read_rows(tmp_path / "calibration.csv")
     each = []
     for seed in (0, 1, 2):
-        tables.write([Run(paths[seed])], names, {}, tmp_path / str(seed), 1)
+        tables.write([Evaluated(paths[seed])], names, {}, tmp_path / str(seed), 1)
         each += read_rows(tmp_path / str(seed) / "calibration.csv")
     assert float(calibrated["brier"]) == pytest.approx(np.mean([float(row["brier"]) for row in each]), abs=1e-5)
     assert len({row["brier"] for row in each}) > 1

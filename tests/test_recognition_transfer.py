@@ -9,7 +9,7 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition import predictions, samples, transfer
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 
 SNRS = (3.0, np.inf)
 
@@ -27,7 +27,7 @@ def predicted(path, right, trained_on="", scheme="A:VT", seed=0):
     predictions.write(path, predictions.from_facts(facts, (0,), np.eye(4)[guess]))
     about = {"protocol": "seen", "scheme": scheme, "seed": seed, "hardware": "none", "trained_on": trained_on}
     path.with_suffix(".json").write_text(json.dumps(about))
-    return Run(path)
+    return Evaluated(path)
 
 
 def table(path):

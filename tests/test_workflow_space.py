@@ -50,19 +50,19 @@ def test_units_are_what_a_job_s_arrays_consist_of():
 def test_needs_are_sums_by_hand_and_what_is_there_is_not_counted():
     values = 50 * 2 * 6 * 3 * 400
     whole = 100 + 8 * values
-    fresh = space.need([space.Job("noise", CHUNK)] * 3, FIGURES, PLAN, CONFIG, 2)
+    fresh = space.need([space.PlannedJob("noise", CHUNK)] * 3, FIGURES, PLAN, CONFIG, 2)
     assert (fresh.disk, fresh.jobs, fresh.unknown) == (3 * whole, 3, ())
     assert fresh.memory == 2 * fresh.largest_job == 2 * (50e6 + 10 * values)
     # Made again in place: nothing is added except one new file next to the file that it replaces.
-    again = space.need([space.Job("noise", CHUNK, existing=whole)] * 3, FIGURES, PLAN, CONFIG, 2)
+    again = space.need([space.PlannedJob("noise", CHUNK, existing=whole)] * 3, FIGURES, PLAN, CONFIG, 2)
     assert again.disk == whole
     # Temporary files: two for each core, however many there are in the run.
-    many = space.need([space.Job("tiles", CHUNK)] * 50, FIGURES, PLAN, CONFIG, 2)
+    many = space.need([space.PlannedJob("tiles", CHUNK)] * 50, FIGURES, PLAN, CONFIG, 2)
     assert many.disk == 4 * 0.5 * 50 * 2 * 6 * 768**2
     # A job that takes both cores runs alone; the smaller jobs of one thread do not run meanwhile.
-    wide = space.need([space.Job("train", {}, threads=2), space.Job("noise", CHUNK)], FIGURES, PLAN, CONFIG, 2)
+    wide = space.need([space.PlannedJob("train", {}, threads=2), space.PlannedJob("noise", CHUNK)], FIGURES, PLAN, CONFIG, 2)
     assert wide.memory == wide.largest_job == 900e6 and wide.largest_rule == "train"
-    assert space.need([space.Job("gallery", {})], FIGURES, PLAN, CONFIG, 1).unknown == ("gallery",)
+    assert space.need([space.PlannedJob("gallery", {})], FIGURES, PLAN, CONFIG, 1).unknown == ("gallery",)
 
 
 def test_a_run_that_cannot_fit_is_refused_and_one_that_barely_fits_warned_about():
@@ -127,7 +127,7 @@ def test_the_kept_figures_are_exact_for_signals():
 def test_the_check_refuses_warns_or_is_off(tmp_path, monkeypatch):
     table = tmp_path / "space.csv"
     table.write_text(",".join(space.COLUMNS) + "\nnoise,x,1e18,0,1,0,no\n")
-    arguments = ([space.Job("noise", CHUNK)], PLAN, CONFIG, 1, table, tmp_path)
+    arguments = ([space.PlannedJob("noise", CHUNK)], PLAN, CONFIG, 1, table, tmp_path)
     monkeypatch.delenv(space_check.VARIABLE, raising=False)
     with pytest.raises(SpaceError, match=r"1000000000\.0 GB.*LOWALT_SPACE=warn"):
         space_check.check(*arguments)

@@ -38,6 +38,7 @@ class Mutant(NamedTuple):
 
 @cache
 def _operators() -> dict:
+    """The operators of OPERATORS by name."""
     return {name: get_operator(name)() for name in OPERATORS}
 
 

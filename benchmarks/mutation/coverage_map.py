@@ -55,6 +55,7 @@ def read(folder: Path) -> Coverage:
 
 
 def _lines(data: Path, root: Path) -> dict[str, dict[int, list[str]]]:
+    """For each measured file below `root`, the tests that run each line."""
     kept = CoverageData(str(data))
     kept.read()
     found: dict[str, dict[int, list[str]]] = {}

@@ -7,7 +7,8 @@ __version__ = "0.2.0"
 
 
 def __getattr__(name: str):
-    # Imports wait: a stage's command line must not pay for the whole street.
+    """Import `Dataset` or `Endless` when it is first asked for."""
+    # A stage's command line must not wait for the import of all other stages.
     if name in ("Dataset", "Endless"):
         from lowalt.shards import dataset
 

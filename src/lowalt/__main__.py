@@ -16,6 +16,7 @@ CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.sche
 
 
 def _sample(text: str) -> tuple[str, int]:
+    """Subtype and motion model of a text such as "Crow:3"."""
     name, _, model = text.rpartition(":")
     if not name or not model.isdigit():
         raise argparse.ArgumentTypeError(f"{text!r}, expected SUBTYPE:MODEL such as 'Crow:3'")
@@ -23,6 +24,7 @@ def _sample(text: str) -> tuple[str, int]:
 
 
 def _explained(given: argparse.Namespace) -> str:
+    """The text that `lowalt explain` prints for the arguments given."""
     from lowalt.effects.explain import explain_scene
 
     inputs = os.environ.get("LOWALT_INPUTS")

@@ -49,6 +49,7 @@ class LogHandler(LogHandlerBase):
     needs_rulegraph = False
 
     def __post_init__(self) -> None:
+        """Choose the stream, and whether the display is a board, lines, or Snakemake's own text."""
         given = self.common_settings
         self._stream = sys.stdout if given.stdout else sys.stderr
         self._terminal = self._stream.isatty() and os.environ.get("TERM", "dumb") != "dumb"
@@ -56,7 +57,7 @@ class LogHandler(LogHandlerBase):
             given.nocolor, self._stream, DefaultFormatter(given.quiet, given.show_failed_logs),
             DefaultFilter(given.quiet, given.debug_dag, given.verbose, given.dryrun, given.printshellcmds),
         )  # fmt: skip
-        # Who asks for all of Snakemake's own words gets them.
+        # These options of Snakemake ask for its own messages.
         self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
@@ -87,6 +88,7 @@ class LogHandler(LogHandlerBase):
         super().close()
 
     def _take(self, record: logging.LogRecord) -> None:
+        """Update the display by one record of Snakemake."""
         event = getattr(record, "event", None)
         if event == LogEvent.RUN_INFO and getattr(record, "stats", None):
             totals = {name: count for name, count in record.stats.items() if name != "total"}
@@ -104,14 +106,16 @@ class LogHandler(LogHandlerBase):
 
     @staticmethod
     def _noise(record: logging.LogRecord) -> bool:
+        """Whether a record says nothing that the display does not say."""
         # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
         failed = getattr(record, "exception", None) == "CalledProcessError"
         text = record.getMessage() if record.msg is not None else ""
         return failed or (record.levelno <= logging.INFO and (not text or text == "None" or text.startswith(NOISE)))
 
     def _start(self, record: logging.LogRecord) -> None:
+        """Show that a job has started."""
         if not record.output:
-            # A target: it makes nothing itself.
+            # The rule only collects files; it makes none itself.
             self._board.totals.pop(record.rule_name, None)
             return
         label = "/".join(str(value) for name, value in record.wildcards.items() if name != "run")
@@ -123,11 +127,13 @@ class LogHandler(LogHandlerBase):
             self._say(self._board.line(record.rule_name, record.created, progress.last))
 
     def _finish(self, job_id: object, now: float) -> None:
+        """Show that a job has finished."""
         complete = self._board.finish(job_id, now)
         if complete:
             self._say(self._board.line(complete, now, progress.last))
 
     def _fail(self, record: logging.LogRecord) -> None:
+        """Show a failed job with the last lines of its logs."""
         if self._board:
             self._board.finish(record.jobid, record.created, good=False)
         lines = [f"failed: {record.rule_name}, job {record.jobid}"]
@@ -148,6 +154,7 @@ class LogHandler(LogHandlerBase):
             self._draw()
 
     def _erase(self) -> None:
+        """Take the drawn board off the terminal."""
         if self._drawn:
             print(f"\x1b[{self._drawn}F\x1b[J", end="", file=self._stream)
             self._drawn = 0
@@ -181,6 +188,7 @@ class LogHandler(LogHandlerBase):
                     print("\n".join([*text, self._board.total(self._shown)]), file=self._stream, flush=True)
 
     def _keep(self, state: str) -> None:
-        # A full disk stops the jobs, and they say so; the display goes on.
+        """Write the state of the run to its status file."""
+        # On a full disk the jobs fail with messages of their own; the display must not.
         with contextlib.suppress(OSError, InputError):
             status.write(self._board, state)

@@ -17,7 +17,7 @@ from lowalt.common.errors import InputError
 
 _LARGEST = 2**31 - 1
 _VERSION = 45
-"""What a reader must know: the long sizes of section 4.5.3."""
+"""Version of the format that a reader must know, 4.5: the one with the long sizes of section 4.5.3."""
 _UNIX = 3
 _DATE = 1 << 5 | 1
 """1 January 1980, the first day that the format has."""

@@ -46,6 +46,7 @@ class Draws(np.random.Generator):
         self._kept: int | None = None
 
     def __reduce__(self) -> tuple:
+        """State for pickle: the bit generator, and the kept half of a 64-bit draw."""
         return _restored, (self.bit_generator, self._kept)
 
     def words(self, count: int) -> np.ndarray:

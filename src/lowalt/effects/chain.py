@@ -74,6 +74,7 @@ class Chain:
 
     @error.setter
     def error(self, value: float) -> None:
+        """Set the error of the target's interpolation."""
         self.target.error = value
 
     @cached_property

@@ -33,7 +33,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
 from lowalt.common.network import station_names
 from lowalt.common.streams import stream
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
 from lowalt.recognition.statistics import accuracy_by, pareto
@@ -108,14 +108,14 @@ def _what(entry: Entry) -> dict:
     }  # fmt: skip
 
 
-def _shares(run: Run, part: str) -> dict[str, float]:
+def _shares(run: Evaluated, part: str) -> dict[str, float]:
     """Accuracy in percent by SNR label, and their mean "avg"; empty where the part has no samples."""
     found = run.part(part)
     table = {snr_text(snr): 100 * share for snr, (share, _) in accuracy_by(found.snr_db, found.correct).items()}
     return {**table, "avg": float(np.mean(list(table.values())))} if table else {}
 
 
-def trained_rows(run: Run, base: Run, entry: Entry, seed: int) -> list[dict]:
+def trained_rows(run: Evaluated, base: Evaluated, entry: Entry, seed: int) -> list[dict]:
     """Return one row an SNR and one for their average of a trained scheme, compared with `base` on the same samples."""
     if not np.array_equal(run.test.key, base.test.key):
         raise InputError(f"{run.scheme} and {base.scheme} were tested on different samples")
@@ -168,11 +168,12 @@ def mark_front(rows: list[dict]) -> None:
 
 
 def _or_nan(value: float | None) -> float:
+    """The value, NaN for None."""
     return math.nan if value is None else value
 
 
 def write(
-    runs: list[Run], order: list[str], timed: dict[str, Entry], fidelity: list[dict], out: str | Path, seed: int
+    runs: list[Evaluated], order: list[str], timed: dict[str, Entry], fidelity: list[dict], out: str | Path, seed: int
 ) -> None:  # fmt: skip
     """Write accuracy_cost.csv: trained schemes in `order`, then those only timed, then `fidelity` rows.
 
@@ -207,7 +208,7 @@ def main(arguments: list[str]) -> None:
     index = json.loads(text_of(given.index, "index"))
     shards, stations = index["shards"], station_names(index["render"]["network"])
     size = sum(shard["bytes"] for shard in shards) / sum(shard["samples"] for shard in shards)
-    runs, speeds = [Run(path) for path in given.predictions], read_speeds(given.speeds)
+    runs, speeds = [Evaluated(path) for path in given.predictions], read_speeds(given.speeds)
     fidelity = fidelity_rows(given.fidelity) if given.fidelity else []
     timed = entries(given.schemes, stations, speeds, size)
     write(runs, names(given.schemes), timed, fidelity, given.out, seed)

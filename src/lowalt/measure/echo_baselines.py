@@ -45,6 +45,7 @@ def amplitudes(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m)
 
 
 def _strongest(subcarriers: np.ndarray) -> complex:
+    """Value of the strongest range cell of one symbol's subcarriers (M,)."""
     cells = np.fft.ifft(subcarriers)
     return cells[abs(cells).argmax()]
 

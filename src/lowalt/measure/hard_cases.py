@@ -98,6 +98,7 @@ def cluster(distance: float, count: int = 5, size: float = 0.5, seed: int = 3) -
 
 
 def _grating() -> tuple:
+    """A point in the first grating lobe of the arrays: network, station, its place (1, 3) and the aim (3,) in m."""
     # kappa = 1.02 makes the first grating lobe visible: it is 2 / kappa away from the beam in direction cosine.
     net = network()
     station = dataclasses.replace(net.stations[0], frequency_hz=1.02 * net.carrier_hz)

@@ -43,6 +43,7 @@ def _clock(machine: Machine, threads: int) -> Callable[[], float]:
 
 
 def _images(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
+    """Random index images (samples, views, size, size) uint8, equal at every call."""
     shape = (samples, len(scheme.columns), size, size)
     return torch.randint(0, 256, shape, dtype=torch.uint8, generator=torch.Generator().manual_seed(0))
 

@@ -17,6 +17,7 @@ TURNS = pair(1 / (2 * PI))
 
 @LEAN
 def _sines(angles, sines, cosines):
+    """Fill `sines` and `cosines` (K,) for angles (K,) rad."""
     for i in range(np.uint64(len(angles))):
         s, c = sine_cosine(multiply(TURNS, (angles[i], 0.0)))
         sines[i], cosines[i] = s[0], c[0]
@@ -31,6 +32,7 @@ def sines_cosines(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @LEAN
 def _product(a, b, out):
+    """Fill `out` (N, C) with the matrix product of a (N, K) and b (K, C), summed in the order of K."""
     for n in range(np.uint64(a.shape[0])):
         for c in range(np.uint64(b.shape[1])):
             out[n, c] = a[n, 0] * b[0, c]

@@ -49,6 +49,7 @@ def _freeze(arguments: list[str]) -> None:
 
 
 def _sources(line) -> None:
+    """Add the arguments that name samples: cached views, shards, or a data set that makes them."""
     line.add_argument("--views", nargs="+", help="caches of views (.npz)")
     line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
     line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
@@ -131,7 +132,7 @@ def _evaluate(arguments: list[str]) -> None:
 def _tables(arguments: list[str]) -> None:
     """Write accuracy.csv and its companions from prediction files. Settings: seed."""
     from lowalt.recognition import tables
-    from lowalt.recognition.evaluated import Run
+    from lowalt.recognition.evaluated import Evaluated
     from lowalt.recognition.orderings import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
@@ -144,14 +145,14 @@ def _tables(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
     published = read_published(given.published) if given.published else {}
-    runs = [Run(path) for path in given.predictions]
+    runs = [Evaluated(path) for path in given.predictions]
     tables.write(runs, names(given.schemes), published, given.out, seed)
 
 
 def _transfer(arguments: list[str]) -> None:
     """Compare models of other runs with this run's own on its test samples. Settings: seed."""
     from lowalt.recognition import transfer
-    from lowalt.recognition.evaluated import Run
+    from lowalt.recognition.evaluated import Evaluated
 
     line = parser("lowalt.recognition transfer", _transfer.__doc__)
     line.add_argument("--own", nargs="+", required=True, help="prediction files of this run's models (.csv)")
@@ -164,7 +165,7 @@ def _transfer(arguments: list[str]) -> None:
     first, *others = map(load_yaml, given.configs)
     for other in others:
         transfer.check_folds(first, other)
-    own, other = ([Run(path) for path in paths] for paths in (given.own, given.other))
+    own, other = ([Evaluated(path) for path in paths] for paths in (given.own, given.other))
     transfer.write(own, other, names(given.schemes), given.out, seed)
 
 

@@ -13,12 +13,14 @@ class _Sum(torch.autograd.Function):
 
     @staticmethod
     def forward(_, values: torch.Tensor) -> torch.Tensor:
+        """Return the sum of `values` over all ranks."""
         total = values.clone()
         distributed.all_reduce(total)
         return total
 
     @staticmethod
     def backward(_, gradient: torch.Tensor) -> torch.Tensor:
+        """Return the sum of the gradients of all ranks."""
         total = gradient.contiguous().clone()
         distributed.all_reduce(total)
         return total

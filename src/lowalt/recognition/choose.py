@@ -129,7 +129,7 @@ def parts(facts: Facts, fold: int, count: int) -> dict[str, np.ndarray]:
     }
 
 
-class Trial:
+class CandidateTrial:
     """Predictions of one candidate, fold and seed, and the JSON record that goes with them."""
 
     def __init__(self, path: str | Path) -> None:
@@ -147,7 +147,7 @@ class Trial:
         self.held, self.kept = found.take(rows[held]), found.take(rows[~held])
 
 
-def _held(trials: list[Trial], seeds: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _held(trials: list[CandidateTrial], seeds: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Motion models of all folds: their names, subtypes, numbers of samples, and shares correct (seeds, models)."""
     by_seed = []
     for seed in seeds:
@@ -161,12 +161,12 @@ def _held(trials: list[Trial], seeds: list[int]) -> tuple[np.ndarray, np.ndarray
     return names, subtypes, count, np.array([entry[-1] for entry in by_seed])
 
 
-def tables(trials: list[Trial], seed: int) -> tuple[list[list], list[list]]:
+def tables(trials: list[CandidateTrial], seed: int) -> tuple[list[list], list[list]]:
     """Return the rows of choices.csv and of choices_subtypes.csv; candidates in the order of their first trial.
 
     Raises: InputError where a candidate lacks a fold or seed that the first one has.
     """
-    groups: dict[str, list[Trial]] = {}
+    groups: dict[str, list[CandidateTrial]] = {}
     for trial in trials:
         groups.setdefault(trial.about["candidate"], []).append(trial)
     wanted = {(trial.about["fold"], trial.about["seed"]) for trial in next(iter(groups.values()))}
@@ -192,7 +192,7 @@ def tables(trials: list[Trial], seed: int) -> tuple[list[list], list[list]]:
     return rows, each
 
 
-def _subtypes(name: str, trials: list[Trial]) -> list[list]:
+def _subtypes(name: str, trials: list[CandidateTrial]) -> list[list]:
     """Rows of one candidate: accuracy of each subtype where it was held out and where it was trained on."""
     by_part = []
     for part in ("held", "kept"):
@@ -206,7 +206,7 @@ def _subtypes(name: str, trials: list[Trial]) -> list[list]:
     ]
 
 
-def write(trials: list[Trial], folder: str | Path, seed: int) -> None:
+def write(trials: list[CandidateTrial], folder: str | Path, seed: int) -> None:
     """Write choices.csv and choices_subtypes.csv; seed: of the intervals. Raises: as `tables`."""
     rows, each = tables(trials, seed)
     write_csv(Path(folder) / "choices.csv", COLUMNS, rows)
@@ -221,7 +221,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="folder for the tables")
     given = line.parse_args(arguments)
     (seed,) = pick(given.settings, "seed")
-    write([Trial(path) for path in given.predictions], given.out, seed)
+    write([CandidateTrial(path) for path in given.predictions], given.out, seed)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds
 
 
-class Run:
+class Evaluated:
     """One trained and evaluated scheme: its predictions and what is known of the run."""
 
     def __init__(self, path: str | Path) -> None:

@@ -60,6 +60,7 @@ def backbone(name: str, size: int) -> VisionTransformer:
         raise InputError(f"network: backbone {name!r} at {size} pixels, expected at least {shape.patch}")
 
     def patches(**given: object) -> OverlappingPatches:
+        """The patch embedding that timm asks for, with this transformer's stride."""
         return OverlappingPatches(**given, stride=shape.stride)
 
     model = VisionTransformer(

@@ -30,7 +30,7 @@ from lowalt.common.classes import word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
@@ -66,7 +66,7 @@ def _percent(share: float) -> str:
     return f"{100 * share:.4f}"
 
 
-def accuracy_rows(runs: list[Run], part: str, seed: int) -> Iterable[list]:
+def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
     """Yield rows [snr_db, accuracy_percent, *F1, samples, hardware, seeds, spread_points] of one scheme's runs.
 
     Values are means over the runs, one a training seed; seed: of the bootstrap. Intervals of macro F1 resample whole
@@ -91,7 +91,7 @@ def accuracy_rows(runs: list[Run], part: str, seed: int) -> Iterable[list]:
         yield [snr, _percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, len(values), spread]
 
 
-def seed_rows(runs: list[Run]) -> Iterable[list]:
+def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [seed, accuracy_percent, *TRAINING, hardware], the accuracy on average over the SNRs."""
     for run in runs:
         shares = [share for share, _ in accuracy_by(run.test.snr_db, run.test.correct).values()]
@@ -100,7 +100,7 @@ def seed_rows(runs: list[Run]) -> Iterable[list]:
         yield [run.seed, _percent(np.mean(shares)), *took, run.hardware]
 
 
-def confusion_rows(runs: list[Run]) -> Iterable[list]:
+def confusion_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [category, predicted, samples], summed over the seeds."""
     classes = runs[0].classes
     counts = sum(confusion(run.test.label, run.test.guesses, len(classes)) for run in runs)
@@ -109,7 +109,7 @@ def confusion_rows(runs: list[Run]) -> Iterable[list]:
             yield [name, other, counts[true, guess]]
 
 
-def subtype_rows(runs: list[Run]) -> Iterable[list]:
+def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [category, subtype, accuracy_percent, samples], the worst of each category first."""
     test, classes = runs[0].test, runs[0].classes
     category = {name: classes[label] for name, label in zip(test.subtype.tolist(), test.label, strict=True)}
@@ -119,7 +119,7 @@ def subtype_rows(runs: list[Run]) -> Iterable[list]:
         yield [category[name], name, _percent(table[name][0]), table[name][1]]
 
 
-def band_rows(runs: list[Run], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
+def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
     """Yield rows [from, to, accuracy_percent, samples] over bands of a value; samples without one are left out."""
     test = runs[0].test
     found = values(test)
@@ -134,7 +134,7 @@ def _alarm_part(found: Predictions) -> AlarmPart:
     return AlarmPart(found.probabilities[:, LOOKED_FOR], found.label, found.motion, found.subtype)
 
 
-def alarm_rows(runs: list[Run], seed: int) -> Iterable[list]:
+def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
     """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false alarms of others.
 
     In percent, with 95 % intervals; thresholds come from validation samples. A detection that too few validation
@@ -159,13 +159,13 @@ def alarm_rows(runs: list[Run], seed: int) -> Iterable[list]:
         yield [_percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
 
 
-def calibration_rows(runs: list[Run]) -> Iterable[list]:
+def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
     found = [list(calibration(run.test.probabilities, run.test.label).values()) for run in runs]
     yield [f"{value:.6f}" for value in np.mean(found, axis=0)]
 
 
-def reliability_rows(runs: list[Run]) -> Iterable[list]:
+def reliability_rows(runs: list[Evaluated]) -> Iterable[list]:
     """Yield rows [from, to, confidence_percent, accuracy_percent, samples] over bands of confidence."""
     probabilities = np.concatenate([run.test.probabilities for run in runs])
     labels = np.concatenate([run.test.label for run in runs])
@@ -173,7 +173,7 @@ def reliability_rows(runs: list[Run]) -> Iterable[list]:
         yield [f"{low:.4f}", f"{high:.4f}", _percent(confidence), _percent(share), count]
 
 
-def comparison_rows(first: list[Run], second: list[Run], seed: int) -> Iterable[list]:
+def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) -> Iterable[list]:
     """Yield one row [resampled, seeds, difference, low, high] of two schemes on the same samples.
 
     Difference in percentage points, mean over the seeds; seeds: the fewer of the two schemes' trainings.
@@ -196,7 +196,7 @@ def _write(path: Path, columns: list[str], rows: list[list]) -> None:
     write_csv(path, ["protocol", "scheme", *columns], rows)
 
 
-def _one_set(runs: list[Run]) -> tuple[str, ...]:
+def _one_set(runs: list[Evaluated]) -> tuple[str, ...]:
     """The classes of all runs; refuses runs of several sets."""
     found = sorted({run.classes for run in runs})
     if len(found) != 1:
@@ -204,13 +204,13 @@ def _one_set(runs: list[Run]) -> tuple[str, ...]:
     return found[0]
 
 
-def write(runs: list[Run], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
+def write(runs: list[Evaluated], order: list[str], published: dict, folder: str | Path, seed: int) -> None:
     """Write all tables into `folder`; schemes stand in `order`, protocols seen first.
 
     published: as `orderings.read_published` gives it; seed: of the bootstrap.
     Raises: InputError for a scheme outside `order`, the same run twice, or runs with different classes.
     """
-    groups: dict[tuple[str, str], list[Run]] = {}
+    groups: dict[tuple[str, str], list[Evaluated]] = {}
     for run in sorted(runs, key=lambda run: run.seed):
         if run.scheme not in order:
             raise InputError(f"scheme {run.scheme!r}: not in the table of schemes, which has {order}")

@@ -33,7 +33,7 @@ HISTORY = ("step", "epoch", "samples", "rate", "train_loss", "validation_loss", 
 
 
 @dataclass
-class Progress:
+class TrainingState:
     """Where a run stands; everything in it goes into the checkpoint."""
 
     epoch: int = 0
@@ -83,7 +83,7 @@ class Trainer:
         self.best_weights: dict = {}
         self.waited_s = 0.0
         self.metrics: Metrics | None = None
-        self.at = Progress()
+        self.at = TrainingState()
 
     def _order(self, epoch: int) -> np.ndarray:
         """Return the sample numbers of an epoch in training order."""
@@ -114,7 +114,7 @@ class Trainer:
         self.ema.module.load_state_dict(state["ema"])
         self.optimiser.load_state_dict(state["optimiser"])
         self.best_weights = state["best"]
-        self.at = Progress(**state["at"])
+        self.at = TrainingState(**state["at"])
         set_random_state(self.machine.device, state["random"])
         return True
 
@@ -127,6 +127,7 @@ class Trainer:
             )
 
     def _finite_weights(self) -> None:
+        """Raise InputError naming the weights that are not finite."""
         # A step of finite loss and gradient can overflow a weight; the next loss would show it only after a checkpoint.
         for name, value in self.model.state_dict().items():
             if value.is_floating_point() and not bool(value.isfinite().all()):
@@ -187,7 +188,7 @@ class Trainer:
         self.at.loss_sum, self.at.loss_steps = 0.0, 0
         self.at.done = bool(self.block["patience"]) and self.at.since_best >= self.block["patience"]
 
-    def fit(self) -> Progress:
+    def fit(self) -> TrainingState:
         """Train to the last step or until validation stops improving; goes on from where the run stands."""
         start, last, first = time.monotonic(), time.monotonic(), self.at.steps
         steps = self.block["steps"]

@@ -21,7 +21,7 @@ import numpy as np
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.tables import snr_text
 
@@ -45,7 +45,7 @@ def check_folds(own: dict, other: dict) -> None:
         )
 
 
-def comparison(own: list[Run], other: list[Run], name: str, seed: int) -> Iterable[list]:
+def comparison(own: list[Evaluated], other: list[Evaluated], name: str, seed: int) -> Iterable[list]:
     """Yield the columns from snr_db on, in percent and points, of one scheme.
 
     own, other: runs (seeds) of the two models; name: the other run, which keys the bootstrap's stream with `seed`.
@@ -79,7 +79,7 @@ def _spread(groups: list[list[float]]) -> str:
     return f"{np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom):.4f}"
 
 
-def write(own: list[Run], other: list[Run], order: list[str], out: str | Path, seed: int) -> None:
+def write(own: list[Evaluated], other: list[Evaluated], order: list[str], out: str | Path, seed: int) -> None:
     """Write transfer.csv; schemes stand in `order`, protocols seen first. `other` runs say which run trained them.
 
     Raises: InputError where a model has no counterpart in this run.

@@ -31,6 +31,7 @@ FOLDER = "config/measured"
 
 
 def _line(name: str, description: str, *, inputs: bool = False) -> argparse.ArgumentParser:
+    """A parser with the arguments that all commands share, and with those of the measured sets where `inputs`."""
     options = argparse.ArgumentParser(prog=f"python -m lowalt.recordings {name}", description=description)
     options.add_argument("--twins", type=shipped, default=f"{FOLDER}/twins.yaml", help="radars and scenes")
     options.add_argument(
@@ -55,6 +56,7 @@ def _found(given: argparse.Namespace, library: Library) -> list[Measured]:
 
 
 def _twin(library: Library, name: str):
+    """The radar of this name. Raises: InputError where the library has none."""
     if name not in library.twins:
         raise InputError(f"--radar {name!r}: no such twin, expected one of {sorted(library.twins)}")
     return library.twins[name]

@@ -19,10 +19,12 @@ PUBLISHED = "config/published_accuracy.csv"
 
 
 def _line(cells: list[str]) -> str:
+    """A row of a Markdown table."""
     return "| " + " | ".join(cells) + " |\n"
 
 
 def _head(cells: list[str]) -> str:
+    """The head of a Markdown table: names of columns and the line below."""
     return _line(cells) + _line(["---"] * len(cells))
 
 

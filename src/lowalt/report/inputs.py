@@ -67,6 +67,7 @@ class Inputs:
         return cls(found, str(path))
 
     def __contains__(self, name: str) -> bool:
+        """Whether the run or the kept references have this file."""
         return name in self.files
 
     def own_or_kept(self, name: str) -> str | None:

@@ -32,7 +32,7 @@ from lowalt.report.sections import (
 )
 
 
-class Part(NamedTuple):
+class PagePart(NamedTuple):
     """A part of the page: its address in the page, its title in the contents, and its sections."""
 
     id: str
@@ -42,16 +42,16 @@ class Part(NamedTuple):
 
 RESULTS = (accuracy, orderings, confusion, subtypes, bands, alarms, calibration, transfer, trainings)
 PARTS = (
-    Part("run", "This run", (overview,)),
-    Part("results", "Results", RESULTS),
-    Part("cost", "What accuracy costs in time", (echo_cost, accuracy_cost)),
-    Part("hard-cases", "Hard cases", (hard_cases,)),
-    Part("effects", "Effects and scenes", (effects, scene)),
-    Part("measured", "Held against measurement", (measured,)),
-    Part("targets", "Targets", (targets,)),
-    Part("samples", "Samples", (samples,)),
-    Part("stages", "Stage times", (stages,)),
-    Part("provenance", "Provenance", (made_with,)),
+    PagePart("run", "This run", (overview,)),
+    PagePart("results", "Results", RESULTS),
+    PagePart("cost", "What accuracy costs in time", (echo_cost, accuracy_cost)),
+    PagePart("hard-cases", "Hard cases", (hard_cases,)),
+    PagePart("effects", "Effects and scenes", (effects, scene)),
+    PagePart("measured", "Held against measurement", (measured,)),
+    PagePart("targets", "Targets", (targets,)),
+    PagePart("samples", "Samples", (samples,)),
+    PagePart("stages", "Stage times", (stages,)),
+    PagePart("provenance", "Provenance", (made_with,)),
 )
 """The parts in the order of the page. Every page has all of them; a part without values says so."""
 SECTIONS = tuple(section for part in PARTS for section in part.sections)
@@ -64,6 +64,7 @@ TEMPLATES = Path(__file__).parent
 
 
 def _templates() -> jinja2.Environment:
+    """The templates, which refuse a name that nobody gave them."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["plotted"] = plotted
@@ -95,6 +96,7 @@ def contents(run: Run) -> dict[str, dict | None]:
 
 
 def _name(module: ModuleType) -> str:
+    """A section's name, that of its module."""
     return module.__name__.rpartition(".")[2]
 
 

@@ -38,7 +38,7 @@ class Sample(NamedTuple):
 
 
 class Place(NamedTuple):
-    """The sample that a number stands for."""
+    """The sample of a number: its group, subtype, motion model and SNR."""
 
     group: str
     subtype: str
@@ -141,7 +141,7 @@ class Dataset:
         return fold(self.plan.split, self.plan.seed, place.subtype, place.model, place.snr_db)
 
     def row(self, place: Place) -> dict:
-        """Return the motion table's row of a sample; models beyond the configuration's count are drawn likewise."""
+        """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
         rng = stream(self.plan.seed, "motion", place.subtype, place.model)
         published, settings = self.published[place.subtype], self.config["motion"]
         cloud = self.clouds[place.subtype]

@@ -41,6 +41,7 @@ class Maker:
         self._received: dict[tuple, tuple[np.ndarray, np.ndarray | None]] = {}
 
     def __getstate__(self) -> dict:
+        """State for pickle, without tables and kept echoes."""
         # Workers prepare tables of their own.
         return {**{name: value for name, value in self.__dict__.items() if name != "renderer"}, "_received": {}}
 

@@ -56,6 +56,7 @@ class ShardSet:
         return int(self._ends[-1])
 
     def __getstate__(self) -> dict:
+        """State for pickle, without the tables that each process makes for itself."""
         kept = {name: value for name, value in self.__dict__.items() if name != "renderer"}
         return {**kept, "_tables": {}}
 

@@ -13,7 +13,7 @@ from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS
 
 COLUMNS = 5
-VIEWS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
+DIRECTIONS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
 """The viewer's azimuth, from the front towards the right, and elevation (degrees), chosen for each category."""
 
 BODY_COLOUR = "#52525b"
@@ -24,14 +24,14 @@ FAINT = 0.3
 
 def axes_of(kind: str) -> np.ndarray:
     """Return the rotation (3, 3) from body axes to right, up and toward the viewer, for targets like `kind`."""
-    azimuth, elevation = np.radians(VIEWS[kind])
+    azimuth, elevation = np.radians(DIRECTIONS[kind])
     toward = np.array([np.sin(azimuth) * np.cos(elevation), np.cos(azimuth) * np.cos(elevation), np.sin(elevation)])
     right = np.array([-np.cos(azimuth), np.sin(azimuth), 0.0])
     return np.stack([right, np.cross(toward, right), toward])
 
 
 def shown(cloud: Cloud) -> np.ndarray:
-    """Return the points (L, 3) as (right, up, toward the viewer) in m: a recording's first frame, or the cloud at rest."""
+    """Return the points (L, 3) as (right, up, toward the viewer) in m: those of a recording in its first frame."""
     points = cloud.track[0] if len(cloud.track) else cloud.points
     seen = points @ axes_of(cloud.like).T
     return seen - [*((seen.max(0) + seen.min(0))[:2] / 2), 0]

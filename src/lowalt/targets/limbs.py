@@ -1,6 +1,6 @@
-"""A limb of two bones from a fixed joint to a moving point, as walkers on four legs and cyclists have it.
+"""A limb of two bones from a fixed joint to a moving point, as in walkers on four legs and in cyclists.
 
-Axes: x right, y front, z up, metres; positions, not angles, since the feet's paths are what is known.
+Axes: x right, y front, z up, metres; positions, not angles, since the paths of the feet are known.
 """
 
 import numpy as np

@@ -16,7 +16,7 @@ def make(record: dict, inputs: Path | None, seed: int) -> Cloud:
 
 def _made(record: dict, inputs: Path | None, seed: int) -> Cloud:
     """Return the cloud of a merged record, unchecked; arguments and errors as `make`."""
-    # Imports wait for the source: a built-in cloud must not pay for pymeshlab.
+    # Each source imports its own modules, so that a built-in cloud does not wait for the import of pymeshlab.
     source = record.get("source")
     if source == "builtin":
         from lowalt.targets.builtin import builtin_cloud

@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
-from lowalt.common.rotations import thinnest
+from lowalt.common.matrices import thinnest
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation

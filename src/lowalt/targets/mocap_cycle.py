@@ -6,8 +6,8 @@ import numpy as np
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
+from lowalt.common.matrices import nearest_rotations
 from lowalt.common.portable import product
-from lowalt.common.rotations import nearest_rotations
 from lowalt.targets.mocap_motion import Motion, nodes_m
 from lowalt.targets.skeleton import NODES
 

@@ -23,8 +23,8 @@ _DOF = ("tx", "ty", "tz", "rx", "ry", "rz")
 class Skeleton:
     """The contents of a skeleton file.
 
-    bones: (31, 3) in file units and file axes; axes_rad: (31, 3), angles of each bone's own frame; dofs: the channels of
-    each node in the order of the file; unit_m: metres per file unit.
+    bones: (31, 3) in file units and file axes; axes_rad: (31, 3), angles of each bone's own frame; dofs: the channels
+    of each node in the order of the file; unit_m: metres per file unit.
     """
 
     bones: np.ndarray

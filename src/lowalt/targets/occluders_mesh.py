@@ -69,7 +69,7 @@ def simplified(triangles: np.ndarray, most: int) -> Surface:
     faces = index.reshape(-1, 3)
     faces = faces[face_normals(vertices, faces)[1] > 0]
     if len(faces) > most:
-        import pymeshlab  # only large meshes pay for the import
+        import pymeshlab  # slow to import, and only large meshes need it
 
         work = pymeshlab.MeshSet()
         work.add_mesh(pymeshlab.Mesh(vertices, faces))

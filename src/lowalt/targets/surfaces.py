@@ -145,7 +145,7 @@ def hull(stations: Iterable[tuple], exponent: float = 2.5, sides: int = 24, bow:
 
 
 def box(size: Iterable[float], centre: Iterable[float] = (0, 0, 0), exponent: float = 8.0) -> Surface:
-    """Return a box with edges of the lengths `size` (x, y, z); those along y are rounded by the superellipse's exponent."""
+    """Return a box with the edge lengths `size` (x, y, z); the superellipse's exponent rounds its edges along y."""
     x, y, z = (float(value) / 2 for value in size)
     return hull([(-y, x, -z, z), (y, x, -z, z)], exponent).moved(centre)
 

@@ -106,7 +106,7 @@ def ducted(record: dict, f: dict) -> list[Part]:
 
 
 def raised(record: dict, f: dict) -> list[Part]:
-    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a large gimbal below the nose."""
+    """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a big gimbal below the nose."""
     places = hubs(record, f["spacing_ratio"])
     boom, arm = f["frame_rise"], f["arm_diameter"] / 2
     reach_x, reach_y = abs(places).max(0)

@@ -49,8 +49,7 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
 
 
 def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
-    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade at right angles to its
-    arm."""
+    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade square to the arm."""
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))

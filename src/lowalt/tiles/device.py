@@ -98,7 +98,7 @@ class DeviceRenderer:
 
     @staticmethod
     def _along(values: Tensor, columns: Tensor, shares: Tensor) -> Tensor:
-        """Columns of the image from `columns` (taps, size) of the spectrum with `shares` (taps, size), taps in pairs."""
+        """Columns of the image from `columns` (taps, size) of the spectrum weighted by `shares` (taps, size)."""
         pairs = (shares[tap] * values[..., columns[tap]] + shares[tap + 1] * values[..., columns[tap + 1]]
                  for tap in range(0, columns.shape[0], 2))  # fmt: skip
         return functools.reduce(torch.add, pairs)

@@ -80,7 +80,7 @@ class Run:
         refuse_data(config)
         refuse_input(config)
         if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
-            raise InputError("added: snr_db beside effects.cell_noise, whose echoes hold the noise of all SNRs")
+            raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
         for name in block.get("extra", []):
             refuse_extra(config, name, classes)
         return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)

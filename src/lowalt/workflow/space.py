@@ -36,7 +36,7 @@ class Figures:
 
 
 @dataclass(frozen=True)
-class Job:
+class PlannedJob:
     """A job that will run: rule, wildcards, bytes of its outputs that are there already, threads it takes."""
 
     rule: str
@@ -114,7 +114,7 @@ def _levels(wildcards: Mapping[str, str], plan: Plan) -> int:
     return len(plan.chunk(f"{wildcards['group']}-{wildcards['part']}").snrs)
 
 
-def need(jobs: Iterable[Job], figures: dict[str, Figures], plan: Plan, config: dict, cores: int) -> Need:
+def need(jobs: Iterable[PlannedJob], figures: dict[str, Figures], plan: Plan, config: dict, cores: int) -> Need:
     """Return the disk and the memory that these jobs need on a machine with so many cores.
 
     Outputs that are there already are written over, so only their growth counts, plus one output at a time that stands

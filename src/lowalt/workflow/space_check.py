@@ -19,7 +19,9 @@ ALIKE = {"echo_in_scene": "echo"}
 """Rules whose jobs write and hold as much as those of another rule, which was measured."""
 
 
-def check(jobs: list[space.Job], plan: Plan, config: dict, cores: int | None, table: Path, folder: Path) -> list[str]:
+def check(
+    jobs: list[space.PlannedJob], plan: Plan, config: dict, cores: int | None, table: Path, folder: Path
+) -> list[str]:
     """Return warnings about disk and memory for these jobs before they start.
 
     cores: of this machine, or None where jobs run on other machines; memory is then not checked. folder: that of
@@ -48,7 +50,7 @@ def before(workflow: object, plan: Plan, config: dict) -> None:
     from snakemake.logging import logger
 
     jobs = [
-        space.Job(
+        space.PlannedJob(
             ALIKE.get(job.rule.name, job.rule.name),
             dict(job.wildcards_dict),
             sum(path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file()),

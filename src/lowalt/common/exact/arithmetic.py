@@ -22,6 +22,7 @@ def fma(typing_context, a, b, c):
     """Return a b + c with one rounding."""
 
     def generate(context, builder, signature, arguments):
+        """Emit the machine instruction."""
         return builder.fma(*arguments)
 
     return types.float64(types.float64, types.float64, types.float64), generate

@@ -1,4 +1,4 @@
-"""Bounds of where every symbol's points lie, from the poses of the parts alone, before any point is computed."""
+"""Bounds of the places of every symbol's points, from the poses of the parts alone, before any point is computed."""
 
 import math
 

@@ -14,8 +14,8 @@ STRIP = 256
 MULTIPLE = 16
 """Strips hold whole multiples of this many points; the padding has no amplitude."""
 STRIP_ROOM = STRIP + MULTIPLE + 8
-"""Length of a work array: a strip, and what the last group of a part may write beyond it. It is no power of two:
-arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
+"""Length of a work array: a strip, and room for the last group of a part, which may write beyond it. It is no power of
+two: arrays a whole 4096 bytes apart would make loads wait for unrelated stores."""
 
 
 class Placing(NamedTuple):

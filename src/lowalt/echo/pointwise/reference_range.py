@@ -30,6 +30,7 @@ def _fraction(r, r_lo, k, k_lo):
 
 @LEAN
 def _fill(place, radar, out):
+    """Fill `out` (N, 7) with the reference ranges of places (N, 3) m; `reference` names the columns."""
     for n in range(len(place)):
         h2, h2_lo = 0.0, 0.0
         for i in range(3):

@@ -33,6 +33,7 @@ def inner_rooms(room: str) -> list[str]:
 
 
 def _words(room: str) -> str:
+    """A room's purpose, broken into lines, and the names of its inner rooms."""
     inner = inner_rooms(room)
     rooms = [f"inner rooms: {', '.join(inner)}"] if inner else []
     return "\n".join([textwrap.fill(purpose(PACKAGE / room / "__init__.py"), WIDTH), *rooms])

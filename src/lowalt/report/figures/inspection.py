@@ -6,7 +6,7 @@ from matplotlib import pyplot as plt
 from lowalt.report.figures.style import png
 from lowalt.targets.inspection import Inspection
 
-VIEWS = ((0, 1), (1, 2), (0, 2))
+DIRECTIONS = ((0, 1), (1, 2), (0, 2))
 
 
 def _colours(found: Inspection) -> np.ndarray:
@@ -26,7 +26,7 @@ def inspection_picture(found: Inspection) -> bytes:
     half = 0.58 * float((found.high - found.low).max())
     front, up = "xyz".index(found.front), "xyz".index(found.up)
     right = 3 - front - up
-    for panel, (across, high) in zip(panels, VIEWS, strict=True):
+    for panel, (across, high) in zip(panels, DIRECTIONS, strict=True):
         panel.scatter(found.points[:, across], found.points[:, high], s=4, c=colours, linewidths=0)
         for part in found.components:
             if part.guess:

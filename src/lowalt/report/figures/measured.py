@@ -29,6 +29,7 @@ def read_pair(path: str | Path) -> dict:
 
 
 def _draw(panel: Axes, pair: dict, row: str, floor_db: float, fastest_mps: float | None):
+    """Draw one of the pair's images, `row`, over time and radial speed; return it for the colour bar."""
     speeds, times = pair["speeds_mps"], pair["times_s"]
     corners = (times[0], times[-1], speeds[0], speeds[-1])
     drawn = panel.imshow(pair[row], extent=corners, origin="lower", aspect="auto", vmin=floor_db, vmax=0)

@@ -8,7 +8,7 @@ from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
 from lowalt.targets.cloud import Cloud
 
-VIEWS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
+DIRECTIONS = {"UAV": (0, 1, "from above"), "Bird": (0, 2, "from the front"), "Vehicle": (1, 2, "from the side"),
          "Pedestrian": (1, 2, "from the side")}  # fmt: skip
 
 
@@ -17,7 +17,7 @@ def view_of(cloud: Cloud) -> tuple[int, int, str]:
     rotors = [abs(cloud.axes[part]) for part in cloud.parts_of("rotor")]
     if rotors and all(axis[1] > 0.9 for axis in rotors):
         return 0, 2, "from behind"
-    return VIEWS[cloud.like]
+    return DIRECTIONS[cloud.like]
 
 
 def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:

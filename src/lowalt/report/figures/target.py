@@ -22,7 +22,7 @@ from lowalt.spectra import Spectra, spectrum
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gallery import bones
 
-VIEWS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
+DIRECTIONS = (("from above", 0, 1), ("from the right", 1, 2), ("from behind", 0, 2))
 AXES = ("right x (m)", "front y (m)", "up z (m)")
 NORMALS = 150
 """Normals drawn at most: more would hide the points."""
@@ -32,6 +32,7 @@ CONFIG = SHIPPED / "config/default.yaml"
 
 
 def _colours(cloud: Cloud) -> np.ndarray:
+    """RGBA colour of each point (L, 4), by its part."""
     table = plt.get_cmap("tab20")
     parts = np.array(
         [(0.55, 0.55, 0.58, 1.0) if kind == "body" else table(i % 20) for i, kind in enumerate(cloud.kinds)]
@@ -46,6 +47,7 @@ def _limits(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _view(panel, cloud: Cloud, points: np.ndarray, view: tuple[str, int, int], middle: np.ndarray, half: float) -> None:
+    """Draw points (L, 3) m and the bones between them as seen along one axis, in a square of half width `half`."""
     title, across, up = view
     panel.scatter(points[:, across], points[:, up], s=6, c=_colours(cloud), linewidths=0)
     for bone in bones(cloud.names):
@@ -86,6 +88,7 @@ def _motion_row(cloud: Cloud, config: dict, seed: int) -> dict:
 
 
 def _decibel(values: np.ndarray) -> np.ndarray:
+    """Magnitudes relative to their largest, in dB, at least FLOOR_DB."""
     top = float(values.max())
     return (
         20 * np.log10(np.maximum(values, top * 10 ** (FLOOR_DB / 20)) / top)
@@ -131,7 +134,7 @@ def target_picture(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1) -> b
     figure, panels = plt.subplots(2, 3, figsize=(14, 8.6))
     points = cloud.track[0] if len(cloud.track) else cloud.points
     middle, half = _limits(points)
-    for panel, view in zip(panels[0], VIEWS, strict=True):
+    for panel, view in zip(panels[0], DIRECTIONS, strict=True):
         _view(panel, cloud, points, view, middle, half)
         _marks(panel, cloud, view, middle, half)
     _spectra(panels[1], cloud, row, config)
@@ -159,7 +162,7 @@ def target_animation(cloud: Cloud, config_path: Path = CONFIG, seed: int = 1, co
     pictures = []
     for number, points in enumerate(frames):
         figure, panels = plt.subplots(1, 3, figsize=(10, 3.9))
-        for panel, view in zip(panels, VIEWS, strict=True):
+        for panel, view in zip(panels, DIRECTIONS, strict=True):
             _view(panel, cloud, points, view, middle, half)
         figure.suptitle(
             f"{cloud.subtype}: {1000 * number / count * length:.4g} ms of a cycle of {1000 * length:.4g} ms"

@@ -23,6 +23,7 @@ def example_tiles(shards: ShardSet) -> list[tuple[str, bytes]]:
 
 
 def _picture(shards: ShardSet, number: int) -> bytes:
+    """PNG of a sample: the stored one, or one drawn from its signals."""
     if shards.kind == "image":
         return shards.png(number)
     buffer = io.BytesIO()

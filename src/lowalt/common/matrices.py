@@ -1,4 +1,4 @@
-"""Axes and rotations of space that follow from matrices 3 x 3, in the operations of `lowalt.common.portable`."""
+"""Matrices 3 x 3: the axis along which vectors spread least, and the nearest rotations, in portable operations."""
 
 import numpy as np
 
