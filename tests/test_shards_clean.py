@@ -120,7 +120,7 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
             for name in archive.getnames():
                 if name.endswith(".json"):
                     entry = json.load(archive.extractfile(name))
-                    seen += [(entry["model"], snr) for snr in clean.snrs_of(entry)]
+                    seen += [(entry["model"], snr) for snr in clean.sample_snrs(entry)]
     assert sorted(seen) == [(model, snr) for model in range(4) for snr in (3.0, 8.0, np.inf)]
 
 

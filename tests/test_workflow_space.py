@@ -60,7 +60,8 @@ def test_needs_are_sums_by_hand_and_what_is_there_is_not_counted():
     many = space.need([space.PlannedJob("tiles", CHUNK)] * 50, FIGURES, PLAN, CONFIG, 2)
     assert many.disk == 4 * 0.5 * 50 * 2 * 6 * 768**2
     # A job that takes both cores runs alone; the smaller jobs of one thread do not run meanwhile.
-    wide = space.need([space.PlannedJob("train", {}, threads=2), space.PlannedJob("noise", CHUNK)], FIGURES, PLAN, CONFIG, 2)
+    jobs = [space.PlannedJob("train", {}, threads=2), space.PlannedJob("noise", CHUNK)]
+    wide = space.need(jobs, FIGURES, PLAN, CONFIG, 2)
     assert wide.memory == wide.largest_job == 900e6 and wide.largest_rule == "train"
     assert space.need([space.PlannedJob("gallery", {})], FIGURES, PLAN, CONFIG, 1).unknown == ("gallery",)
 

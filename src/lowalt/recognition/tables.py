@@ -30,25 +30,14 @@ from lowalt.common.classes import word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
+from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent, reliability_rows
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
-from lowalt.recognition.statistics import (
-    LOOKED_FOR,
-    AlarmPart,
-    accuracy_by,
-    alarm_intervals,
-    alarm_rates,
-    calibration,
-    confusion,
-    measurable,
-    reliability,
-    threshold,
-)
+from lowalt.recognition.statistics import accuracy_by, confusion
 
-DETECTIONS = (0.9, 0.95, 0.99)
 F1 = ("macro_f1_percent", "macro_f1_low", "macro_f1_high")
 """Columns of accuracy.csv with macro F1 and the bounds of its 95 % interval."""
 TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train_s", "train_processor_s",
@@ -59,11 +48,6 @@ TRAINING = ("backbone", "weights", "parameters", "steps", "samples_seen", "train
 def snr_text(snr_db: float) -> str:
     """Return an SNR as the tables write it: "3", "2.5", "inf"."""
     return f"{snr_db:g}"
-
-
-def _percent(share: float) -> str:
-    """A share in percent, with four digits."""
-    return f"{100 * share:.4f}"
 
 
 def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]:
@@ -86,9 +70,9 @@ def accuracy_rows(runs: list[Evaluated], part: str, seed: int) -> Iterable[list]
     shares["avg"] = np.mean(list(shares.values()), axis=0).tolist()
     counts["avg"] = len(parts[0])
     for snr, values in shares.items():
-        spread = _percent(np.std(values, ddof=1)) if len(values) > 1 else ""
-        f1 = map(_percent, scores[snr])
-        yield [snr, _percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, len(values), spread]
+        spread = percent(np.std(values, ddof=1)) if len(values) > 1 else ""
+        f1 = map(percent, scores[snr])
+        yield [snr, percent(np.mean(values)), *f1, counts[snr], runs[0].hardware, len(values), spread]
 
 
 def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
@@ -97,7 +81,7 @@ def seed_rows(runs: list[Evaluated]) -> Iterable[list]:
         shares = [share for share, _ in accuracy_by(run.test.snr_db, run.test.correct).values()]
         known = [run.about.get(name, "") for name in TRAINING]
         took = [f"{value:.6g}" if isinstance(value, float) else value for value in known]
-        yield [run.seed, _percent(np.mean(shares)), *took, run.hardware]
+        yield [run.seed, percent(np.mean(shares)), *took, run.hardware]
 
 
 def confusion_rows(runs: list[Evaluated]) -> Iterable[list]:
@@ -116,7 +100,7 @@ def subtype_rows(runs: list[Evaluated]) -> Iterable[list]:
     correct = np.mean([run.test.correct for run in runs], axis=0)
     table = accuracy_by(test.subtype, correct)
     for name in sorted(table, key=lambda name: (classes.index(category[name]), table[name][0], name)):
-        yield [category[name], name, _percent(table[name][0]), table[name][1]]
+        yield [category[name], name, percent(table[name][0]), table[name][1]]
 
 
 def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray], width: float) -> Iterable[list]:
@@ -126,51 +110,7 @@ def band_rows(runs: list[Evaluated], values: Callable[[Predictions], np.ndarray]
     known = ~np.isnan(found)
     correct = np.mean([run.test.correct for run in runs], axis=0)
     for band, (share, count) in accuracy_by(np.floor(found[known] / width), correct[known]).items():
-        yield [f"{band * width:g}", f"{(band + 1) * width:g}", _percent(share), count]
-
-
-def _alarm_part(found: Predictions) -> AlarmPart:
-    """The data of predictions from which false alarms are counted."""
-    return AlarmPart(found.probabilities[:, LOOKED_FOR], found.label, found.motion, found.subtype)
-
-
-def alarm_rows(runs: list[Evaluated], seed: int) -> Iterable[list]:
-    """Yield rows [asked, threshold, rate, low, high, ...]: detection of the first class, then false alarms of others.
-
-    In percent, with 95 % intervals; thresholds come from validation samples. A detection that too few validation
-    samples can set a threshold for is "not measurable".
-    """
-    classes = len(runs[0].classes)
-    validations = [_alarm_part(run.part("validation")) for run in runs]
-    tests = [_alarm_part(run.test) for run in runs]
-    for asked in DETECTIONS if all((found.labels == LOOKED_FOR).any() for found in validations) else ():
-        if not measurable(validations[0].labels, asked):
-            yield [_percent(asked), *["not measurable"] * (1 + 3 * classes)]
-            continue
-        levels = [threshold(found.scores, found.labels, asked) for found in validations]
-        rates = []
-        for found, level in zip(tests, levels, strict=True):
-            detected, alarms = alarm_rates(found.scores, found.labels, level, classes)
-            rates.append([detected, *alarms])
-        whole = runs[0].protocol == "unseen"
-        generator = stream(seed, "alarms", runs[0].protocol, runs[0].scheme, asked)
-        bounds = alarm_intervals(validations, tests, asked, whole, generator, classes)
-        cells = [[_percent(rate), *map(_percent, pair)] for rate, pair in zip(np.mean(rates, 0), bounds, strict=True)]
-        yield [_percent(asked), repr(float(np.mean(levels))), *(cell for three in cells for cell in three)]
-
-
-def calibration_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [calibration_error, brier, cross_entropy] on the test part."""
-    found = [list(calibration(run.test.probabilities, run.test.label).values()) for run in runs]
-    yield [f"{value:.6f}" for value in np.mean(found, axis=0)]
-
-
-def reliability_rows(runs: list[Evaluated]) -> Iterable[list]:
-    """Yield rows [from, to, confidence_percent, accuracy_percent, samples] over bands of confidence."""
-    probabilities = np.concatenate([run.test.probabilities for run in runs])
-    labels = np.concatenate([run.test.label for run in runs])
-    for low, high, confidence, share, count in reliability(probabilities, labels):
-        yield [f"{low:.4f}", f"{high:.4f}", _percent(confidence), _percent(share), count]
+        yield [f"{band * width:g}", f"{(band + 1) * width:g}", percent(share), count]
 
 
 def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) -> Iterable[list]:
@@ -188,7 +128,7 @@ def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) 
     generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme)
     interval = strict_difference(ours, theirs, count, one.subtype[place], whole, generator)
     levels = ["seeds"] * (seeds > 1) + ["subtypes"] * whole + ["motion models"]
-    yield [", ".join(levels), seeds, *map(_percent, interval)]
+    yield [", ".join(levels), seeds, *map(percent, interval)]
 
 
 def _write(path: Path, columns: list[str], rows: list[list]) -> None:

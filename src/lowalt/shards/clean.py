@@ -55,7 +55,7 @@ def packed(
     return json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
 
 
-def snrs_of(entry: dict) -> list[float]:
+def sample_snrs(entry: dict) -> list[float]:
     """Return the SNRs (dB) of a motion model's samples by its parsed record, +inf for no noise.
 
     Raises: InputError where the record is not one of a shard of kind `recipe`.
@@ -70,8 +70,8 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
 
     Raises: InputError where the model has no sample of this SNR.
     """
-    if snr_db not in snrs_of(entry):
-        raise InputError(f"record of {entry['key']}: SNRs {snrs_of(entry)} dB, expected {snr_db} dB among them")
+    if snr_db not in sample_snrs(entry):
+        raise InputError(f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them")
     kept = {name: value for name, value in entry.items() if name not in (POWER, CANCELLER)}
     kept |= {"key": sample_key(entry["subtype"], entry["model"], snr_db), "noise": not math.isinf(snr_db)}
     kept["snr_db"] = NO_NOISE_DB if math.isinf(snr_db) else snr_db
@@ -106,7 +106,7 @@ def samples(models: Iterable[dict]) -> Iterator[dict]:
         entry = json.loads(entry) if isinstance(entry, (bytes, str)) else entry
         stored = np.lib.format.read_array(io.BytesIO(stored)) if isinstance(stored, bytes) else np.asarray(stored)
         clean, stations = complex_signals(stored), list(entry["geometry"])
-        for snr_db in snrs_of(entry):
+        for snr_db in sample_snrs(entry):
             record = json.loads(unpacked(entry, snr_db))
             signal = noisy(entry, clean, stations, snr_db)
             parts = np.ascontiguousarray(signal).view(np.float32).reshape(*signal.shape, 2)
