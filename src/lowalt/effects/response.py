@@ -100,7 +100,7 @@ class Rays:
         radio, refs = self.radio, self.refs
         strength = radio.scale * np.atleast_2d(strength)
         own_routes = strength.ndim == 3
-        own, whole = np.exp(-2j * np.pi * refs[:, 4]), refs[:, 5].astype(np.int64)
+        own, whole = np.exp(-2j * np.pi * refs[:, TURN]), refs[:, CELL].astype(np.int64)
         result = np.zeros((len(refs), radio.subcarriers), np.complex128)
         for a, b, times in self.pairs:
             there, home = self.out[a], self.back[b]
@@ -121,7 +121,7 @@ class Rays:
                 mix, table = tables.joined(reach, len(self.nodes), radio.subcarriers, self.rest)
                 planes = planes @ mix
             planes = (planes @ table).reshape(len(refs), 2, -1)
-            moment_loops.delayed(planes, own, whole, refs[:, 6] + middle, result)
+            moment_loops.delayed(planes, own, whole, refs[:, REST] + middle, result)
         return result
 
 

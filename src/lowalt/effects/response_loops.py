@@ -11,6 +11,7 @@ import numpy as np
 from lowalt.common.jit import kernel
 from lowalt.echo.fast.polynomials import smooth
 from lowalt.echo.fast.vector_loops import horner
+from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 from lowalt.echo.pointwise.terms import dirichlet
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
@@ -88,7 +89,7 @@ def one_way(
     wave = half_turns if squint else 0.5 * kappas[0] / spacing
     each = min(1, coefficient.shape[1] - 1)
     for n in range(places.shape[0]):
-        rx, ry, rz, r_ref = refs[n, 0], refs[n, 1], refs[n, 2], refs[n, 3]
+        rx, ry, rz, r_ref = refs[n, X], refs[n, Y], refs[n, Z], refs[n, RANGE]
         ox, oy, oz = origin[n, 0], origin[n, 1], origin[n, 2]
         least = np.inf
         for i in range(count):

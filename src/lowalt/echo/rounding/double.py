@@ -11,7 +11,7 @@ from lowalt.common.exact.arithmetic import scale
 from lowalt.common.exact.constants import taylor
 from lowalt.common.exact.sines import fraction, odd_sign
 from lowalt.common.jit import INLINED, LEAN
-from lowalt.echo.rounding.sums import constants_of, patterns, phase_of, seen
+from lowalt.echo.rounding.sums import AMPLITUDE, CELL, TURN, constants_of, patterns, phase_of, seen
 
 LANES = 8
 """Sums that run side by side: point i is added to sum i modulo 8. The padding of points is a multiple of it."""
@@ -58,27 +58,27 @@ def dirichlet(x, count):
 
 @LEAN
 def times_dirichlet(work, row, count, twice, points):
-    """Multiply the amplitudes (row 14) by U_{count-1} of a row's half turns, or by its square."""
+    """Multiply the amplitudes (row AMPLITUDE) by U_{count-1} of a row's half turns, or by its square."""
     row, below = np.uint64(row), np.uint64(row + 1)
     for i in range(np.uint64(points)):
         u = dirichlet((work[row, i], work[below, i]), count)
-        work[14, i] *= u * u if twice else u
+        work[AMPLITUDE, i] *= u * u if twice else u
 
 
 @LEAN
 def wave(work, points):
-    """Replace rows 12 and 13 by the real and imaginary parts of all points."""
+    """Replace row CELL and the row below it by the real and imaginary parts of all points."""
     for i in range(np.uint64(points)):
-        high = work[10, i]
+        high = work[TURN, i]
         quarter = np.rint(4.0 * high)
-        f = (high - 0.25 * quarter) + work[11, i]
+        f = (high - 0.25 * quarter) + work[TURN + 1, i]
         square = f * f
         s, c = f * polynomial(square, _SINE), polynomial(square, _COSINE)
         q = quarter - 4.0 * np.floor(0.25 * quarter)
         odd = q == 1.0 or q == 3.0
-        a = work[14, i]
-        work[12, i] = (-a if q == 1.0 or q == 2.0 else a) * (s if odd else c)
-        work[13, i] = (-a if q >= 2.0 else a) * (c if odd else s)
+        a = work[AMPLITUDE, i]
+        work[CELL, i] = (-a if q == 1.0 or q == 2.0 else a) * (s if odd else c)
+        work[CELL + 1, i] = (-a if q >= 2.0 else a) * (c if odd else s)
 
 
 @INLINED
@@ -107,6 +107,6 @@ def cell_value(scene, lay, radar, n, cell, work):
             times_dirichlet(work, row, elements, squared, points)
     wave(work, points)
     factor = constants_of(radar.exact).scale[0] / float(radar.subcarriers)
-    real, imag = factor * added(work, 12, points), factor * added(work, 13, points)
+    real, imag = factor * added(work, CELL, points), factor * added(work, CELL + 1, points)
     s, c = phase_of(cell, radar.subcarriers)
     return real * c[0] - imag * s[0], real * s[0] + imag * c[0]

@@ -57,19 +57,19 @@ def cosines(x, y, z, constants):
 def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
     """Fill rows SIDE to AMPLITUDE from X, Y, Z; aims: the beams' direction cosines; cell, count: whole doubles."""
     for i in range(np.uint64(len(root_rcs))):
-        x, y, z = (work[0, i], work[1, i]), (work[2, i], work[3, i]), (work[4, i], work[5, i])
+        x, y, z = (work[X, i], work[X + 1, i]), (work[Y, i], work[Y + 1, i]), (work[Z, i], work[Z + 1, i])
         r, inverse, psi, omega = cosines(x, y, z, constants)
         psi, omega = subtract(psi, aims[0]), subtract(omega, aims[1])
-        work[6, i], work[7, i] = multiply(constants.half_kappa, psi)
-        work[8, i], work[9, i] = multiply(constants.half_kappa, omega)
+        work[SIDE, i], work[SIDE + 1, i] = multiply(constants.half_kappa, psi)
+        work[UP, i], work[UP + 1, i] = multiply(constants.half_kappa, omega)
         turn = add(multiply(constants.phase_h, psi), multiply(constants.phase_v, omega))
-        work[10, i], work[11, i] = subtract(turn, multiply(constants.turns, r))
+        work[TURN, i], work[TURN + 1, i] = subtract(turn, multiply(constants.turns, r))
         away = subtract((cell, 0.0), multiply(constants.cells, r))
-        work[12, i], work[13, i] = divide(away, (count, 0.0))
+        work[CELL, i], work[CELL + 1, i] = divide(away, (count, 0.0))
         high = root_rcs[i]
         p, e = product(high, high)
         low = ((rcs_m2[i] - p) - e) / (2.0 * high if high > 0.0 else 1.0)
-        work[14, i], work[15, i] = multiply((high, low), multiply(inverse, inverse))
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply((high, low), multiply(inverse, inverse))
 
 
 @INLINED
@@ -82,11 +82,11 @@ def patterns(radar):
     """
     like_h, like_v = radar.transmit_h == radar.receive_h, radar.transmit_v == radar.receive_v
     return (
-        (6, float(radar.transmit_h), like_h),
-        (6, 1.0 if like_h else float(radar.receive_h), False),
-        (8, float(radar.transmit_v), like_v),
-        (8, 1.0 if like_v else float(radar.receive_v), False),
-        (12, float(radar.subcarriers), False),
+        (SIDE, float(radar.transmit_h), like_h),
+        (SIDE, 1.0 if like_h else float(radar.receive_h), False),
+        (UP, float(radar.transmit_v), like_v),
+        (UP, 1.0 if like_v else float(radar.receive_v), False),
+        (CELL, float(radar.subcarriers), False),
     )
 
 
@@ -98,17 +98,17 @@ def times_dirichlet(work, row, count, twice, points):
         u = dirichlet((work[row, i], work[below, i]), count)
         if twice:
             u = multiply(u, u)
-        work[14, i], work[15, i] = multiply((work[14, i], work[15, i]), u)
+        work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply((work[AMPLITUDE, i], work[AMPLITUDE + 1, i]), u)
 
 
 @LEAN
 def wave(work, points):
     """Replace rows TURN and CELL by the real and imaginary parts of all points."""
     for i in range(np.uint64(points)):
-        s, c = sine_cosine((work[10, i], work[11, i]))
-        a = (work[14, i], work[15, i])
-        work[10, i], work[11, i] = multiply(a, c)
-        work[12, i], work[13, i] = multiply(a, s)
+        s, c = sine_cosine((work[TURN, i], work[TURN + 1, i]))
+        a = (work[AMPLITUDE, i], work[AMPLITUDE + 1, i])
+        work[TURN, i], work[TURN + 1, i] = multiply(a, c)
+        work[CELL, i], work[CELL + 1, i] = multiply(a, s)
 
 
 @INLINED
@@ -143,7 +143,7 @@ def cell_value(scene, lay, radar, n, cell, work):
     wave(work, points)
     real, imag = (0.0, 0.0), (0.0, 0.0)
     for i in range(points):
-        real, imag = add(real, (work[10, i], work[11, i])), add(imag, (work[12, i], work[13, i]))
+        real, imag = add(real, (work[TURN, i], work[TURN + 1, i])), add(imag, (work[CELL, i], work[CELL + 1, i]))
     factor = divide(constants_of(radar.exact).scale, (float(radar.subcarriers), 0.0))
     real, imag = multiply(real, factor), multiply(imag, factor)
     s, c = phase_of(cell, radar.subcarriers)
