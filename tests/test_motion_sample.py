@@ -1,0 +1,100 @@
+"""Motion models: the table's round trip, ranges of draws, named streams, and the region between the masts."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.motion import read_table, write_table
+from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.table import NUMBERS
+from lowalt.targets.cloud import Cloud
+from moving_clouds import rigid_cloud, row
+
+MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])
+MOTION = {
+    "region": {"polygon_m": None, "mast_clearance_m": 10.0},
+    "height_m": {"UAV": [30.0, 150.0], "Bird": [20.0, 120.0]},
+    "tilt_deg": 20.0,
+    "cadence": "free",
+}
+
+
+def test_the_table_reads_back_the_same_bits(tmp_path):
+    rng = np.random.default_rng(2)
+    rows = [row(**{name: float(rng.normal()) for name in NUMBERS}, model=index) for index in range(5)]
+    rows[1]["start_s"] = math.nan
+    path = tmp_path / "motion.csv"
+    write_table(path, rows)
+    back = read_table(path)
+    for was, now in zip(rows, back, strict=True):
+        assert all(was[name] == now[name] or (was[name] != was[name] and now[name] != now[name]) for name in was)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace("x_m", "x_km", 1), "columns"),
+        (lambda text: text.replace("0.0", "zero", 1), "line 2, column x_m: 'zero'"),
+        (lambda text: text.rsplit(",", 1)[0] + "\n", "cells"),
+    ],
+)
+def test_a_broken_table_is_refused_with_its_place(tmp_path, change, words):
+    path = tmp_path / "motion.csv"
+    write_table(path, [row()])
+    path.write_text(change(path.read_text()))
+    with pytest.raises(InputError, match=words):
+        read_table(path)
+
+
+def test_models_stay_in_their_ranges_and_streams_are_named():
+    corners = region_polygon(MASTS, None)
+    cloud = rigid_cloud("rotor", "UAV")
+    ranges = {"freq_lo_hz": 80, "freq_hi_hz": 256, "vx_abs_max": 10, "vy_abs_max": 5, "vz_abs_max": 3}
+    rows = [draw(stream(7, "motion", "test", i), cloud, ranges, MASTS, corners, MOTION) for i in range(300)]
+    for drawn in rows:
+        assert 80 <= drawn["rate_hz"] <= 256
+        assert abs(drawn["vy_mps"]) <= 5
+        assert 30 <= drawn["z_m"] <= 150
+        assert np.hypot(*(MASTS - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
+        assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+    # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
+    mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
+    assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)
+    again = draw(stream(7, "motion", "test", 4), cloud, ranges, MASTS, corners, MOTION)
+    assert {k: v for k, v in again.items() if v == v} == {k: v for k, v in rows[4].items() if v == v}
+
+
+def test_two_stations_need_a_polygon():
+    with pytest.raises(InputError, match="polygon_m"):
+        region_polygon(MASTS[:2], None)
+
+
+def test_the_hull_of_many_stations_is_the_region_and_bad_polygons_are_refused():
+    square = np.array([[0, 0], [0, 10], [10, 0], [10, 10], [4, 5]], dtype=float)
+    assert sorted(map(tuple, region_polygon(square, None))) == sorted(map(tuple, square[:4]))
+    with pytest.raises(InputError, match="not convex"):
+        region_polygon(square, square.tolist())
+    with pytest.raises(InputError, match="flat"):
+        region_polygon(square, [[0, 0], [1, 1], [2, 2]])
+
+
+@pytest.mark.parametrize(("cadence", "tied"), [("free", False), ("tied", True)])
+def test_cadence_follows_speed_only_where_tied(cadence, tied):
+    track = np.random.default_rng(3).normal(size=(12, 31, 3))
+    nothing = np.full((31, 3), np.nan)
+    record = {"subtype": "t", "category": "Pedestrian", "source": "", "checksum": "", "origin_height_m": 0.9}
+    cloud = Cloud(
+        points=track[0], part=np.arange(31), kinds=("node",) * 31, names=tuple(map(str, range(31))),
+        parents=np.full(31, -1), hinges=nothing, axes=nothing, normals=nothing, rcs_m2=np.ones(31), track=track,
+        record={**record, "track_rate_hz": 120.0, "track_speed_mps": 1.25},
+    )  # fmt: skip
+    settings, ranges = {**MOTION, "cadence": cadence}, {"speed_lo": 0.2, "speed_hi": 1.5}
+    drawn = draw(stream(1, "m"), cloud, ranges, MASTS, region_polygon(MASTS, None), settings)
+    speed = math.hypot(drawn["vx_mps"], drawn["vy_mps"])
+    assert 0.2 <= speed <= 1.5
+    assert drawn["z_m"] == 0.9
+    assert 0 <= drawn["start_s"] < 12 / 120
+    assert drawn["playback"] == pytest.approx(speed / 1.25 if tied else 1.0)
