@@ -10,16 +10,18 @@ import every_effect
 from every_effect import NUMBERS_OF_A_SCENE, case, change
 
 
-def drawn(count: int, seed: int) -> tuple[Counter, float]:
-    """How many of `count` random scenes name each effect, and the largest change over its tolerance."""
-    named, most = Counter(), 0.0
+def drawn(count: int, seed: int) -> tuple[Counter, float, list[tuple]]:
+    """How many of `count` random scenes name each effect, the largest change over its tolerance, and the scenes that
+    change more than that: (index, change over tolerance, tolerance, effects)."""
+    named, most, broken = Counter(), 0.0, []
     for index in range(count):
         one = case(np.random.default_rng([seed, index]).random(NUMBERS_OF_A_SCENE))
         share = change(one)
-        assert share <= 1, (seed, index, share, one.tolerance, one.effects)
+        if not share <= 1:
+            broken.append((index, share, one.tolerance, one.effects))
         named.update(list(one.effects))
         most = max(most, share)
-    return named, most
+    return named, most, broken
 
 
 def test_every_effect_of_the_catalogue_can_be_in_a_random_scene():
@@ -27,12 +29,15 @@ def test_every_effect_of_the_catalogue_can_be_in_a_random_scene():
 
 
 def test_random_scenes_of_all_effects_keep_their_tolerance():
-    drawn(25, 3)
+    named, most, broken = drawn(25, 3)
+    assert not broken
+    assert len(named) > 20 and most > 1e-6
 
 
 @pytest.mark.slow
 def test_1000_random_scenes_of_all_effects_keep_their_tolerance():
-    named, most = drawn(1000, 4)
+    named, most, broken = drawn(1000, 4)
+    assert not broken
     print(f"1000 scenes, largest change {most:.3f} of the tolerance; scenes that name each effect: {dict(named)}")
     assert set(named) == set(every_effect.NAMES) and min(named.values()) >= 20
     assert most > 1e-3

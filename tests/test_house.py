@@ -50,6 +50,48 @@ def test_every_module_says_what_it_holds():
     assert not bare
 
 
+def python_files(*folders: str) -> list[Path]:
+    """The Python files below these folders of the repository."""
+    return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def functions(path: Path) -> list[ast.FunctionDef]:
+    """All functions of a file, with those inside classes and other functions."""
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
+
+
+def test_every_function_says_what_it_does():
+    bare = [
+        f"{path.name}: {node.name}"
+        for path in python_files("src", "benchmarks")
+        for node in functions(path)
+        if not node.name.startswith("__") and not ast.get_docstring(node)
+    ]
+    assert not bare
+
+
+LONG = {
+    "one_way": "a compiled loop over points and frequencies; functions for its parts would take ten numbers a point",
+    "triangles": "a compiled loop over points and triangles; functions for its parts would take ten numbers a pair",
+}
+"""Functions that may have more than 60 lines, with the reason."""
+
+
+def test_functions_have_at_most_60_lines_and_files_250():
+    files = python_files("src", "benchmarks", "tests", "docs", "examples")
+    lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in files}
+    long = [f"{path.name}: {node.name}" for path in files for node in functions(path)
+            if node.end_lineno - node.lineno >= 60 and node.name not in LONG]  # fmt: skip
+    assert not long
+    assert not {str(path): count for path, count in lines.items() if count > 250}
+
+
+def test_no_name_of_a_class_stands_for_two_things():
+    defined = [node.name for path in python_files("src/lowalt") for node in ast.parse(path.read_text()).body
+               if isinstance(node, ast.ClassDef)]  # fmt: skip
+    assert not {name for name in defined if defined.count(name) > 1}
+
+
 def test_no_tracked_file_is_large_or_names_this_machine():
     tracked = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True)
     if tracked.returncode:

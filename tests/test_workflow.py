@@ -18,7 +18,7 @@ from lowalt.common.network import Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, read_table
 from lowalt.targets.cloud import read
-from lowalt.workflow.sources import PACKAGE, sources
+from snakemake_texts import MODULE, RULES, SPY, declared
 
 pytest.importorskip("snakemake")
 pytestmark = pytest.mark.workflow
@@ -30,29 +30,6 @@ OVERLAY = {
     "motion": {"models": 20, "models_per_chunk": 10},
     "noise": {"snr_db": [8, float("inf")]},
 }
-
-
-# Python imports this by itself at start: every job notes its command and the package's modules it ended up with.
-SPY = """
-import atexit, os, pathlib, sys, uuid
-
-def note():
-    files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
-    base = os.environ["LOWALT_TEST_PACKAGE"]
-    files = sorted(os.path.relpath(file, base) for file in files if file.startswith(base))
-    if files and sys.argv[0].startswith(base):
-        command = os.path.relpath(sys.argv[0], base), sys.argv[1]
-        lines = "\\n".join([" ".join(command), *files])
-        pathlib.Path(os.environ["LOWALT_TEST_IMPORTS"], uuid.uuid4().hex).write_text(lines)
-
-if "LOWALT_TEST_IMPORTS" in os.environ:
-    atexit.register(note)
-"""
-RULES = {
-    "targets/__main__.py": "cloud", "targets/gallery.py": "gallery", "motion/__main__.py": "motion",
-    "echo/__main__.py": "echo", "noise/__main__.py": "noise", "tiles/__main__.py": "tiles",
-    "shards/__main__.py write": "shard", "shards/__main__.py index": "index", "shards/card.py": "card",
-}  # fmt: skip
 
 
 def workplace(folder: Path) -> Path:
@@ -205,17 +182,6 @@ def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(fini
     assert changed == 40
 
 
-def declared(rule: str) -> set[str]:
-    """The source files a rule declares as its code, relative to the package, from the arguments in its rule file."""
-    text = "\n".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
-    body = re.search(rf"^rule {rule}:\n(.*?)(?=^rule |\Z)", text, re.MULTILINE | re.DOTALL)[1]
-    arguments = re.search(r"code=code\((.*?)\)", body, re.DOTALL)[1]
-    modules = re.findall(r'"([\w.]+)"', arguments)
-    if "SOURCE_MODULES" in arguments:
-        modules += [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
-    return {str(path.relative_to(PACKAGE)) for path in sources(*modules, spectra=("vrp", "trp", "vt"))}
-
-
 def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
     seen = {}
     for path in (finished / "imports").iterdir():
@@ -239,24 +205,6 @@ def test_any_one_sample_is_made_again_alone_from_its_row(finished):
     alone = echo_signal(network, network.station("B"), motion, cloud.rcs_m2, aim).signal
     stored = np.load(base / "echo/unseen-00001/B.npy")[number]
     np.testing.assert_array_equal(alone.astype(np.complex64), stored)
-
-
-MODULE = """
-configfile: "{root}/config/default.yaml"
-configfile: "{root}/overlay.yaml"
-
-module lowalt:
-    snakefile: "{root}/Snakefile"
-    config: config
-
-use rule * from lowalt as lowalt_*
-
-rule size:
-    default_target: True
-    input: "results/test/motion/unseen-00001.csv"
-    output: "size.txt"
-    shell: "wc -c < {{input}} > {{output}}"
-"""
 
 
 def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, tmp_path):

@@ -1,4 +1,4 @@
-"""The workflow's logic without Snakemake: names, files and settings that follow from a configuration."""
+"""The workflow's logic without Snakemake: names and files that follow from a configuration."""
 
 import json
 import os
@@ -10,43 +10,20 @@ from types import SimpleNamespace
 import pytest
 import yaml
 
-from lowalt.common.config import merge, plain
+from configured import parts, run_of
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.effects.catalogue import PLACES
-from lowalt.report.inputs import KEPT, OPTIONAL
-from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
-from lowalt.workflow.effect_calls import EffectCalls
-from lowalt.workflow.products import FIDELITY, Products
-from lowalt.workflow.run import Run
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.products import FIDELITY
 
 ROOT = Path(__file__).parent.parent
-SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
-
-
-class Inputs(dict):
-    """A job's inputs by name, read as items or attributes, as Snakemake gives them."""
-
-    __getattr__ = dict.__getitem__
 
 
 @pytest.fixture(autouse=True)
 def checkout(monkeypatch):
     """Paths of the default configuration are relative to the checkout."""
     monkeypatch.chdir(ROOT)
-
-
-def run_of(overlay: dict | None = None, inputs: str | None = None) -> Run:
-    return Run.of(merge(load_yaml("config/default.yaml"), overlay or {}), SCHEMA, inputs)
-
-
-def parts(overlay: dict | None = None) -> tuple[Run, Products, Settings]:
-    run = run_of(overlay)
-    calls = EffectCalls(run)
-    return run, Products(run, calls), Settings(run, calls)
 
 
 def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
@@ -173,52 +150,6 @@ def test_training_reads_images_of_the_scheme_s_own_size():
     assert uncached.samples(SimpleNamespace(scheme="x")) == {"index": "results/default/shards/index.json"}
 
 
-@pytest.mark.parametrize(
-    ("overlay", "changed"),
-    [
-        ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table", "cost_pixels"}),
-        ({"noise": {"snr_db": [9]}}, {"noise", "shard", "views"}),
-        ({"tiles": {"reduced": [48]}}, {"views"}),
-        ({"images": {"gamma": 0.7}}, {"images", "cost_pixels"}),
-        ({"images": {"colour_map": "magma"}}, {"images", "cost_pixels", "training"}),
-        ({"recognition": {"training": {"steps": 7}}}, {"training"}),
-        ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation", "effects_table"}),
-        ({"split": {"val": 2, "train": 7}}, {"shard"}),
-        ({"echo": {"tolerance": 1e-3}}, {"echo", "echo_in_scene"}),
-    ],
-)
-def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
-    job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
-    names = (
-        "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "cost_pixels", "views",
-        "training", "evaluation", "seed", "effects_table",
-    )  # fmt: skip
-    before, after = parts()[2], parts(overlay)[2]
-    assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
-    # The whole configuration stands next to the results and in the report.
-    assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
-
-
-def test_settings_of_different_jobs_differ_and_are_json():
-    _, _, settings = parts()
-    one, other = (SimpleNamespace(run="default", group=group, part="00000") for group in ("seen", "unseen"))
-    drawn = [set(json.loads(settings.motion(job))["published"]) for job in (one, other, one)]
-    assert drawn[0] == drawn[2] and drawn[0].isdisjoint(drawn[1])
-    assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
-
-
-def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
-    run, products, settings = parts()
-    calls = EffectCalls(run)
-    assert list(calls.all) == ["none", *PLACES, "urban", "worst"]
-    assert products.call_samples(CHUNK)[0] == "results/default/effects/seen-worst.npz"
-    occluded = SimpleNamespace(run="default", group="seen", call="occlusion")
-    assert len(products.call_occluders(occluded)) == 20
-    assert json.loads(settings.effect_samples(occluded))["effects"] == {"occlusion": {}}
-    with pytest.raises(InputError, match="no call 'nothing'"):
-        calls.named("nothing")
-
-
 def test_a_run_on_another_s_data_reads_there_and_refuses_other_settings(tmp_path, monkeypatch):
     overlay = {"run": "mine", "data": "default", "recognition": {"training": {"steps": 9}}}
     made = tmp_path / "results/default/config.yaml"
@@ -247,35 +178,6 @@ def test_the_table_of_other_runs_is_named_with_its_command_where_it_is_missing(t
     Path(FIDELITY).parent.mkdir(parents=True)
     Path(FIDELITY).touch()
     assert products.fidelity(CHUNK) == FIDELITY
-
-
-def test_options_stand_only_where_their_input_does():
-    none = Inputs(occluders="", powers="", index="i")
-    every = Inputs(occluders="o", powers="p", views="v w", tiles="t")
-    found = {name: getattr(options, name) for name in ("occluders", "powers", "content")}
-    assert {name: build(CHUNK, none) for name, build in found.items()} == dict.fromkeys(found, "")
-    assert [build(CHUNK, every) for build in found.values()] == [
-        "--occluders o", "--powers p", "--tiles t --powers p",
-    ]  # fmt: skip
-    assert (options.samples(CHUNK, none), options.samples(CHUNK, every)) == ("--index i", "--views v w")
-
-
-def test_the_report_s_files_are_a_manifest_that_the_report_takes():
-    shown = {"cost": True, "effects": True, "accuracy": "a.csv", "published": "config/published_accuracy.csv"}
-    for overlay, names in (
-        ({"report": {"cost": False}}, set()),
-        (
-            {"report": shown, "recognition": {"transfer": ["other"]}},
-            {"transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects", "effects_figure"},
-        ),
-    ):
-        _, products, _ = parts(overlay)
-        files = ReportInputs(products.report(CHUNK)).files
-        kept = {name for name in files if name.startswith("kept_")}
-        assert kept == {f"kept_{name}" for name in KEPT}
-        assert names == (set(files) & set(OPTIONAL)) - {"published"} - kept
-        assert len(files["clouds"]) == 40 and files["index"] == "results/default/shards/index.json"
-    assert "src/lowalt/report/sections/accuracy.html" in products.page_templates(CHUNK)
 
 
 def test_a_run_that_transfers_from_itself_is_refused():

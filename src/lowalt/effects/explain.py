@@ -30,7 +30,7 @@ from lowalt.targets.records import records_of
 REPEATS = 3
 
 
-class Sample(NamedTuple):
+class ExplainedSample(NamedTuple):
     """One motion model to explain the scene by."""
 
     cloud: Cloud
@@ -38,7 +38,7 @@ class Sample(NamedTuple):
     occluders: dict | None
 
 
-def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> list[Sample]:
+def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> list[ExplainedSample]:
     """Return the motion models `named` (subtype, number), or the first model of each category's first subtype.
 
     Clouds and motion are made as the workflow makes them, so a sample is the one the data set holds.
@@ -69,12 +69,12 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
 
             occluders = surfaces.make(record, inputs, config["seed"]) | {"subtype": name}
         result.append(
-            Sample(cloud, {**row, "group": record["published"]["unseen_protocol"], "model": model}, occluders)
+            ExplainedSample(cloud, {**row, "group": record["published"]["unseen_protocol"], "model": model}, occluders)
         )
     return result
 
 
-def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, float]:
+def costs(scene: Scene, chosen: list[ExplainedSample], station_name: str) -> dict[str, float]:
     """Return milliseconds a sample and station: "base", each effect added alone to the base, and "together"."""
     station = scene.network.station(station_name)
 
@@ -92,7 +92,7 @@ def costs(scene: Scene, chosen: list[Sample], station_name: str) -> dict[str, fl
     return result | {"together": mean(scene.effects)}
 
 
-def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
+def sample_lines(scene: Scene, sample: ExplainedSample, station_name: str) -> list[str]:
     """Return lines that name the effects computed for one sample at one station, with their bounds."""
     station = scene.network.station(station_name)
     cloud = with_cross_sections(scene, sample.cloud)
@@ -119,7 +119,7 @@ def sample_lines(scene: Scene, sample: Sample, station_name: str) -> list[str]:
     return lines
 
 
-def link_lines(scene: Scene, view: View, sample: Sample) -> list[str]:
+def link_lines(scene: Scene, view: View, sample: ExplainedSample) -> list[str]:
     """Return lines on one sample of a link between two stations: geometry, Doppler factor, level of the echo."""
     station = view.station
     ends = [np.asarray(one.position_m) - view.aim_m for one in (station.transmitter, station)]

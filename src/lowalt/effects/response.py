@@ -55,11 +55,11 @@ def response(
     Raises: InputError for a point in the station, or a link with other paths. Source: paper Eqs. 4, 7 and 24;
     Jacobi-Anger expansion; Willis, Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
-    rays = Rays(network, station, places, aim_m, paths, squint=squint, wavefront=wavefront, error=error)
+    rays = OneWayFactors(network, station, places, aim_m, paths, squint=squint, wavefront=wavefront, error=error)
     return rays.summed(np.sqrt(rcs_m2) * factor)
 
 
-class Rays:
+class OneWayFactors:
     """All points' one-way factors over every path at given instants, from which responses to any strengths follow.
 
     The arguments are those of `response`.

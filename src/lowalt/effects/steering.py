@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
-from lowalt.effects.response import ImagePath, Rays
+from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
 
 
@@ -28,13 +28,15 @@ class Steered:
         self.view, asked = view, {"squint": squint, "wavefront": wavefront, "error": error}
         given = view.network, view.station
         if view.beams is None or len(view.beams.starts_s) == 1:
-            self.beams = [(slice(None), 1.0, Rays(*given, view.places, view.aim_m, paths, **asked))]
+            self.beams = [(slice(None), 1.0, OneWayFactors(*given, view.places, view.aim_m, paths, **asked))]
             return
         self.beams = []
         for number, rows in view.beam_rows():
             some = [ImagePath(path.places[rows], _rows_of(path.coefficient, rows)) for path in paths]
             aim = view.beams.aims_m[number]
-            self.beams.append((rows, _kept_phase(view, aim), Rays(*given, view.places[rows], aim, some, **asked)))
+            self.beams.append(
+                (rows, _kept_phase(view, aim), OneWayFactors(*given, view.places[rows], aim, some, **asked))
+            )
 
     def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
         """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`.

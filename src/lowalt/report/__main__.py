@@ -9,7 +9,7 @@ from lowalt.common.files import replacing
 from lowalt.report.inputs import Inputs
 from lowalt.report.page import contents, page, plots
 from lowalt.report.plots import write_plots
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.report.sections.stages import write_stages
 
 
@@ -24,7 +24,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--figures", required=True, type=Path, help="folder of the plots to write (.svg, .csv)")
     options.add_argument("--out", required=True, help="page to write (.html)")
     given = options.parse_args(arguments)
-    reported = Run(Inputs.read(given.manifest), *pick(given.settings, "config", "published"))
+    reported = ReportedRun(Inputs.read(given.manifest), *pick(given.settings, "config", "published"))
     write_stages(given.stages, reported)
     values = contents(reported)
     text = page(reported, values)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import jinja2
 
 from lowalt.report.plots import Plot, plotted, scripts
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
     accuracy_cost,
@@ -87,7 +87,7 @@ def section_page(title: str, name: str, values: dict) -> str:
     return assembled(title, [{"id": name, "title": title, "html": rendered(name, values)}])
 
 
-def contents(run: Run) -> dict[str, dict | None]:
+def contents(run: ReportedRun) -> dict[str, dict | None]:
     """Return the values of every section by its name.
 
     Raises: InputError for a table that is missing or lacks a column.
@@ -105,7 +105,7 @@ def plots(values: dict[str, dict | None]) -> list[Plot]:
     return [held for section in values.values() for held in (section or {}).values() if isinstance(held, Plot)]
 
 
-def page(run: Run, values: dict[str, dict | None]) -> str:
+def page(run: ReportedRun, values: dict[str, dict | None]) -> str:
     """Return the whole page of the sections' values."""
     parts = []
     for part in PARTS:

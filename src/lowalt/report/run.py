@@ -9,7 +9,7 @@ from lowalt.report.tables import stage_times
 from lowalt.shards import ShardSet
 
 
-class Run:
+class ReportedRun:
     """The run that a page shows."""
 
     def __init__(self, inputs: Inputs, config: dict, targets: dict[str, dict]) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv
 from lowalt.report.figures.accuracy_plots import over_snr
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.report.tables import by_scheme, macro_f1, spreads
 
 COLUMNS = ("protocol", "scheme", "snr_db", "accuracy_percent")
@@ -22,7 +22,7 @@ def network_words(block: dict) -> str:
     )
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return accuracies of this run and of the paper, their figure, and the network in words."""
     measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
     ours = by_scheme(measured)

@@ -3,12 +3,12 @@
 from lowalt.report.figures import cost_plots
 from lowalt.report.figures.accuracy_cost import FIDELITY, NEEDED, draw
 from lowalt.report.figures.style import embedded
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 SHOWN = ("backbone", "pixels", "inference_ms_1", "hardware")
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the rows averaged over the SNRs and their figure; None where neither run nor reference has them."""
     name = run.inputs.own_or_kept("accuracy_cost")
     if name is None:

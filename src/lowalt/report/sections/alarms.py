@@ -1,12 +1,12 @@
 """Section: how often other targets are given the first class's name, at thresholds for a wanted detection rate."""
 
 from lowalt.common.classes import listed, plural, word
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 COLUMNS = ("protocol", "scheme", "asked_percent", "threshold")
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the rows of the table of false alarms and the words of the classes; None where there are none."""
     wanted, *others = run.shards.classes
     rates = ("detected", *map(word, others))

@@ -1,13 +1,13 @@
 """Section: confusion matrices."""
 
 from lowalt.report.figures import accuracy_plots
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.report.tables import confusion
 
 COLUMNS = ("protocol", "scheme", "category", "predicted", "samples")
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the plot; None where nothing was predicted."""
     counts = confusion(run.inputs.table("confusion", *COLUMNS))
     return {"plot": accuracy_plots.confusion(counts, run.shards.classes)} if counts else None

@@ -2,7 +2,7 @@
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.figures.style import embedded
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 MEASURED = ("method", "points", "range_m", "tolerance", "seconds", "relative_error", "hardware")
 PIXELS = ("tolerance", "pixels", "changed_pixels")
@@ -48,7 +48,7 @@ def summary(measured: list[dict[str, str]], pixels: list[dict[str, str]]) -> dic
     return {"hardware": measured[0]["hardware"], "range_m": float(distance), "samples": samples, "rows": rows}
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the short table, and the figure of this run's own; None where neither run nor reference has them."""
     name = run.inputs.own_or_kept("echo_cost")
     if name is None:

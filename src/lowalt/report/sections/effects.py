@@ -2,7 +2,7 @@
 
 from lowalt.report.figures import cost_plots
 from lowalt.report.figures.style import embedded
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 COLUMNS = (
     "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",
@@ -11,7 +11,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the rows of the table of effects, and the figure of this run's own; None where there is no table."""
     name = run.inputs.own_or_kept("effects")
     if name is None:

@@ -9,7 +9,7 @@ from lowalt.common.hardware import describe
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 NAMES = (
     "lowalt", "snakemake", "numpy", "scipy", "numba", "llvmlite", "pillow", "deflate", "trimesh", "pymeshlab", "torch",
@@ -30,7 +30,7 @@ def versions() -> list[tuple[str, str]]:
     return found
 
 
-def machines(run: Run) -> list[tuple[str, str]]:
+def machines(run: ReportedRun) -> list[tuple[str, str]]:
     """Return (what was made, machine) of the trainings, by their own records, and of the page."""
     rows = run.inputs.table("seeds")
     trained = {
@@ -39,7 +39,7 @@ def machines(run: Run) -> list[tuple[str, str]]:
     return [("this page", describe()), *((name, machine) for name, machine in trained.items() if machine)]
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return the revision, the seeds, machines, versions, checksums, the configuration and the commands again."""
     commit = revision()
     lines, overlay = commands(commit, changes(located(load_yaml(shipped(BASE))), run.config))

@@ -9,7 +9,7 @@ from pathlib import Path
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.csv_tables import read_csv
 from lowalt.report.figures.style import embedded
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 FIGURES = (
     "pair", "label", "figure", "unit", "files", "measured", "measured_low", "measured_high", "before", "before_low",
@@ -63,7 +63,7 @@ def held(folder: str | Path) -> dict:
             "categories": CATEGORIES}  # fmt: skip
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the section's values; None where neither run nor reference has measured tables."""
     name = run.inputs.own_or_kept("measured")
     return None if name is None else {"own": name == "measured", **held(run.inputs.path(name).parent)}

@@ -1,6 +1,6 @@
 """Section: which scheme is better than which, paired on the same samples, and whether the paper's orderings hold."""
 
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 COMPARISONS = ("protocol", "scheme", "over", "difference_points", "low", "high", "resampled", "seeds")
 ORDERINGS = ("protocol", "scheme", "over", "claim", "paper_points", "difference_points", "ordering")
@@ -23,7 +23,7 @@ def ordering_words(rows: list[dict[str, str]]) -> str:
     return words + "."
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the paired comparisons and the paper's orderings; None where no two compared schemes were trained."""
     comparisons = run.inputs.table("comparisons", *COMPARISONS)
     orderings = run.inputs.table("orderings", *ORDERINGS)

@@ -1,10 +1,10 @@
 """Section: the run in one sentence."""
 
 from lowalt.common.hardware import describe
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return the run's size, its seed and the machine."""
     return {
         "run": run.config["run"], "seed": run.config["seed"], "stations": len(run.stations),

@@ -1,12 +1,12 @@
 """Section: a viewer of some samples: echoes, tile with axes, probabilities of the networks, motion in 3-D."""
 
 from lowalt.report import viewer, viewer_echoes
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.shards.remake import opened
 from lowalt.targets.cloud import read
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return the viewer's samples, the panels of a tile, and the sizes of images."""
     clouds = {cloud.subtype: cloud for cloud in map(read, run.inputs.paths("clouds"))}
     files = run.inputs.paths("predictions") if "predictions" in run.inputs else []

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from lowalt.common.errors import InputError
 from lowalt.effects.explain import explained
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return the explanation without times: those of the effects stand in a table of their own."""
     inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
     try:

@@ -1,6 +1,6 @@
 """Section: accuracy of every subtype, and the subtype nearest to it that was trained on."""
 
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
 DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio")
@@ -17,7 +17,7 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the pivoted table, the worst subtype first, and the distances; None where nothing was predicted."""
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}

@@ -6,7 +6,7 @@ from lowalt.common.files import sha256
 from lowalt.motion import read_table
 from lowalt.report.figures.motion_strip import motion_strip
 from lowalt.report.figures.style import embedded
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 from lowalt.report.tables import cloud_seconds
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.dimensions import estimates
@@ -38,7 +38,7 @@ def cloud_rows(clouds: dict[str, Cloud], published: dict[str, dict], seconds: di
     return rows
 
 
-def values(run: Run) -> dict:
+def values(run: ReportedRun) -> dict:
     """Return the table of clouds and the pictures of clouds and motion."""
     clouds = {path: read(path) for path in run.inputs.paths("clouds")}
     return {

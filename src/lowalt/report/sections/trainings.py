@@ -1,6 +1,6 @@
 """Section: the time and the size of each training."""
 
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 COLUMNS = (
     "protocol", "scheme", "seed", "accuracy_percent", "backbone", "weights", "parameters", "steps", "train_s",
@@ -8,7 +8,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the rows of the table of trainings; None where there are none."""
     rows = run.inputs.table("seeds", *COLUMNS)
     return {"rows": rows} if rows else None

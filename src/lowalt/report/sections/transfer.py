@@ -1,6 +1,6 @@
 """Section: models of other runs on this run's test samples."""
 
-from lowalt.report.run import Run
+from lowalt.report.run import ReportedRun
 
 COLUMNS = (
     "protocol", "scheme", "trained_on", "snr_db", "accuracy_percent", "own_percent", "difference_points", "low", "high",
@@ -8,7 +8,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def values(run: Run) -> dict | None:
+def values(run: ReportedRun) -> dict | None:
     """Return the rows averaged over the SNRs; None where the run names no other runs."""
     if "transfer" not in run.inputs:
         return None
