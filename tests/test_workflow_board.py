@@ -164,6 +164,29 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
     assert kept["state"] == "failed"
 
 
+def test_a_full_disk_is_named_once_where_the_logs_of_jobs_have_no_room(monkeypatch, capsys):
+    handler = handler_of()
+    handler.emit(record("run", event="run_info", stats={"echo": 2, "total": 2}))
+    handler.emit(record("error", logging.ERROR, event="job_error", jobid=1, rule_name="echo", log=["1.log"]))
+    assert "disk is full" not in handler._stream.getvalue()
+    monkeypatch.setattr("snakemake_logger_plugin_lowalt.free_bytes", lambda path: 4096)
+    for job in (1, 2):
+        handler.emit(record("error", logging.ERROR, event="job_error", jobid=job, rule_name="echo", log=["1.log"]))
+    assert handler._stream.getvalue().count("the disk is full: 0.0 MB are free") == 1
+    own_log = logging.FileHandler("/dev/full")
+    own_log.emit(record("a line of Snakemake's own log"))
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_full_disk_is_named_where_snakemake_meets_it_and_other_faults_of_a_log_keep_their_traceback(capsys):
+    handler = handler_of()
+    handler.emit(record("Error recording metadata ([Errno 28] No space left on device)", logging.ERROR))
+    assert "the disk is full" in handler._stream.getvalue()
+    own_log = logging.FileHandler("/dev/full")
+    own_log.emit(logging.LogRecord("log", logging.INFO, "", 0, "%d models", ("no number",), None))
+    assert "Traceback" in capsys.readouterr().err
+
+
 def test_a_dry_run_shows_what_snakemake_shows():
     handler = handler_of(dryrun=True)
     handler._plain.stream = handler._stream

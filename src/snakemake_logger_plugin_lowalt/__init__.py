@@ -20,6 +20,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 
 from lowalt.common import progress
 from lowalt.common.errors import InputError
+from lowalt.common.files import FULL, NEARLY_FULL_BYTES, free_bytes
 from lowalt.workflow import status
 from lowalt.workflow.board import Board, Job
 
@@ -37,6 +38,15 @@ NOISE = (
     "Using profile", "Using shell", "Using workflow specific profile", "host:",
 )  # fmt: skip
 """Beginnings of messages that say nothing about this run."""
+
+
+def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -> None:
+    """Report that a line could not be written to a log file, unless its disk is full: then the run itself says so.
+
+    Python would print two tracebacks for every such line.
+    """
+    if getattr(sys.exc_info()[1], "errno", None) not in FULL:
+        logging.Handler.handleError(file, record)
 
 
 class LogHandler(LogHandlerBase):
@@ -61,6 +71,9 @@ class LogHandler(LogHandlerBase):
         self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
+        self._full = False
+        # Snakemake keeps its own log on the run's disk.
+        logging.FileHandler.handleError = quiet_on_a_full_disk
         self._guard, self._stop = threading.RLock(), threading.Event()
         self._ticker = threading.Thread(target=self._tick, daemon=True)
 
@@ -103,6 +116,18 @@ class LogHandler(LogHandlerBase):
             self._fail(record)
         elif event not in QUIET and not self._noise(record):
             self._say(self._plain.format(record))
+        if event == LogEvent.JOB_ERROR or record.levelno >= logging.ERROR:
+            self._say_full(str(record.msg))
+
+    def _say_full(self, text: str) -> None:
+        """Say once that the disk is full, if an error's text or the free space shows it: job logs may have no room."""
+        free = free_bytes(Path.cwd())
+        if not self._full and (free < NEARLY_FULL_BYTES or os.strerror(FULL[0]) in text):
+            self._full = True
+            self._say(
+                f"the disk is full: {free / 1e6:.1f} MB are free in {Path.cwd()}; whole files are kept, "
+                "so make room and start the run again"
+            )
 
     @staticmethod
     def _noise(record: logging.LogRecord) -> bool:

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[3]
 PARTS = ("Snakefile", "workflow", "config", "profiles", "src", "envs")
 TIMINGS = (
     "logs", "benchmarks", "report.html", "stages.csv", "seeds.csv", "run.json", "progress",
-    "cost.csv", "cost_pixels.csv", "cost.png",
+    "cost.csv", "cost_pixels.csv", "cost.png", "echo_cost.csv", "echo_cost.svg", "stage_times.csv", "stage_times.svg",
 )  # fmt: skip
 """Names of files and folders of a run that hold times, which no run repeats."""
 LOUD = ("Traceback (most recent call last)", "Directory cannot be locked")
