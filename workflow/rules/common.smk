@@ -9,7 +9,7 @@ from lowalt.common.environment import prepare
 from lowalt.common.errors import InputError
 from lowalt.common.plan import PART
 from lowalt.effects.catalogue import dotted
-from lowalt.workflow import locks, options, scheduling, space_check
+from lowalt.workflow import locks, options, polling, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
@@ -19,6 +19,7 @@ from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
 locks.install()
 scheduling.install()
+polling.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
 try:

@@ -7,7 +7,6 @@ same whatever else the configuration names.
 import math
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from lowalt.common import portable
 from lowalt.common.classes import AIRBORNE
@@ -21,6 +20,9 @@ def region_polygon(masts_m: np.ndarray, polygon_m: list | None) -> np.ndarray:
 
     Raises: InputError where the polygon is degenerate.
     """
+    # The Snakefile imports this module, and needs a hull only where the configuration gives a region.
+    from scipy.spatial import ConvexHull, QhullError
+
     corners = np.array(masts_m if polygon_m is None else polygon_m, dtype=float)
     if corners.ndim != 2 or corners.shape[1:] != (2,) or len(corners) < 3:
         raise InputError(

@@ -8,8 +8,6 @@ between schemes also resample training seeds and, for unseen subtypes, the subty
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import norm as normal
-from scipy.stats import t as student
 
 
 class Interval(NamedTuple):
@@ -75,6 +73,10 @@ def _stretch(count: int, freedom: int) -> float:
     degrees of freedom needs Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
     Methods and their Application, 1997, section 2; Hesterberg, What Teachers Should Know about the Bootstrap, 2015.
     """
+    # The Snakefile imports this module, and the distributions take most of a second to import.
+    from scipy.stats import norm as normal
+    from scipy.stats import t as student
+
     return float(np.sqrt(count / (count - 1)) * student.ppf(0.975, freedom) / normal.ppf(0.975))
 
 

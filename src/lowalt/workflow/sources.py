@@ -5,6 +5,7 @@ The workflow declares them as inputs of each stage, so editing a module re-runs 
 
 import ast
 import functools
+from collections.abc import Iterator
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
@@ -14,6 +15,7 @@ SOURCE_MODULES = [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh
 CATALOGUE = "lowalt.spectra.catalogue"
 
 
+@functools.cache
 def _file(module: str) -> Path | None:
     """File of a module of the package, None where there is none."""
     base = ROOT.joinpath(*module.split("."))
@@ -21,6 +23,16 @@ def _file(module: str) -> Path | None:
         if path.is_file():
             return path
     return None
+
+
+def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield every statement of a body and of the blocks inside it. Expressions hold none, and most nodes are those."""
+    for statement in body:
+        yield statement
+        for name in ("body", "orelse", "finalbody"):
+            yield from _statements(getattr(statement, name, []))
+        for block in (*getattr(statement, "handlers", []), *getattr(statement, "cases", [])):
+            yield from _statements(block.body)
 
 
 @functools.cache
@@ -33,7 +45,7 @@ def _imports(path: Path) -> tuple[str, ...]:
     tree = ast.parse(path.read_text(), str(path))
     found = []
     deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
-    for node in tree.body if deferred else ast.walk(tree):
+    for node in tree.body if deferred else _statements(tree.body):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
