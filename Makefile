@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages default data real measured test test-slow fuzz lint format bench bench-workflow bench-make status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -44,7 +44,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,notebooks) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 $(DOCS): $(BASE)
@@ -127,6 +127,9 @@ bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 
 LABEL ?= this revision
 bench-make: $(SETUP)  ## wall and processor time of `make` from an empty clone, part by part: results/benchmarks/workflow.csv
 	$(BIN)/python benchmarks/from_clone.py --out results/benchmarks/workflow.csv --label '$(LABEL)' $(COLD)
+
+bench-walk: $(SETUP)  ## a new user's walk through the documents, each step timed, from clone to a network of one's own in the report: results/benchmarks/walk.csv
+	$(BIN)/python benchmarks/walk.py --out results/benchmarks/walk.csv --label '$(LABEL)'
 
 status: $(SETUP)  ## what a run in another terminal is doing
 	@$(BIN)/python -m lowalt.workflow.status
@@ -229,6 +232,9 @@ docs-pages: $(BASE)  ## write the page of the configuration's keys from its sche
 
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+
+notebooks: $(TESTING)  ## a notebook of every tutorial, made from its Markdown, in the folder notebooks
+	$(BIN)/python docs/notebooks.py --out notebooks
 
 help:
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'

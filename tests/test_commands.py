@@ -1,6 +1,10 @@
 """The commands of `lowalt`: what they write and say, their exit status, and examples that parse."""
 
+import argparse
 import json
+import shlex
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +22,7 @@ from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from trainings import train, with_training, write_views
 
+ROOT = Path(__file__).parents[1]
 CONFIG = load_yaml("config/default.yaml")
 
 
@@ -115,16 +120,87 @@ def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch)
         main(["--help"])
     names = capsys.readouterr().out.split("{")[1].split("}")[0].split(",")
     assert {"run", "status", "explain", "sample", "predict", "verify", "remake", "compare", "target"} <= set(names)
-    for name in sorted(set(names) - {"target", "spectra"}):
+    actions = [["target", action] for action in ("inspect", "new", "make", "show")]
+    for words in [[name] for name in sorted(names)] + actions:
         with pytest.raises(SystemExit) as ended:
-            main([name, "--help"])
+            main([*words, "--help"])
         text = " ".join(capsys.readouterr().out.split())
-        assert ended.value.code == 0 and f"example: lowalt {name}" in text
+        assert ended.value.code == 0 and "example: " in text
+        example = text.partition("example: ")[2]
+        assert f"lowalt {' '.join(words)}" in example
+        if words != ["completion"]:
+            parsed_only(monkeypatch, shlex.split(example)[1:])
+
+
+def parsed_only(monkeypatch, words):
+    """A command line is understood; nothing is run."""
+    whole = argparse.ArgumentParser.parse_args
+
+    def stop(self, *given):
+        whole(self, *given)
+        raise KeyError("understood")
+
+    with monkeypatch.context() as changed, pytest.raises(KeyError, match="understood"):
+        changed.setattr(argparse.ArgumentParser, "parse_args", stop)
+        main(words)
+
+
+ODD = (
+    "run none.yaml", "run config", "run README.md", "explain none.yaml", "explain config",
+    "explain README.md --no-cost", "explain config/scenes/urban.yaml --station Z --no-cost",
+    "explain config/tiny.yaml --sample Nobody:1 --no-cost", "sample Nobody 3", "sample Crow -1",
+    "sample Crow 3 --snr nan", "sample Crow 3 --overlay none.yaml", "predict none.pt a.png",
+    "predict README.md README.md", "predict README.md none.npy", "verify none.json", "verify README.md",
+    "verify config", "verify config/targets.csv --remake 2", "remake none.json KEY", "remake README.md KEY",
+    "compare none nowhere", "compare config docs", "report --gallery --results none",
+    "report --gallery --results config", "spectra none.yaml", "spectra README.md", "target inspect none.stl",
+    "target inspect README.md", "target inspect config", "target new none.stl --subtype Crow",
+    "target new README.md --subtype Nobody", "target make none.yaml", "target make README.md",
+    "target make config/tiny.yaml", "target show none.npz", "target show README.md",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("line", ODD)
+def test_odd_inputs_end_with_2_and_one_clear_sentence(line, capsys, monkeypatch, tmp_path):
+    for name in ("config", "workflow", "docs", "README.md"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    try:
+        status = main(shlex.split(line))
+    except SystemExit as ended:
+        status = ended.code
+    said = capsys.readouterr()
+    assert status == 2, said
+    assert "error: " in said.err and "Traceback" not in said.err
+
+
+@pytest.mark.parametrize(
+    ("words", "current", "wanted"),
+    [
+        (["lowalt"], "stat", ["status"]),
+        (["lowalt", "target"], "ma", ["make"]),
+        (["lowalt", "target", "make"], "--inp", ["--inputs"]),
+        (["lowalt", "run"], "--dr", ["--dry-run"]),
+        (["lowalt", "run"], "config/ti", ["config/tiny.yaml"]),
+        ([".venv/bin/lowalt", "compare", "results"], "--js", ["--json"]),
+    ],
+)
+def test_a_shell_completes_commands_options_and_files(words, current, wanted, capsys, monkeypatch):
+    assert main(["completion"]) == 0
+    words = " ".join(map(shlex.quote, [*words, current]))
+    text = f"{capsys.readouterr().out}\nCOMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _lowalt"
+    shell = shutil.which("bash") or pytest.skip("no bash")
+    ran = subprocess.run(
+        [shell, "-c", text + '; printf "%s\n" "${COMPREPLY[@]}"'], capture_output=True, text=True, cwd=ROOT
+    )
+    assert ran.stderr == "" and ran.stdout.split() == wanted
 
 
 def test_verify_and_remake_end_with_1_where_a_byte_differs(tmp_path, capsys):
     publish(build(tmp_path / "made", "signal"), tmp_path / "set")
     index = tmp_path / "set/index.json"
+    assert main(["verify", str(index), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"good": True, "faults": []}
     assert main(["verify", str(index)]) == 0
     assert "every byte is as it was written" in capsys.readouterr().out
     (shard, *_) = sorted((tmp_path / "set").glob("*.tar"))

@@ -9,7 +9,7 @@ import os
 import sys
 from pathlib import Path
 
-from lowalt.commands import compare, data, report, sample, spectra, target, workflow
+from lowalt.commands import compare, completion, data, report, sample, spectra, target, workflow
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -57,11 +57,13 @@ def main(arguments: list[str] | None = None) -> int:
     report.add_to(commands)
     target.add_to(commands)
     spectra.add_to(commands, CONFIG, SCHEMA)
+    completion.add_to(commands)
     given = line.parse_args(arguments)
     actions = {
         "run": workflow.run, "status": workflow.states, "sample": sample.run, "verify": data.verify,
         "remake": data.remake, "predict": data.predict, "compare": compare.run, "target": target.run,
         "spectra": spectra.run, "report": report.run, "explain": _explained,
+        "completion": lambda given: completion.script(line),
     }  # fmt: skip
     try:
         text = actions[given.command](given)

@@ -26,6 +26,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     remake.add_argument("index", type=Path, help="index.json of the data set")
     remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
     for line in (verify, remake):
+        line.add_argument("--json", action="store_true", help="print JSON for a program")
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
@@ -40,12 +41,13 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     predict.add_argument("--json", action="store_true", help="print JSON for a program")
 
 
-def _ended(lines: list[str], good: str) -> str:
-    """The text to print; a fault ends the command with status 1."""
+def _ended(lines: list[str], good: str, as_json: bool) -> str:
+    """The text to print, or JSON with the faults; a fault ends the command with status 1."""
+    text = json.dumps({"good": not lines, "faults": lines}) if as_json else "\n".join(lines) or good
     if lines:
-        print("\n".join(lines))
+        print(text)
         raise SystemExit(1)
-    return good
+    return text
 
 
 def verify(given: argparse.Namespace) -> str:
@@ -60,7 +62,7 @@ def verify(given: argparse.Namespace) -> str:
         remaker = opened(given.index, given.clouds, given.occluders)
         lines = [line for number in some(remaker.shards, given.remake) for line in remaker.faults(number)]
     again = f", {given.remake} samples made again" if given.remake else ""
-    return _ended(lines, f"{given.index}: every byte is as it was written{again}")
+    return _ended(lines, f"{given.index}: every byte is as it was written{again}", given.json)
 
 
 def remake(given: argparse.Namespace) -> str:
@@ -72,7 +74,7 @@ def remake(given: argparse.Namespace) -> str:
 
     remaker = opened(given.index, given.clouds, given.occluders)
     lines = [line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key))]
-    return _ended(lines, f"{len(given.sample)} samples made again, equal in every byte")
+    return _ended(lines, f"{len(given.sample)} samples made again, equal in every byte", given.json)
 
 
 def predict(given: argparse.Namespace) -> str:

@@ -28,6 +28,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the base configuration")
     line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
+    line.add_argument("--json", action="store_true", help="print JSON for a program")
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 
@@ -60,4 +61,5 @@ def run(given: argparse.Namespace) -> str:
             temporary.write_bytes(data)
     with replacing(given.out / f"{key}.npy") as temporary:
         np.save(temporary, signal)
-    return "\n".join(str(given.out / name) for name in (*written, f"{key}.npy"))
+    paths = [str(given.out / name) for name in (*written, f"{key}.npy")]
+    return json.dumps({"key": key, "files": paths}) if given.json else "\n".join(paths)

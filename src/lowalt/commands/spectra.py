@@ -17,7 +17,10 @@ REPEATS = 5
 
 def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
     """Add the action to the command `lowalt`; base: the configuration by default; schema: its schema."""
-    line = commands.add_parser("spectra", help="the spectra of a configuration, and the time an image of each takes")
+    line = commands.add_parser(
+        "spectra", help="the spectra of a configuration, and the time an image of each takes",
+        epilog="example: lowalt spectra config/tiny.yaml",
+    )  # fmt: skip
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the base configuration")
     line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")

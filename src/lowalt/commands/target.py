@@ -34,26 +34,39 @@ def _unit(text: str) -> str | float:
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `target` and its four commands to a parser's commands."""
-    target = commands.add_parser("target", help="your own mesh or recording: look, draft a record, make its cloud")
+    target = commands.add_parser(
+        "target", help="your own mesh or recording: look, draft a record, make its cloud",
+        epilog="example: lowalt target inspect inputs/mydrone.stl",
+    )  # fmt: skip
     actions = target.add_subparsers(dest="action", required=True)
     inspect = actions.add_parser(
-        "inspect", help="what a mesh file holds: unit, sizes, pieces, what may move; and a picture"
-    )
+        "inspect", help="what a mesh file holds: unit, sizes, pieces, what may move; and a picture",
+        epilog="example: lowalt target inspect inputs/mydrone.stl",
+    )  # fmt: skip
     inspect.add_argument("file", type=Path)
     inspect.add_argument("--category", default="UAV", choices=("UAV", "Bird", "Vehicle"))
     inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
     inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
-    new = actions.add_parser("new", help="draft a record of a mesh file, with what must be confirmed marked")
+    new = actions.add_parser(
+        "new", help="draft a record of a mesh file, with what must be confirmed marked",
+        epilog='example: lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml',
+    )  # fmt: skip
     new.add_argument("file", type=Path)
     new.add_argument("--subtype", required=True, help="the published target whose place the mesh takes")
     new.add_argument("--unit", type=_unit)
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
-    make = actions.add_parser("make", help="one record to one cloud and a picture")
+    make = actions.add_parser(
+        "make", help="one record to one cloud and a picture",
+        epilog="example: lowalt target make mydrone.yaml --inputs inputs",
+    )  # fmt: skip
     make.add_argument("record", type=Path, help="YAML file of records")
     make.add_argument("--subtype", help="which record of the file (default: its only one)")
     make.add_argument("--seed", type=int, default=20260701)
     make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
-    show = actions.add_parser("show", help="picture of a cloud with axes, hinges, normals, its motion and its spectra")
+    show = actions.add_parser(
+        "show", help="picture of a cloud with axes, hinges, normals, its motion and its spectra",
+        epilog="example: lowalt target show results/default/clouds/crow.npz --out crow.png",
+    )  # fmt: skip
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
     for parser in (new, make):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED, shipped
+from lowalt.common.yaml_files import load_yaml
 from lowalt.workflow import status
 
 SNAKEFILE = SHIPPED / "Snakefile"
@@ -37,7 +38,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
 def command(given: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
-    Raises: InputError naming an overlay that is not there, or where no Snakefile came with this installation.
+    Raises: InputError naming an overlay that is missing or no YAML mapping, or where there is no Snakefile.
     """
     if not SNAKEFILE.is_file():
         raise InputError(f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a clone")
@@ -45,6 +46,7 @@ def command(given: argparse.Namespace) -> list[str]:
     for path in overlays:
         if not path.is_file():
             raise InputError(f"configuration: no file at {path}")
+        load_yaml(path)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--cores", given.cores]
     profile = given.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))

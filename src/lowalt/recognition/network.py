@@ -4,7 +4,7 @@ Axes of every tensor: B samples, K stations, V spectra of a station, then channe
 serves any subset of stations and spectra; a view is a (station, spectrum) pair, station-major.
 
 Settings of this module, the block `recognition.network`:
-    backbone      timm model name ("test_resnet", "swin_base_patch4_window7_224", ...)
+    backbone      timm model name ("test_resnet", "swin_base_patch4_window7_224", ...), or FILE.py:FUNCTION
     weights       "none", "hub" (the name's default tag) or the path of a .pth or .safetensors file
     intra_depth   layers of the encoder over a station's spectra
     inter_depth   layers of the encoder over the stations
@@ -25,7 +25,7 @@ from torch import nn
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.recognition import spectrogram_transformer
+from lowalt.recognition import own_backbone, spectrogram_transformer
 from lowalt.recognition.fusion import Fused
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
@@ -33,16 +33,17 @@ KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forw
 
 
 def backbone(name: str, weights: str, size: int) -> nn.Module:
-    """Return the timm model `name`, or one of `spectrogram_transformer`, as a feature extractor for size x size RGB
-    images.
+    """Return the timm model `name`, one of `spectrogram_transformer`, or the user's own FILE.py:FUNCTION, as a feature
+    extractor for size x size RGB images.
 
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
-    if name in spectrogram_transformer.SHAPES:
+    own = own_backbone.file_of(name) is not None
+    if own or name in spectrogram_transformer.SHAPES:
         if weights != "none":
             raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
-        return spectrogram_transformer.backbone(name, size)
+        return (own_backbone if own else spectrogram_transformer).backbone(name, size)
     if not timm.is_model(name):
         raise InputError(f"network: backbone {name!r} is not a timm model (timm {timm.__version__})")
     options: dict = {"num_classes": 0}

@@ -17,9 +17,18 @@ import torch
 from lowalt.common.classes import stated
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.common.files import replacing, sha256
 from lowalt.common.hardware import describe
-from lowalt.recognition import augment, checkpoint, inference, metrics, network, predictions, recipe
+from lowalt.recognition import (
+    augment,
+    checkpoint,
+    inference,
+    metrics,
+    network,
+    own_backbone,
+    predictions,
+    recipe,
+)  # fmt: skip
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.samples import ViewSamples
@@ -49,11 +58,13 @@ def train(
     augment.check(settings["augmentation"])
     palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
     machine = Machine.here(block["precision"])
+    own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     name = checkpoint.identity(
         scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
         samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
+        **({"own": sha256(own)} if own and own.is_file() else {}),
     )  # fmt: skip
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])

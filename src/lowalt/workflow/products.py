@@ -51,7 +51,13 @@ class Products(DataProducts):
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         names = self._config["recognition"].get("extra", [])
         extra = [path for name in names for path in self._extra(name, size)]
-        return {**self.samples(wildcards), **({"extra": extra} if extra else {})}
+        return {**self.samples(wildcards), **({"extra": extra} if extra else {}), **self._own_backbone(wildcards)}
+
+    def _own_backbone(self, wildcards: Any) -> dict[str, str]:
+        """The user's file that a scheme's backbone is made in, none for a library's backbone."""
+        scheme = self._run.schemes_by_slug[wildcards.scheme]
+        name = scheme.backbone or self._config["recognition"]["network"]["backbone"]
+        return {"backbone": name.rpartition(":")[0]} if ".py:" in name else {}
 
     def _extra(self, name: str, size: int) -> list[str]:
         """Images of another run's fold train, in the shards' order.

@@ -1,0 +1,59 @@
+"""A backbone of the user's own: a function of a Python file, which the configuration names as FILE.py:FUNCTION.
+
+The function takes the pixels a side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
+features (B, features). The file runs with the rights of the user, so it is to be trusted like any program. It lies in
+the folder in which the command runs or below it: a model keeps the name, and must not choose files elsewhere.
+"""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from lowalt.common.errors import InputError
+
+MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
+"""How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own."""
+
+
+def file_of(name: str) -> Path | None:
+    """Return the Python file of a backbone's name, None for a name of a library's model."""
+    path, colon, _ = name.rpartition(":")
+    return Path(path) if colon and path.endswith(".py") else None
+
+
+def backbone(name: str, size: int) -> nn.Module:
+    """Return the module that FILE.py:FUNCTION makes for size x size images, with its number of features noted.
+
+    Raises: InputError where the file is missing or outside of this folder, has no such function or ends in an error, or
+    where the module gives no features (B, features).
+    """
+    path = file_of(name)
+    if path is not None and not path.resolve().is_relative_to(Path.cwd().resolve()):
+        raise InputError(f"network: backbone {name!r}: {path} is not in this folder, expected a file in or below it")
+    if path is None or not path.is_file():
+        raise InputError(f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists")
+    function = name.rpartition(":")[2]
+    found = importlib.util.spec_from_file_location(f"lowalt_own_{path.stem}", path)
+    held = importlib.util.module_from_spec(found)
+    sys.modules[found.name] = held
+    try:
+        found.loader.exec_module(held)
+        if not callable(getattr(held, function, None)):
+            raise InputError(f"network: backbone {name!r}: {path} has no function {function!r}")
+        made = getattr(held, function)(size)
+        with torch.no_grad():
+            features = made.eval()(torch.zeros(2, 3, size, size))
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"network: backbone {name!r}: {type(error).__name__}: {error}") from error
+    if not isinstance(features, torch.Tensor) or features.ndim != 2 or len(features) != 2:
+        shape = tuple(features.shape) if isinstance(features, torch.Tensor) else type(features).__name__
+        raise InputError(f"network: backbone {name!r} gives {shape} for two images, expected (2, features)")
+    made.num_features = features.shape[1]
+    if not hasattr(made, "pretrained_cfg"):
+        made.pretrained_cfg = MIDDLE
+    return made.train()

@@ -1,0 +1,113 @@
+"""Notebooks of the tutorials: every block of a page is a cell, links lead to files, and the cells run in a kernel."""
+
+import importlib
+import re
+import shutil
+import sys
+
+import pytest
+
+from dataset import build, publish
+from test_tutorials import FENCE, FOLDER, NEEDS, ROOT, SHARDS, linked_tree
+
+PAGES = sorted(path.stem for path in FOLDER.glob("*.md"))
+SHORT = ("first_data_set", "recording", "trajectory")
+"""Tutorials whose notebooks run in the quick suite, in one kernel."""
+LONG = sorted(set(PAGES) - set(SHORT) - {"effect"})
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """The module that makes notebooks."""
+    pytest.importorskip("nbformat")
+    monkeypatch.syspath_prepend(str(ROOT / "docs"))
+    return importlib.import_module("notebooks")
+
+
+def book(made, page):
+    return made.notebook((FOLDER / f"{page}.md").read_text())
+
+
+@pytest.fixture
+def checkout(tmp_path, monkeypatch):
+    """A folder with links to what a checkout holds, and to the environment of this Python."""
+    for name in ("config", "design", "examples", "workflow", "src"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    (tmp_path / ".venv").symlink_to(sys.prefix)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
+    monkeypatch.setenv("HF_DATASETS_OFFLINE", "1")
+    return tmp_path
+
+
+def run(notebook, folder):
+    """Run all cells in one kernel; returns what they print. Fails at the first cell that raises."""
+    client = pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    (folder / "notebooks").mkdir()
+    client.NotebookClient(notebook, timeout=240, resources={"metadata": {"path": str(folder / "notebooks")}}).execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    return "".join(output.get("text", "") for output in outputs)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_a_notebook_holds_every_block_and_all_text_of_its_page(made, page):
+    text = (FOLDER / f"{page}.md").read_text()
+    found = book(made, page)
+    made.nbformat.validate(found)
+    blocks = [(kind, title, code) for kind, title, code in FENCE.findall(text) if title or kind in ("python", "sh")]
+    cells = [cell.source for cell in found.cells if cell.cell_type == "code"]
+    wanted = [code.rstrip() for _, title, code in blocks if title != "entry"]
+    assert cells[0] == made.START and [re.sub(r"^%%.*\n", "", source) for source in cells[1:]] == wanted
+    # Every sentence between blocks stands in a cell of text.
+    prose = re.sub(r"\]\([^)]*\)|\s", "", "".join(one.source for one in found.cells if one.cell_type == "markdown"))
+    parts = [re.sub(r"\]\([^)]*\)|\s", "", part) for part in FENCE.sub("```", text).split("```")]
+    assert len(parts) > 1 and all(part in prose for part in parts)
+    assert found == book(made, page)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_of_a_notebook_lead_to_files_of_the_repository(made, page):
+    prose = "\n".join(cell.source for cell in book(made, page).cells if cell.cell_type == "markdown")
+    links = re.findall(r"\]\(([^)#\s:]+)", re.sub(r"```.*?```", "", prose, flags=re.DOTALL))
+    assert not [link for link in links if not (ROOT / "notebooks" / link).resolve().exists()]
+
+
+def test_the_short_notebooks_run_in_one_kernel(made, checkout):
+    whole = book(made, SHORT[0])
+    for page in SHORT[1:]:
+        whole.cells += book(made, page).cells[1:]
+    for number, cell in enumerate(whole.cells):
+        cell["id"] = f"cell-{number}"
+    printed = run(whole, checkout)
+    assert printed.startswith("80 ") and "Writing first.yaml" in printed
+    assert len(list((checkout / "mine/tiles").glob("*.png"))) > 2
+
+
+def test_a_failing_line_of_a_notebook_is_not_passed_over(made, tmp_path):
+    errors = pytest.importorskip("nbclient").exceptions
+    with pytest.raises(errors.CellExecutionError):
+        run(made.notebook("```sh\nfalse\ntrue\n```\n"), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", LONG)
+def test_a_long_notebook_runs(made, page, checkout, tmp_path_factory):
+    if page in SHARDS:
+        pytest.importorskip(NEEDS[page])
+        shards = publish(build(tmp_path_factory.mktemp("made") / "shards", "image"), checkout / "made")
+        (checkout / "results/default").mkdir(parents=True)
+        shutil.copytree(shards, checkout / "results/default/shards")
+    run(book(made, page), checkout)
+
+
+@pytest.mark.slow
+def test_the_notebook_of_an_effect_runs_once_its_entry_is_in_the_schema(made, checkout):
+    (checkout / "workflow").unlink()
+    shutil.copytree(ROOT / "workflow", checkout / "workflow")
+    (checkout / "src").unlink()
+    linked_tree(checkout / "src", "lowalt/effects/receiver")
+    entry = next(code for _, title, code in FENCE.findall((FOLDER / "effect.md").read_text()) if title == "entry")
+    schema = checkout / "workflow/schemas/config.schema.yaml"
+    schema.write_text(schema.read_text().replace("      squint:", f"{entry}      squint:", 1))
+    assert "dc_offset" in run(book(made, "effect"), checkout)
