@@ -1,19 +1,20 @@
 """Provenance: the revision is git's own, the overlay makes the configuration again, and checksums are of the files."""
 
 import hashlib
+import json
 import subprocess
 
 import pytest
 import yaml
 
-from lowalt.common.config import check, load, merge
+from lowalt.common.config import canonical, check, load, merge
 from lowalt.common.yaml_files import load_yaml
 from lowalt.report import provenance
 
 SCHEMA, BASE = "workflow/schemas/config.schema.yaml", "config/default.yaml"
 OTHERS = (
     {"run": "other", "network": {"stations": {"C": None, "tower": {"position_m": [250, 400, 30], "normal_deg": 270}}}},
-    {"noise": {"snr_db": [3.0]}, "recognition": {"seeds": [0, 1], "network": {"backbone": "resnet18"}}},
+    {"noise": {"snr_db": [3.0, float("inf")]}, "recognition": {"seeds": [0, 1], "network": {"backbone": "resnet18"}}},
     {"effects": {"clutter": {}, "phase_noise": {}}, "spectra": {"vt": None}, "report": {"cost": False}},
 )
 
@@ -52,14 +53,15 @@ def test_the_sum_of_the_code_follows_names_and_content(tmp_path):
 def test_the_overlay_of_the_page_makes_the_same_configuration_again(overlay):
     base = load_yaml(BASE)
     config = check(merge(load_yaml(BASE), overlay), SCHEMA)
-    found = provenance.changes(base, config)
+    # The stage gets its configuration as JSON, which has no infinity.
+    found = provenance.changes(base, json.loads(canonical(config)))
     again = yaml.safe_load(provenance.commands("no checkout", found)[1])
     assert check(merge(load_yaml(BASE), again), SCHEMA) == config
     assert len(str(again)) < 300
 
 
 def test_the_default_needs_no_overlay():
-    assert provenance.changes(load_yaml(BASE), load([BASE], SCHEMA)) == {}
+    assert provenance.changes(load_yaml(BASE), json.loads(canonical(load([BASE], SCHEMA)))) == {}
     assert provenance.commands("abc, 1 tracked file changed since", {}) == ("git checkout abc\nmake", "")
     assert provenance.commands("abc", {"run": "x"})[0].splitlines()[-1] == ".venv/bin/lowalt run again.yaml"
 

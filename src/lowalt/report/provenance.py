@@ -3,9 +3,11 @@
 import hashlib
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import yaml
 
+from lowalt.common.config import plain
 from lowalt.common.files import sha256
 from lowalt.common.shipped import SHIPPED
 from lowalt.common.street import PACKAGE
@@ -47,13 +49,29 @@ def code_sum(folder: Path = PACKAGE) -> str:
 def changes(base: dict, config: dict) -> dict:
     """Return the smallest overlay that turns the configuration `base` into `config` when it is laid over it.
 
-    A key that `config` lacks becomes null, which removes a station or a spectrum.
+    A key that `config` lacks becomes null, which removes a station or a spectrum. Infinities are equal as numbers and
+    as the words that stand for them in JSON; the overlay has numbers.
     """
+    found = _differing(plain(base), plain(config))
+    return _numbers(found)
+
+
+def _numbers(value: Any) -> Any:
+    """The value with the words "inf" and "-inf" as numbers."""
+    if isinstance(value, dict):
+        return {key: _numbers(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_numbers(item) for item in value]
+    return float(value) if value in ("inf", "-inf") else value
+
+
+def _differing(base: dict, config: dict) -> dict:
+    """The keys of `changes` with their values, infinities as words."""
     found = {}
     for key in [*config, *(key for key in base if key not in config)]:
         mine, other = config.get(key), base.get(key)
         if isinstance(mine, dict) and isinstance(other, dict):
-            inner = changes(other, mine)
+            inner = _differing(other, mine)
             if inner:
                 found[key] = inner
         elif key not in config or key not in base or mine != other:
