@@ -83,3 +83,19 @@ def test_terms_fall_below_their_bounds():
     assert (found <= bound + 1e-14).all()
     # The bounds are of use: the largest terms of an order are within a hundred times theirs.
     assert found[8].max() > 1e-4 * bound[8].max()
+
+
+def test_kept_boxes_serve_places_inside_and_are_made_anew_outside(monkeypatch):
+    rng = np.random.default_rng(5)
+    array, made, kept = given((16, 4)), [], {}
+    terms = near_field._terms
+    monkeypatch.setattr(near_field, "_terms", lambda *values: (made.append(1), terms(*values))[1])
+    monkeypatch.setattr(near_field, "WORK", 0)
+    places = array.station + 120.0 * np.array([0.8, 0.5, 0.33]) + rng.uniform(-0.6, 0.6, (40, 150, 3))
+    # A symbol later points have moved by a millimetre; a look later the target is somewhere else.
+    for move, boxes in ((0.0, 1), (1e-3, 1), (30.0, 2)):
+        moved = places + move * np.array([-0.6, 0.7, 0.1])
+        out = np.empty((1, 40, 150), np.complex128)
+        near_field.sums(moved, array, 1e-7, out, kept)
+        assert abs(out[0] - direct(moved, array)).max() <= 1e-7 * 64
+        assert len(made) == boxes

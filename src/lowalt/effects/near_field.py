@@ -22,6 +22,8 @@ STRETCH, DEPTH, LOUDER = 1.23, 3.2, 1.06
 WIDEST, NEAR = 1.2, 0.03
 ELLIPSES = 1.0 + 2.0 ** np.arange(-3.0, 14.0)
 """Sums of the semi-axes of the ellipses on which sums are bounded."""
+WIDER = 1.02
+"""How much wider than needed a box is made that may serve again; a target moves by far less within an OFDM symbol."""
 WORK = 1_000_000
 """Time of a box's nodes and terms before any point is summed, in terms of one point."""
 LEBESGUE = 3.5
@@ -106,29 +108,64 @@ def evaluated(at, middle, half, terms, lengths, out):
                 out[q, n, i] = complex(total[0, q, i], total[1, q, i])
 
 
-def sums(places: np.ndarray, array: Arrays, error: float, out: np.ndarray) -> None:
-    """Fill out (Q, N, L) with the array's sums at places (N, L, 3) m, within `error` of the number of elements."""
+class Box(NamedTuple):
+    """A box of directions, middle and half (3,), with the polynomials of `evaluated` over it."""
+
+    middle: np.ndarray
+    half: np.ndarray
+    terms: np.ndarray
+    lengths: np.ndarray
+
+    def holds(self, low: np.ndarray, high: np.ndarray) -> bool:
+        """Return whether directions from low to high (3,) are in the box."""
+        return bool((low >= self.middle - self.half).all() and (high <= self.middle + self.half).all())
+
+
+def sums(
+    places: np.ndarray, array: Arrays, error: float, out: np.ndarray, kept: dict[int, Box] | None = None
+) -> None:  # fmt: skip
+    """Fill out (Q, N, L) with the array's sums at places (N, L, 3) m, within `error` of the number of elements.
+
+    kept: boxes of earlier calls with the same array and error, by their first symbol; they serve again while all
+    directions stay inside, and new ones are made a little wider than needed and added.
+    """
     at = np.empty((3, *places.shape[:2]))
     directions(places, array.station, array.axes, at)
     for first in range(0, len(places), SYMBOLS):
         rows = slice(first, first + SYMBOLS)
-        # A term takes about as long as a fifth of an element.
-        each = np.prod(array.shape) * (4 + array.series.shape[1])
         points = places[rows].shape[0] * places.shape[1]
-        if points * each < WORK:
-            _every_point(places[rows], array, out[:, rows])
-            continue
         low, high = at[:, rows].min(axis=(1, 2)), at[:, rows].max(axis=(1, 2))
-        middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-9 * np.array([1.0, 1.0, high[2]]))
-        sizes = term_bounds(middle, half, array)
-        counts = None if sizes is None else node_counts(sizes, error / 4)
-        nodes = None if counts is None else _nodes(counts, middle, half, array)
-        lengths = None if nodes is None else _lengths(sizes, counts, error / 4)
-        if nodes is None or WORK + points * len(out) * lengths.sum() + nodes.shape[1] * each > points * each:
+        box = None if kept is None else kept.get(first)
+        if box is None or not box.holds(low, high):
+            wider = WIDER if kept is not None else 1.0
+            box = _box(low, high, wider, array, error, points, len(out))
+        if box is None:
             _every_point(places[rows], array, out[:, rows])
             continue
-        terms = _terms(nodes, counts, array, len(out))
-        evaluated(np.ascontiguousarray(at[:, rows]), middle, half, terms, lengths, out[:, rows])
+        if kept is not None:
+            kept[first] = box
+        evaluated(np.ascontiguousarray(at[:, rows]), box.middle, box.half, box.terms, box.lengths, out[:, rows])
+
+
+def _box(
+    low: np.ndarray, high: np.ndarray, wider: float, array: Arrays, error: float, points: int, frequencies: int
+) -> Box | None:  # fmt: skip
+    """The polynomials over the directions from low to high (3,), None where summing every point costs less."""
+    # A term takes about as long as a fifth of an element.
+    each = np.prod(array.shape) * (4 + array.series.shape[1])
+    if points * each < WORK:
+        return None
+    middle = 0.5 * (low + high)
+    half = wider * np.maximum(0.5 * (high - low), 1e-9 * np.array([1.0, 1.0, high[2]]))
+    sizes = term_bounds(middle, half, array)
+    counts = None if sizes is None else node_counts(sizes, error / 4)
+    nodes = None if counts is None else _nodes(counts, middle, half, array)
+    if sizes is None or counts is None or nodes is None:
+        return None
+    lengths = _lengths(sizes, counts, error / 4)
+    if WORK + points * frequencies * lengths.sum() + nodes.shape[1] * each > points * each:
+        return None
+    return Box(middle, half, _terms(nodes, counts, array, frequencies), lengths)
 
 
 def _every_point(places: np.ndarray, array: Arrays, out: np.ndarray) -> None:

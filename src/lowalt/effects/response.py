@@ -62,12 +62,13 @@ def response(
 class OneWayFactors:
     """All points' one-way factors over every path at given instants, from which responses to any strengths follow.
 
-    The arguments are those of `response`.
+    The arguments are those of `response`; kept: polynomials of spherical waves that serve several instants of the same
+    symbols, filled by the first of them.
     """
 
     def __init__(
         self, network: Network, station: Station, places: np.ndarray, aim_m: np.ndarray,
-        paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float,
+        paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float, kept: dict | None = None,
     ):  # fmt: skip
         self.radio = radio = radar(network, station)
         if station.transmitter is not None and paths:
@@ -85,10 +86,15 @@ class OneWayFactors:
         self.rest = 10.0 ** np.floor(np.log10(error / 10))
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
-        self.out = [path.one_way(network.transmit, kappas, squint, wavefront, self.rest) for path in sending]
+        asked = kappas, squint, wavefront, self.rest
+        self.out = [
+            path.one_way(network.transmit, *asked, _own(kept, "out", number)) for number, path in enumerate(sending)
+        ]
         self.back = self.out
         if not symmetric:
-            self.back = [path.one_way(network.receive, kappas, squint, wavefront, self.rest) for path in chosen]
+            self.back = [
+                path.one_way(network.receive, *asked, _own(kept, "back", number)) for number, path in enumerate(chosen)
+            ]
 
     def summed(self, strength: np.ndarray) -> np.ndarray:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
@@ -123,6 +129,11 @@ class OneWayFactors:
             planes = (planes @ table).reshape(len(refs), 2, -1)
             moment_loops.delayed(planes, own, whole, refs[:, REST] + middle, result)
         return result
+
+
+def _own(kept: dict | None, *key) -> dict | None:
+    """The part of `kept` that belongs to one array over one path, None where nothing is kept."""
+    return None if kept is None else kept.setdefault(key, {})
 
 
 class _OneWay(NamedTuple):
@@ -172,11 +183,13 @@ class _PathFactors:
         self.coefficient = np.atleast_2d(np.asarray(path.coefficient, np.complex128))
 
     def one_way(
-        self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, wavefront: bool, error: float
-    ) -> _OneWay:
+        self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, wavefront: bool, error: float,
+        kept: dict | None,
+    ) -> _OneWay:  # fmt: skip
         """Return coefficient, array sum, 1/r and half the two-way phase of all points, and their excess range.
 
-        kappas: the arrays' frequencies (Q,) over the carrier. Raises: InputError for a point in the station.
+        kappas: the arrays' frequencies (Q,) over the carrier; kept: as in `near_field.sums`.
+        Raises: InputError for a point in the station.
         """
         radio, axes = self.radio, (self.radio.sine, self.radio.cosine)
         spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
@@ -193,7 +206,7 @@ class _PathFactors:
                 radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
                 response_loops.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
             )  # fmt: skip
-            near_field.sums(self.places, array, error, gains)
+            near_field.sums(self.places, array, error, gains, kept)
         fault = response_loops.one_way(
             self.places, radio.station, axes, self.refs, self.origin, 0.5 * radio.turns, spacing, self.aims,
             radio.kappa, kappas, squint, shape, self.coefficient, gains, out, excess,

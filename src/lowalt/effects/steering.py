@@ -23,20 +23,21 @@ class Steered:
 
     def __init__(
         self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
-        error: float = 1e-14,
+        error: float = 1e-14, kept: dict | None = None,
     ):  # fmt: skip
+        """Prepare the factors; kept: as in `response.OneWayFactors`, for every beam."""
         self.view, asked = view, {"squint": squint, "wavefront": wavefront, "error": error}
         given = view.network, view.station
         if view.beams is None or len(view.beams.starts_s) == 1:
-            self.beams = [(slice(None), 1.0, OneWayFactors(*given, view.places, view.aim_m, paths, **asked))]
+            self.beams = [(slice(None), 1.0, OneWayFactors(*given, view.places, view.aim_m, paths, kept=kept, **asked))]
             return
         self.beams = []
         for number, rows in view.beam_rows():
             some = [ImagePath(path.places[rows], _rows_of(path.coefficient, rows)) for path in paths]
             aim = view.beams.aims_m[number]
-            self.beams.append(
-                (rows, _kept_phase(view, aim), OneWayFactors(*given, view.places[rows], aim, some, **asked))
-            )
+            own = None if kept is None else kept.setdefault(number, {})
+            rays = OneWayFactors(*given, view.places[rows], aim, some, kept=own, **asked)
+            self.beams.append((rows, _kept_phase(view, aim), rays))
 
     def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
         """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`.

@@ -108,8 +108,7 @@ class TargetEcho:
         many samples.
         """
         delays, weights = times
-        everyone = np.arange(len(view.times_s))
-        groups: list[tuple[int, np.ndarray | float, np.ndarray]] = [(0, factor, everyone)]
+        groups: list[tuple[int, np.ndarray | float, np.ndarray | slice]] = [(0, factor, slice(None))]
         if "cyclic_prefix" in on:
             cut = self.by_need["cyclic_prefix"]
             first = cut.module.first_samples(cut.settings, view)
@@ -119,12 +118,15 @@ class TargetEcho:
         held = self._paths if view is self.view else self._paths_of(view)
         samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
         now, before = self.sending.aired[rows], self.sending.aired_before[rows] if "cyclic_prefix" in on else None
-        for delay, weight in zip(delays, weights, strict=True):
-            later = view.at(view.times_s + delay) if "symbol_motion" in on else view
+        kept: dict = {}
+        seen = view.at_each(view.times_s + delays[:, None]) if "symbol_motion" in on else [view]
+        for later, weight in zip(seen, weights, strict=True):
             paths = held
             if held and later is not view:
                 paths = [ImagePath(new, old.coefficient) for new, old in zip(self._images_of(later), held, strict=True)]
-            rays = Steered(later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error)
+            rays = Steered(
+                later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error, kept=kept
+            )
             for count, strength, lit in groups:
                 spectrum = rays.echo(strength)[lit]
                 echo = waveform.transmit(spectrum, now[lit])
@@ -170,6 +172,7 @@ def _every_row(factor: np.ndarray, count: int) -> np.ndarray:
     return np.broadcast_to(factor, (*factor.shape[:-2], count, factor.shape[-1]))
 
 
-def _any_of(chosen: np.ndarray) -> np.ndarray:
-    """Return the symbols (K,) in which any point (N, L) is chosen."""
-    return np.flatnonzero(chosen.any(axis=1))
+def _any_of(chosen: np.ndarray) -> np.ndarray | slice:
+    """Return the symbols (K,) in which any point (N, L) is chosen, as a slice where these are all."""
+    found = chosen.any(axis=1)
+    return slice(None) if found.all() else np.flatnonzero(found)

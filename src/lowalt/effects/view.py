@@ -1,5 +1,6 @@
 """One moving target as one station sees it: poses, places and normals, each computed when first needed."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -15,6 +16,10 @@ from lowalt.targets.cloud import Cloud
 
 if TYPE_CHECKING:
     from lowalt.effects.transmitter.slow_time import Sampling
+
+
+TOGETHER = 16
+"""Instants of a look whose poses are computed together."""
 
 
 class Beams(NamedTuple):
@@ -101,6 +106,18 @@ class View:
     def at(self, times_s: np.ndarray) -> "View":
         """Return the same target seen at other times (K,) s of the look."""
         return replace(self, times_s=times_s)
+
+    def at_each(self, times_s: np.ndarray) -> Iterator["View"]:
+        """Yield the same target seen at each row of times (Q, K) s; poses of TOGETHER rows are computed in one go."""
+        for first in range(0, len(times_s), TOGETHER):
+            some = times_s[first : first + TOGETHER]
+            motion, count = self.at(some.ravel()).motion, times_s.shape[1]
+            for number, row in enumerate(some):
+                rows, later = slice(number * count, (number + 1) * count), self.at(row)
+                later.__dict__["motion"] = motion._replace(
+                    rotation=motion.rotation[rows], translation=motion.translation[rows]
+                )
+                yield later
 
     def seen_from(self, place_m: np.ndarray) -> "View":
         """Return the same target, at the same instants and under the same beams, seen from another place (3,) m."""

@@ -84,7 +84,9 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
     """Return the points' images (N, L, 3) m below the ground."""
-    return [view.places * [1.0, 1.0, -1.0]]
+    mirrored = view.places.copy()
+    np.negative(mirrored[..., 2], out=mirrored[..., 2])
+    return [mirrored]
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
