@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented methods confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -36,7 +36,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(PIP) -c envs/constraints.txt uv || true
 	$(call install,-e '.[workflow$(comma)cost]')
-	rm -f $(SETUP) $(TESTING) $(DOCS)
+	rm -f $(SETUP) $(TESTING) $(DOCS) .venv/set-up-methods
 	touch $@
 
 $(SETUP): $(BASE)
@@ -44,7 +44,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,notebooks) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 $(DOCS): $(BASE)
@@ -170,6 +170,18 @@ invented: $(SETUP)  ## the default's schemes trained also on craft and birds of 
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
 	$(SNAKEMAKE) --configfile config/with-invented.yaml $(OVERLAY)
 
+# The classical methods' packages, which nothing else needs.
+METHODS := .venv/set-up-methods
+$(METHODS): $(SETUP)
+	$(call install,$(call of_extra,methods))
+	touch $@
+
+methods: $(METHODS)  ## methods that people ask about, on the default's data: fusions, networks on signals, classical ones on features: results/methods
+	$(SNAKEMAKE) -- data
+	$(SNAKEMAKE) -- slow_times training_samples
+	$(SNAKEMAKE) --configfile config/methods.yaml
+	$(SNAKEMAKE) --configfile config/methods.yaml -- accuracy_cost
+
 confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
 	$(SNAKEMAKE) --configfile config/confirm.yaml
 
@@ -208,6 +220,9 @@ space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/t
 reference-choices: $(SETUP)  ## keep the tables of a finished `make choices` and a finished `make confirm`
 	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
 	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
+
+reference-methods: $(SETUP)  ## keep the tables of a finished `make methods`
+	for table in $(REFERENCE) alarms.csv accuracy_cost.csv; do cp results/methods/$$table results/reference/methods-$$table; done
 
 reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
 	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done

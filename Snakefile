@@ -72,6 +72,12 @@ rule training_samples:
     localrule: True
 
 
+rule slow_times:
+    input:
+        products.slow_times,
+    localrule: True
+
+
 # What needs no torch before the first training: `make` has it made while torch is still on its way.
 rule prepared:
     input:

@@ -7,6 +7,7 @@
 rule speed:
     input:
         code=code("lowalt.measure.network_speed"),
+        model=products.timed_model,
         schemes=config["recognition"]["table"],
     output:
         "results/{run}/speed/{scheme}.json",
@@ -21,9 +22,10 @@ rule speed:
     params:
         settings=settings.training,
         stations=RUN.stations,
+        model=options.timed_model,
     shell:
         "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme}"
-        " --schemes {input.schemes:q} --stations {params.stations} --out {output:q} 2> {log:q}"
+        " --schemes {input.schemes:q} --stations {params.stations} {params.model} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_table:
@@ -45,9 +47,10 @@ rule accuracy_cost_table:
         "../../envs/environment.yaml"
     params:
         settings=settings.seed,
+        fidelity=options.fidelity,
     shell:
         "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --speeds {input.speeds:q} --index {input.index:q} --fidelity {input.fidelity:q}"
+        " --speeds {input.speeds:q} --index {input.index:q} {params.fidelity}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 

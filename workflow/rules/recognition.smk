@@ -28,6 +28,29 @@ rule views:
         " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.reduced} --out {output:q} 2> {log:q}"
 
 
+rule slow_time:
+    input:
+        unpack(products.noisy_chunk),
+        code=code("lowalt.recognition.slow_time"),
+        index=ancient("results/{run}/shards/index.json"),
+        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
+    output:
+        "results/{run}/slow_time/{group}-{fold}-{part}.npz",
+    log:
+        "results/{run}/logs/slow_time/{group}-{fold}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/slow_time/{group}-{fold}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        settings=settings.slow_time,
+        render=settings.index,
+        noisy=options.noisy_chunk,
+    shell:
+        "python -m lowalt.recognition.slow_time --settings {params.settings:q} --index {input.index:q}"
+        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.noisy} --out {output:q} 2> {log:q}"
+
+
 rule freeze:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.freeze"),

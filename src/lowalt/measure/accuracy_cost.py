@@ -14,7 +14,8 @@ Settings: seed. accuracy_cost.csv, one row a scheme and SNR ("avg": mean over th
     inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in memory
     train_ms             of one sample of a training step on one core, images in memory
     core_s_training      processor time of the whole training, validation included
-    network_bytes        index images a sample that the network takes in; shard_bytes: bytes a sample in the shards
+    network_bytes        bytes of images, signals or features a sample that the network takes in; shard_bytes: bytes a
+                         sample in the shards
     seeds, spread_points fidelity: training seeds, and the standard deviation of accuracy between a model's seeds
     front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
 """
@@ -94,6 +95,11 @@ def entries(
     return found
 
 
+def _input_bytes(scheme: Scheme, size: int) -> int:
+    """Bytes a sample that a scheme takes in: index images of `size` pixels, complex64 signals or float32 features."""
+    return len(scheme.columns) * {"images": size * size, "signals": 8 * size, "features": 4 * size}[scheme.sees]
+
+
 def _what(entry: Entry) -> dict:
     """The columns that describe a scheme and its network, whatever the SNR."""
     scheme, stations, speed, shard_bytes = entry
@@ -103,7 +109,7 @@ def _what(entry: Entry) -> dict:
         "stations": stations, "steps": speed["steps"],
         "parameters": speed["parameters"], "inference_ms_1": speed["inference_ms_1"],
         "inference_ms_64": speed["inference_ms_64"], "train_ms": speed["train_ms"],
-        "network_bytes": len(scheme.columns) * speed["size"] ** 2, "shard_bytes": shard_bytes,
+        "network_bytes": _input_bytes(scheme, speed["size"]), "shard_bytes": shard_bytes,
         "hardware": speed["hardware"],
     }  # fmt: skip
 

@@ -10,6 +10,7 @@ from lowalt.common.files import existing, replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
+from lowalt.recognition.sources import name_sources, of_size
 
 
 def _views(arguments: list[str]) -> None:
@@ -48,31 +49,26 @@ def _freeze(arguments: list[str]) -> None:
     print(f"{given.out}: {freeze.verify(given.out)} files as frozen", file=sys.stderr)
 
 
-def _sources(line) -> None:
-    """Add the arguments that name samples: cached views, shards, or a data set that makes them."""
-    line.add_argument("--views", nargs="+", help="caches of views (.npz)")
-    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
-    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
-    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
-
-
 def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
     """Return the samples of some (group, fold) pairs from the source the command line names."""
     from lowalt.recognition.samples import ViewSamples
     from lowalt.recognition.views import ShardSamples
 
-    if sum(source is not None for source in (given.views, given.index, given.dataset)) != 1:
-        raise InputError("expected one of --views, --index and --dataset")
+    if sum(source is not None for source in (given.views, given.signals, given.index, given.dataset)) != 1:
+        raise InputError("expected one of --views, --signals, --index and --dataset")
+    if (given.signals is None) != (scheme.sees == "images"):
+        raise InputError(f"--signals: scheme {scheme.name!r} sees {scheme.sees}")
+    if given.signals is not None:
+        from lowalt.recognition.slow_time import SlowTimeSamples
+
+        return of_size(SlowTimeSamples(given.signals, scheme.sees, scheme.columns, pairs), scheme, size)
     if given.dataset is not None:
         from lowalt.recognition.made import DatasetSamples, opened
 
         return DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
     if given.views is None:
         return ShardSamples(given.index, scheme.columns, pairs, size, placed)
-    found = ViewSamples(given.views, scheme.columns, pairs)
-    if found.size != size:
-        raise InputError(f"--views: images of {found.size} pixels, settings say {size}")
-    return found
+    return of_size(ViewSamples(given.views, scheme.columns, pairs), scheme, size)
 
 
 def _train(arguments: list[str]) -> None:
@@ -83,7 +79,7 @@ def _train(arguments: list[str]) -> None:
     from lowalt.recognition.samples import ViewSamples, first_models, with_extra
 
     line = parser("lowalt.recognition train", _train.__doc__)
-    _sources(line)
+    name_sources(line)
     line.add_argument("--extra", nargs="+", help="caches of views of other runs that are trained on too")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
@@ -115,7 +111,7 @@ def _evaluate(arguments: list[str]) -> None:
     from lowalt.recognition.runs import evaluate, load
 
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
-    _sources(line)
+    name_sources(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
@@ -226,8 +222,9 @@ def _export(arguments: list[str]) -> None:
 
 
 COMMANDS = {
-    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train, "evaluate": _evaluate,
-    "tables": _tables, "transfer": _transfer, "score": _score, "predict": _predict, "export": _export,
+    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train,
+    "evaluate": _evaluate, "tables": _tables, "transfer": _transfer, "score": _score, "predict": _predict,
+    "export": _export,
 }  # fmt: skip
 
 

@@ -26,11 +26,14 @@ class Probabilities(nn.Module):
 def export(trained: Trained, out: str | Path) -> None:
     """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size.
 
-    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not installed.
+    Raises: InputError for another suffix, a model that sees no images, or where ONNX is asked for and its packages are
+    not installed.
     """
     suffix = Path(out).suffix
     if suffix not in (".pt2", ".onnx"):
         raise InputError(f"--out {out}: expected a name ending in .pt2 or .onnx")
+    if trained.scheme.sees != "images":
+        raise InputError(f"--model: scheme {trained.scheme.name!r} sees {trained.scheme.sees}, expected one on images")
     model = Probabilities(trained.model).eval()
     # Two samples, since a batch of one would be taken for a constant.
     example = torch.zeros(2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8)

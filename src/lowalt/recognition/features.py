@@ -96,7 +96,7 @@ def _first_peak(likeness: np.ndarray, first: int, share: float) -> tuple[np.ndar
 
 
 def repetition_hz(signals: np.ndarray, interval_s: float, most_s: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rate (B,) Hz at which the envelope repeats itself, and the periodicity (B,), its autocorrelation there.
+    """Return the rate (B,) Hz at which the envelope repeats itself, and its periodicity (B,), the autocorrelation.
 
     N equal blades that turn at F repeat at N F, wings that beat at F at F; above half the symbol rate the rate folds.
     The shortest lag counts whose autocorrelation is a peak of at least 0.7 of the highest, up to most_s.

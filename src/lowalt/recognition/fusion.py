@@ -14,7 +14,7 @@ from torch import nn
 from lowalt.common.errors import InputError
 
 
-def _encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
+def encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:
     """Return a transformer encoder of `depth` layers over tokens of `width` features; the identity for depth 0."""
     if depth == 0:
         return nn.Identity()
@@ -56,8 +56,8 @@ class AttentionFusion(Fusion):
         self.modality = nn.Parameter(torch.empty(views, width))
         nn.init.trunc_normal_(self.modality, std=0.02)
         shape = (block["heads"], block["feed_forward"], block["dropout"])
-        self.intra = _encoder(width, block["intra_depth"], *shape)
-        self.inter = _encoder(width, block["inter_depth"], *shape)
+        self.intra = encoder(width, block["intra_depth"], *shape)
+        self.inter = encoder(width, block["inter_depth"], *shape)
 
     def forward(self, tokens: torch.Tensor) -> torch.Tensor:
         """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F."""

@@ -6,6 +6,7 @@ from torch.utils.data import Dataset
 
 from lowalt.common.streams import stream
 from lowalt.recognition.augment import augment
+from lowalt.recognition.augment_signals import augment_signals
 from lowalt.recognition.inference import Machine
 
 
@@ -18,10 +19,15 @@ class Reader(Dataset):
         self.rank, self.ranks = machine.rank, machine.ranks
 
     def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return this rank's share of a batch: index images (B, views, S, S) uint8 and labels (B,)."""
+        """Return this rank's share of a batch: index images (B, views, S, S) uint8, or signals (B, stations, N)
+        complex64, and labels (B,)."""
         step, numbers = item
         mine = numbers[self.rank :: self.ranks]
         seed, *keys = self.keys
         generator = stream(seed, "recognition-augment", *keys, step, self.rank)
-        images = augment(self.source.views(mine), self.columns, self.augmentation, generator)
-        return torch.from_numpy(images), torch.from_numpy(self.source.facts.label[mine]).long()
+        seen = self.source.views(mine)
+        if np.iscomplexobj(seen):
+            seen = augment_signals(seen, self.augmentation, generator)
+        else:
+            seen = augment(seen, self.columns, self.augmentation, generator)
+        return torch.from_numpy(seen), torch.from_numpy(self.source.facts.label[mine]).long()

@@ -13,15 +13,18 @@ from pathlib import Path
 import numpy as np
 import timm
 import torch
+from torch import nn
 
 from lowalt.common.classes import stated
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, sha256
 from lowalt.common.hardware import describe
+from lowalt.common.network import Network
 from lowalt.recognition import (
     augment,
     checkpoint,
+    classical_runs,
     inference,
     metrics,
     network,
@@ -30,15 +33,18 @@ from lowalt.recognition import (
     recipe,
 )  # fmt: skip
 from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.classical_models import of_arrays
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.methods import built
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import SPECTRA, Scheme, columns_in
+from lowalt.recognition.schemes import Scheme, columns_in
+from lowalt.recognition.slow_time import SlowTimeSamples, of_stations
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
 from lowalt.spectra.catalogue import named
-from lowalt.tiles import colour_map, resize
+from lowalt.tiles import resize
 
-Samples = ViewSamples | ShardSamples
+Samples = ViewSamples | ShardSamples | SlowTimeSamples
 
 
 def train(
@@ -55,8 +61,10 @@ def train(
     block, classes = recipe.check(settings["training"]), settings["classes"]
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
+    if scheme.sees == "features":
+        _record(folder / "run.json", classical_runs.train(samples, scheme, protocol, settings, folder))
+        return
     augment.check(settings["augmentation"])
-    palettes = np.stack([colour_map(settings["colour_map"])] * len(SPECTRA))
     machine = Machine.here(block["precision"])
     own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
     # Leave out settings that change no weight, and name the precision that this machine computes with.
@@ -68,7 +76,7 @@ def train(
     )  # fmt: skip
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
-    model = network.Recogniser(scheme, settings["network"], settings["size"], palettes, len(classes))
+    model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
     resumed = trainer.resume()
     if resumed and machine.rank == 0:
@@ -85,7 +93,8 @@ def train(
     if machine.rank == 0:
         _record(folder / "run.json", {
             "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
-            "backbone": scheme.backbone or settings["network"]["backbone"], "weights": settings["network"]["weights"],
+            "backbone": scheme.method or scheme.backbone or settings["network"]["backbone"],
+            "weights": settings["network"]["weights"],
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
             "train_processor_s": busy, "size": settings["size"], "steps": at.steps, "batch": block["batch"],
@@ -106,7 +115,7 @@ def _record(path: Path, content: dict) -> None:
 class Trained:
     """A trained model read back: the network with its weights, what it sees, and where it came from."""
 
-    model: network.Recogniser
+    model: nn.Module
     scheme: Scheme
     protocol: str
     size: int
@@ -124,9 +133,11 @@ def load(path: str | Path) -> Trained:
     try:
         block = {**state["network"], "weights": "none"}
         scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
-        palettes = np.stack([colour_map(state["colour_map"])] * len(SPECTRA))
-        model = network.Recogniser(scheme, block, state["size"], palettes, len(stated(state)))
-        model.load_state_dict(state["weights"])
+        if scheme.sees == "features":
+            model = of_arrays(state["weights"])
+        else:
+            model = built(scheme, block, state["size"], state["colour_map"], len(stated(state)))
+            model.load_state_dict(state["weights"])
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
@@ -182,21 +193,39 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     spectra = len(named(settings["spectra"]))
     if path.suffix == ".png":
         return split(decode(path.read_bytes())[0], spectra)
+    return split(Renderer.from_settings(settings).tile(_signals(path)), spectra)
+
+
+def _signals(path: Path) -> np.ndarray:
+    """Return the array of a signal file. Raises: InputError for another kind of file."""
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
     try:
-        signals = np.load(path, allow_pickle=False)
+        return np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: not an array file ({error})") from error
-    return split(Renderer.from_settings(settings).tile(signals), spectra)
+
+
+def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:
+    """Return the input of a model, one sample (1, ...), from a signal file or, for models on images, a tile.
+
+    Raises: InputError where a model on signals is given something else than the signals of its network.
+    """
+    if trained.scheme.sees == "images":
+        images = images_of(path, settings)
+        names = named(settings["spectra"])
+        places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
+        return resize(images, trained.size)[places][None]
+    network_of, signals = Network.from_settings(settings["network"]), _signals(path)
+    if signals.shape != (len(network_of.stations), network_of.symbols):
+        raise InputError(f"{path}: shape {signals.shape}, expected {len(network_of.stations), network_of.symbols}")
+    signals = signals.astype(np.complex64)[None]
+    values = signals if trained.scheme.sees == "signals" else of_stations(signals, network_of)
+    return values[:, trained.scheme.columns]
 
 
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     """Return the probability of each category for one signal file or tile, in full precision."""
-    images = images_of(path, settings)
-    names = named(settings["spectra"])
-    places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
-    views = resize(images, trained.size)[places]
     with torch.inference_mode():
-        found = trained.model(torch.from_numpy(views[None])).double().softmax(1)[0]
+        found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
     return dict(zip(trained.classes, found.tolist(), strict=True))

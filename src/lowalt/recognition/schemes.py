@@ -14,6 +14,9 @@ A table may have more columns, which a row leaves empty to take the configuratio
     size        pixels a side the network sees
     steps       optimiser steps
     share       share of the motion models of each subtype that train, 0..1 (empty: all)
+    method      empty: the network on images. Otherwise the scheme sees signals or features and names no spectra:
+                cnn | complex | transformer on the stations' signals (fusion and stations as for images; size: symbols
+                of a signal); svm | boosting | xgboost on physical features of all its stations (fusion: concatenation)
 """
 
 from collections.abc import Sequence
@@ -32,7 +35,12 @@ SPECTRA = tuple(name.upper() for name in NAMES)
 FUSIONS = ("attention", "mean", "voting", "concatenation")
 PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
-OPTIONAL = ("size", "steps", "share")
+OPTIONAL = ("size", "steps", "share", "method")
+SEES = {
+    "": "images", "cnn": "signals", "complex": "signals", "transformer": "signals",
+    "svm": "features", "boosting": "features", "xgboost": "features",
+}  # fmt: skip
+"""The input of each method: images of spectra, slow-time signals, or physical features of these."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +57,12 @@ class Scheme:
     size: int = 0
     steps: int = 0
     share: float = 1.0
+    method: str = ""
+
+    @property
+    def sees(self) -> str:
+        """Input of the scheme: "images", "signals" or "features"."""
+        return SEES[self.method]
 
     def settled(self, settings: dict) -> dict:
         """Return the settings of a training with this row's own size and steps in them."""
@@ -62,10 +76,13 @@ class Scheme:
 
     @property
     def columns(self) -> list[int]:
-        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number.
+        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number; of a scheme
+        that sees no images, the numbers of its stations.
 
         `columns_in` gives their places in a data set, which may have fewer spectra.
         """
+        if self.sees != "images":
+            return list(self.stations)
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
 
 
@@ -106,6 +123,19 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
     return value
 
 
+def _method(row: dict, where: str) -> str:
+    """Return the method of a row; refuse an unknown one, and columns that say nothing about it."""
+    method = row.get("method") or ""
+    if method not in SEES:
+        raise InputError(f"{where}: method {method!r}, expected nothing or one of {list(SEES)[1:]}")
+    for column in ("spectra", "backbone") if method else ():
+        if row[column]:
+            raise InputError(f"{where}: {column} {row[column]!r} with method {method!r}, expected an empty cell")
+    if SEES[method] == "features" and row["fusion"] != "concatenation":
+        raise InputError(f"{where}: fusion {row['fusion']!r} with method {method!r}, expected concatenation")
+    return method
+
+
 def _station_names(text: str, known: Sequence[str]) -> list[str]:
     """Split names of stations, "north+south" or "ABC"."""
     names = text.split("+")
@@ -130,16 +160,18 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
     protocols = tuple(row["protocols"].split("+"))
     _indices(row["protocols"], list(protocols), PROTOCOLS, "protocols", where)
     listed = _station_names(row["stations"], stations)
+    method = _method(row, where)
     return Scheme(
         name=row["scheme"],
         stations=_indices(row["stations"], listed, tuple(stations), "stations", where),
-        spectra=_indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
+        spectra=() if method else _indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
         fusion=row["fusion"],
         backbone=row["backbone"],
         protocols=protocols,
         size=int(_number(row, "size", int, 8, 4096, where)),
         steps=int(_number(row, "steps", int, 1, 1e9, where)),
         share=float(_number(row, "share", float, 1e-6, 1.0, where)),
+        method=method,
     )
 
 

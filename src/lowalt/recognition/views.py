@@ -114,6 +114,20 @@ class Reduced:
         return images[places]
 
 
+def located(index: str | Path, name: str) -> tuple[ShardSet, np.ndarray]:
+    """Return the data set of an index and the numbers of the samples of its shard `name`.
+
+    Raises: InputError where the index has no such shard.
+    """
+    shards = ShardSet(index)
+    names = [shard["name"] for shard in shards.shards]
+    if name not in names:
+        raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
+    place = names.index(name)
+    start = sum(shard["samples"] for shard in shards.shards[:place])
+    return shards, np.arange(start, start + shards.shards[place]["samples"])
+
+
 def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source: Reduced | None = None) -> int:
     """Write the cache file of the shard `name` and return its number of samples.
 
@@ -123,13 +137,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     """
     if isinstance(size, bool) or not isinstance(size, int) or size < 8:
         raise InputError(f"settings: size is {size!r}, expected a whole number of pixels >= 8")
-    shards = ShardSet(index)
-    names = [shard["name"] for shard in shards.shards]
-    if name not in names:
-        raise InputError(f"{index}: no shard {name!r}, expected one of {names}")
-    place = names.index(name)
-    start = sum(shard["samples"] for shard in shards.shards[:place])
-    numbers = np.arange(start, start + shards.shards[place]["samples"])
+    shards, numbers = located(index, name)
     # Decoding checks the images, so the records are read without a second check.
     facts = facts_of(ShardSet(index, check=False), numbers)
     if source:

@@ -46,8 +46,26 @@ def extra(wildcards: Any, input: Any) -> str:
     return f"--extra {input.extra}" if input.get("extra") else ""
 
 
+def noisy_chunk(wildcards: Any, input: Any) -> str:
+    """The noisy signals of a chunk and its motion table, where shards hold images alone."""
+    return f"--noisy {input.noisy} --motion {input.motion}" if input.get("noisy") else ""
+
+
+def timed_model(wildcards: Any, input: Any) -> str:
+    """The trained model to time, where time depends on what was learnt."""
+    return f"--model {input.model}" if input.model else ""
+
+
+def fidelity(wildcards: Any, input: Any) -> str:
+    """The table of models trained on echoes at a tolerance, where there is one."""
+    return f"--fidelity {input.fidelity}" if input.fidelity else ""
+
+
 def samples(wildcards: Any, input: Any) -> str:
-    """Option that names the shrunk images, the index of the shards, or the configuration to make samples from."""
+    """Option that names the signals, the shrunk images, the index of the shards, or the configuration to make samples
+    from."""
     if input.get("dataset"):
         return f"--dataset {input.dataset}"
+    if input.get("signals"):
+        return f"--signals {input.signals}"
     return f"--views {input.views}" if input.get("views") else f"--index {input.index}"

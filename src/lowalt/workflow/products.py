@@ -34,8 +34,10 @@ class Products(DataProducts):
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
-        shards, or the clouds from which samples are made on the spot."""
-        base = f"results/{self._run.data}"
+        shards, or the clouds from which samples are made on the spot; signals where the scheme sees no images."""
+        base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
+        if scheme.sees != "images":
+            return {"signals": [f"{base}/slow_time/{shard}.npz" for shard in self._run.plan.shards]}
         if self._config["recognition"].get("input") == "dataset":
             clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
             surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
@@ -43,7 +45,7 @@ class Products(DataProducts):
             return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
         if not self._config["recognition"]["cache"]:
             return {"index": f"{base}/shards/index.json"}
-        size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
+        size = self._run.pixels(scheme)
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
@@ -76,9 +78,26 @@ class Products(DataProducts):
 
     def own_views(self, wildcards: Any) -> list[str]:
         """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
-        sizes = sorted({self._run.pixels(scheme) for scheme in self._run.trained})
-        shards = self._run.plan.shards
+        sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
+
+    def slow_times(self, wildcards: Any) -> list[str]:
+        """Signals and features of this run's own samples, for schemes that see no images."""
+        return [f"results/{self._run.name}/slow_time/{shard}.npz" for shard in self._run.plan.shards]
+
+    def noisy_chunk(self, wildcards: Any) -> dict[str, str]:
+        """Noisy signals of a chunk and its motion table; nothing where shards hold the signals themselves."""
+        if self._config["shards"]["kind"] != "image":
+            return {}
+        noisy = f"results/{wildcards.run}/noisy/{wildcards.group}-{wildcards.part}.npy"
+        return {"noisy": noisy, "motion": self.motion(wildcards)}
+
+    def timed_model(self, wildcards: Any) -> list[str]:
+        """The trained model that is timed, where time depends on what was learnt: a classical method's; else none."""
+        if self._run.schemes_by_slug[wildcards.scheme].sees != "features":
+            return []
+        seed = self._config["recognition"]["seeds"][0]
+        return [f"results/{wildcards.run}/models/unseen/{wildcards.scheme}/{seed}/model.pt"]
 
     def frozen(self, wildcards: Any) -> list[str]:
         """Checksums of the clouds and motion tables of all samples that are trained on."""
@@ -119,11 +138,13 @@ class Products(DataProducts):
         groups, stem = self._run.plan.groups, f"results/{wildcards.run}/effects"
         return [f"{stem}/{group}-{name}.npz" for name in reversed(self._calls.all) for group in groups]
 
-    def fidelity(self, wildcards: Any) -> str:
-        """The table of models trained on echoes at a tolerance, made by other runs.
+    def fidelity(self, wildcards: Any) -> str | list[str]:
+        """The table of models trained on echoes at a tolerance, made by other runs; none for a run on another's data.
 
         Raises: InputError naming the command that makes it, where it is missing.
         """
+        if self._run.data != self._run.name:
+            return []
         if not Path(FIDELITY).is_file():
             raise InputError(f"no {FIDELITY}: it comes from runs of their own, `make accuracy-cost` makes it first")
         return FIDELITY
@@ -185,7 +206,7 @@ class Products(DataProducts):
         run, plan = self._run, self._run.plan
         kind = self._config["shards"]["kind"]
         cached = self._config["recognition"]["cache"]
-        sizes = sorted({run.pixels(scheme) for scheme in run.trained}) if cached else []
+        sizes = run.image_sizes if cached else []
         echoes = [f"{chunk}-{station}" for chunk in plan.sources for station in run.stations]
         data = [
             *(f"cloud/{subtype}" for subtype in run.subtypes),

@@ -9,6 +9,7 @@ from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition.schemes import Scheme
 from lowalt.shards.clean import refuse
 from lowalt.targets.records import missing_inputs, records_of
 
@@ -35,6 +36,17 @@ def refuse_input(config: dict) -> None:
     block = config["recognition"]
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
+
+
+def refuse_signals(config: dict, scheme: Scheme) -> None:
+    """Refuse a scheme on signals or features where their caches are not made, or of another number of symbols."""
+    block, symbols = config["recognition"], config["network"]["symbols"]
+    if not block["cache"] or block.get("extra"):
+        raise InputError(
+            f"recognition: scheme {scheme.name!r} sees {scheme.sees}, expected cache: true and no other runs in extra"
+        )
+    if scheme.sees == "signals" and scheme.size != symbols:
+        raise InputError(f"scheme {scheme.name!r}: size {scheme.size}, expected the {symbols} symbols of a signal")
 
 
 def refuse_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:

@@ -26,6 +26,7 @@ from lowalt.workflow.refusals import (
     refuse_heights,
     refuse_input,
     refuse_no_files,
+    refuse_signals,
     refuse_sizes,
 )
 
@@ -65,7 +66,10 @@ class Run:
             for name in (*block["schemes"], *block["timed"])
         }
         for name, scheme in schemes.items():
-            columns_in(scheme.columns, spectra_named(config["spectra"]), len(config["network"]["stations"]), name)
+            if scheme.sees == "images":
+                columns_in(scheme.columns, spectra_named(config["spectra"]), len(config["network"]["stations"]), name)
+            else:
+                refuse_signals(config, scheme)
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
         refuse_sizes(config)
@@ -171,7 +175,11 @@ class Run:
         Raises: InputError where no scheme is trained in the protocol "seen".
         """
         protocols = self.config["recognition"]["protocols"]
-        able = [scheme for scheme in self.trained if "seen" in scheme.protocols and "seen" in protocols]
+        able = [
+            scheme
+            for scheme in self.trained
+            if scheme.sees == "images" and "seen" in scheme.protocols and "seen" in protocols
+        ]
         if not able:
             raise InputError(
                 "recognition.schemes: none is trained in the protocol 'seen', expected one to ask about effects"
@@ -185,6 +193,11 @@ class Run:
     def images_of_job(self, wildcards: Any) -> int:
         """Images of one sample that the scheme of a job sees: its training takes time in proportion."""
         return len(self.schemes_by_slug[wildcards.scheme].columns)
+
+    @cached_property
+    def image_sizes(self) -> list[int]:
+        """Pixels a side of the images that the trained schemes see."""
+        return sorted({self.pixels(scheme) for scheme in self.trained if scheme.sees == "images"})
 
     def pixels(self, scheme: Scheme) -> int:
         """Pixels a side that a scheme's network sees."""

@@ -124,6 +124,11 @@ class Settings:
         more = {"snr_db": snrs} if self._run.is_reduced(size) else {}
         return self._text("views", wildcards.size, *snrs, size=size, **more)
 
+    def slow_time(self, wildcards: Any) -> str:
+        """The SNRs of a chunk's signals."""
+        snrs = self._snrs(wildcards)
+        return self._text("slow_time", *snrs, snr_db=snrs)
+
     def training(self, wildcards: Any) -> str:
         """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
         block = self._config["recognition"]

@@ -1,0 +1,68 @@
+"""The workflow of `config/methods.yaml`: which files its trainings read, and which configurations are refused."""
+
+from types import SimpleNamespace
+
+import pytest
+import yaml
+
+from configured import ROOT, Inputs, parts, run_of
+from lowalt.common.config import merge
+from lowalt.common.errors import InputError
+from lowalt.common.yaml_files import load_yaml
+from lowalt.workflow import options
+
+METHODS = {"table": "config/methods.csv", "schemes": ["signal CNN", "images voting", "RBF-SVM on features"]}
+
+
+@pytest.fixture(autouse=True)
+def checkout(tmp_path, monkeypatch):
+    """A folder with a finished default run, as far as another run looks at it."""
+    (tmp_path / "config").symlink_to(ROOT / "config")
+    (tmp_path / "results/default").mkdir(parents=True)
+    (tmp_path / "results/default/config.yaml").write_text(yaml.safe_dump(load_yaml(ROOT / "config/default.yaml")))
+    monkeypatch.chdir(tmp_path)
+
+
+def test_every_row_of_the_methods_is_trained_in_both_protocols_or_timed():
+    run = run_of(load_yaml("config/methods.yaml"))
+    assert len(run.trainings) == 11 * 2 * 3 and len(run.schemes) == 15
+    assert {run.schemes[name].sees for name in run.schemes} == {"images", "signals", "features"}
+    assert run.image_sizes == [24] and run.asked.sees == "images"
+
+
+def test_a_training_reads_what_its_method_sees_from_the_data_set_s_own_run():
+    _, products, _ = parts({"run": "mine", "data": "default", "recognition": METHODS})
+    found = {
+        scheme: products.samples(SimpleNamespace(run="mine", scheme=scheme))
+        for scheme in ("signal-cnn", "images-voting", "rbf-svm-on-features")
+    }
+    assert [list(files) for files in found.values()] == [["signals"], ["views"], ["signals"]]
+    assert found["signal-cnn"]["signals"][0].startswith("results/default/slow_time/seen-train-")
+    assert options.samples(None, Inputs(signals="a b")) == "--signals a b"
+    assert products.own_views(None)[0].startswith("results/mine/views/24/")
+    # A run on another's data has no table of echoes at a tolerance; only a classical model is timed as trained.
+    assert products.fidelity(None) == [] and options.fidelity(None, Inputs(fidelity=[])) == ""
+    assert products.timed_model(SimpleNamespace(run="mine", scheme="signal-cnn")) == []
+    (model,) = products.timed_model(SimpleNamespace(run="mine", scheme="rbf-svm-on-features"))
+    assert model == "results/mine/models/unseen/rbf-svm-on-features/0/model.pt"
+    assert options.timed_model(None, Inputs(model=model)) == f"--model {model}"
+
+
+def test_signals_come_from_the_noise_stage_where_shards_hold_images():
+    job = SimpleNamespace(run="default", group="seen", part="00001", fold="train")
+    _, products, settings = parts({"recognition": METHODS})
+    assert products.noisy_chunk(job)["noisy"] == "results/default/noisy/seen-00001.npy"
+    assert options.noisy_chunk(job, Inputs(products.noisy_chunk(job))).startswith("--noisy results/default/noisy/")
+    assert "inf" in settings.slow_time(job)
+    _, products, _ = parts({"recognition": METHODS, "shards": {"kind": "signal"}, "tiles": {"reduced": []}})
+    assert products.noisy_chunk(job) == {} and options.noisy_chunk(job, Inputs()) == ""
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [({"recognition": {"cache": False}}, "sees signals, expected cache: true"),
+     ({"network": {"symbols": 384}}, "size 400, expected the 384 symbols")],
+)  # fmt: skip
+def test_schemes_on_signals_that_cannot_be_read_are_refused_by_name(overlay, words):
+    with pytest.raises(InputError, match=words):
+        run_of(merge({"recognition": METHODS}, overlay))
