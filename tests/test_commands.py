@@ -9,13 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from dataset import build, publish
 from lowalt import Dataset
 from lowalt.__main__ import main
 from lowalt.commands import workflow
-from lowalt.common.config import load_yaml
+from lowalt.common.config import load, load_yaml, plain
 from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.common.shipped import located
 from lowalt.recognition import runs
 from lowalt.report.figures.sample import axes_of
 from lowalt.tiles.png import decode
@@ -24,6 +26,7 @@ from trainings import train, with_training, write_views
 
 ROOT = Path(__file__).parents[1]
 CONFIG = load_yaml("config/default.yaml")
+SCHEMA = "workflow/schemas/config.schema.yaml"
 
 
 def renderer():
@@ -126,7 +129,7 @@ def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch)
             main([*words, "--help"])
         text = " ".join(capsys.readouterr().out.split())
         assert ended.value.code == 0 and "example: " in text
-        example = text.partition("example: ")[2]
+        example = text.partition("example: ")[2].partition(", or ")[0]
         assert f"lowalt {' '.join(words)}" in example
         if words != ["completion"]:
             parsed_only(monkeypatch, shlex.split(example)[1:])
@@ -153,10 +156,11 @@ ODD = (
     "predict README.md README.md", "predict README.md none.npy", "verify none.json", "verify README.md",
     "verify config", "verify config/targets.csv --remake 2", "remake none.json KEY", "remake README.md KEY",
     "compare none nowhere", "compare config docs", "report --gallery --results none",
-    "report --gallery --results config", "spectra none.yaml", "spectra README.md", "target inspect none.stl",
-    "target inspect README.md", "target inspect config", "target new none.stl --subtype Crow",
-    "target new README.md --subtype Nobody", "target make none.yaml", "target make README.md",
-    "target make config/tiny.yaml", "target show none.npz", "target show README.md",
+    "report --gallery --results config", "report", "report none", "report config", "report none --gallery",
+    "spectra none.yaml", "spectra README.md", "target inspect none.stl", "target inspect README.md",
+    "target inspect config", "target new none.stl --subtype Crow", "target new README.md --subtype Nobody",
+    "target make none.yaml", "target make README.md", "target make config/tiny.yaml", "target show none.npz",
+    "target show README.md",
 )  # fmt: skip
 
 
@@ -228,3 +232,24 @@ def test_predict_names_the_classes_by_their_probability(tmp_path, capsys):
     shown = [text.split()[-1] for text in capsys.readouterr().out.splitlines()]
     assert shown == sorted(found, key=found.get, reverse=True)
     assert main([*line[:2], str(tmp_path / "a.wav")]) == 2
+
+
+def test_report_asks_the_workflow_for_the_page_of_the_same_run(tmp_path, monkeypatch, capsys):
+    asked = []
+
+    def snakemake(line):
+        overlay = line[line.index("--configfile") + 1 :]
+        asked.append((load([*overlay[: overlay.index("--")]], SCHEMA), overlay[overlay.index("--") + 1 :]))
+        return given(returncode=0)
+
+    config = load(["config/default.yaml", "config/tiny.yaml"], SCHEMA)
+    del config["network"]["stations"]["C"]
+    (tmp_path / "results/tiny").mkdir(parents=True)
+    (tmp_path / "results/tiny/config.yaml").write_text(yaml.safe_dump(plain(config)))
+    (tmp_path / "results/moved").mkdir()
+    (tmp_path / "results/moved/config.yaml").write_text(yaml.safe_dump(plain(config)))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(workflow.subprocess, "run", snakemake)
+    assert main(["report", "results/tiny"]) == 0
+    assert plain(asked[0][0]) == plain(located(config)) and asked[0][1] == ["results/tiny/report.html"]
+    assert main(["report", "results/moved"]) == 2 and "of the run 'tiny'" in capsys.readouterr().err

@@ -1,35 +1,80 @@
-"""The command `lowalt report --gallery`: a page that links all finished runs and compares any two of them."""
+"""The command `lowalt report`: the page of one run, or a page that links all runs and compares any two of them."""
 
 import argparse
+import tempfile
 from pathlib import Path
 
+import yaml
+
+from lowalt.commands import workflow
 from lowalt.commands.compare import facts
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.shipped import located, shipped
+from lowalt.common.yaml_files import load_yaml
+
+BASE = "config/default.yaml"
 
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `report` to a parser's commands."""
     line = commands.add_parser(
-        "report", help="a page that links all finished runs and compares any two of them",
-        epilog="example: lowalt report --gallery",
+        "report", help="make the page of one run again, or a page that links all runs and compares any two",
+        epilog="example: lowalt report results/default, or lowalt report --gallery",
     )  # fmt: skip
-    line.add_argument("--gallery", action="store_true", required=True, help="write RESULTS/index.html")
+    line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
+    line.add_argument("--cores", default="all", help="cores to use (default: all)")
+    line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
+    line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
     line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
 
 
 def run(given: argparse.Namespace) -> str:
+    """Make what is asked for; return what was written.
+
+    Raises: InputError where neither or both are asked for, and as `page` and `gallery`.
+    """
+    if given.gallery == (given.run is not None):
+        raise InputError("report: expected the folder of a run, such as results/default, or --gallery")
+    return gallery(given.results) if given.gallery else page(given)
+
+
+def page(given: argparse.Namespace) -> str:
+    """Let the workflow make the page of a run, with all that it needs and that is not there or no longer current.
+
+    Ends with the workflow's status where that is not 0. Raises: InputError where the folder holds no run.
+    """
+    from lowalt.report.provenance import changes
+
+    if not (given.run / "config.yaml").is_file():
+        raise InputError(f"{given.run}: has no config.yaml, expected the folder of a run")
+    config = load_yaml(given.run / "config.yaml")
+    name = config.get("run")
+    written = f"results/{name}/report.html"
+    if not isinstance(name, str) or given.run.resolve() != Path(written).parent.resolve():
+        raise InputError(f"{given.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}")
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
+        yaml.safe_dump({"run": name, **changes(located(load_yaml(shipped(BASE))), config)}, overlay)
+        overlay.flush()
+        workflow.run(argparse.Namespace(
+            overlay=[Path(overlay.name)], configfile=[], target=[written], cores=given.cores,
+            dry_run=given.dry_run, profile=None,
+        ))  # fmt: skip
+    return "" if given.dry_run else written
+
+
+def gallery(results: Path) -> str:
     """Write index.html into the folder of runs; return what was written.
 
     Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be read.
     """
     from lowalt.report.gallery import gallery
 
-    folders = sorted(path.parent for path in given.results.glob("*/config.yaml"))
+    folders = sorted(path.parent for path in results.glob("*/config.yaml"))
     if not folders:
-        raise InputError(f"{given.results}: no run, expected folders with a config.yaml such as results/default")
+        raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
     pages = {path.name: f"{path.name}/report.html" for path in folders if (path / "report.html").is_file()}
     text = gallery({path.name: facts(path) for path in folders}, pages)
-    with replacing(given.results / "index.html") as temporary:
+    with replacing(results / "index.html") as temporary:
         temporary.write_text(text)
-    return f"{given.results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"
+    return f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
 
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
@@ -20,18 +21,39 @@ def view_of(cloud: Cloud) -> tuple[int, int, str]:
     return DIRECTIONS[cloud.like]
 
 
-def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
-    """Draw the first motion model of each class at `instants` equal steps of its cycle; returns PNG bytes."""
-    named = {cloud.subtype: cloud for cloud in clouds}
-    chosen = [
+def _chosen(rows: list[dict]) -> list[dict]:
+    """The first motion model of each class."""
+    return [
         next(row for row in rows if row["category"] == name) for name in dict.fromkeys(row["category"] for row in rows)
     ]
+
+
+def _frames(cloud: Cloud, row: dict, instants: int) -> tuple[np.ndarray, np.ndarray]:
+    """Instants (s) of one cycle, and the points at them, (instants, points, 3) m in the target's own frame."""
+    times = np.arange(instants) / instants * cycle_s(cloud, row)
+    return times, positions(cloud, still_row(row), times)
+
+
+def strip_rows(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> list[dict]:
+    """Return the points that `strip_figure` draws: subtype, time (ms), part, x, y, z (m, to 0.1 mm)."""
+    named, found = {cloud.subtype: cloud for cloud in clouds}, []
+    for row in _chosen(rows):
+        cloud = named[row["subtype"]]
+        for time, frame in zip(*_frames(cloud, row, instants), strict=True):
+            for part, point in zip(cloud.part.tolist(), np.round(frame, 4).tolist(), strict=True):
+                facts = {"subtype": cloud.subtype, "time_ms": float(f"{1000 * time:.6g}"), "part": part}
+                found.append(facts | dict(zip(("x_m", "y_m", "z_m"), point, strict=True)))
+    return found
+
+
+def strip_figure(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> Figure:
+    """Draw the first motion model of each class at `instants` equal steps of its cycle."""
+    named, chosen = {cloud.subtype: cloud for cloud in clouds}, _chosen(rows)
     figure, panels = plt.subplots(len(chosen), instants, figsize=(1.7 * instants, 1.8 * len(chosen)), squeeze=False)
     for line, row in zip(panels, chosen, strict=True):
         cloud = named[row["subtype"]]
         across, up, view = view_of(cloud)
-        times = np.arange(instants) / instants * cycle_s(cloud, row)
-        points = positions(cloud, still_row(row), times)
+        times, points = _frames(cloud, row, instants)
         low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
         half = 0.55 * max(high[across] - low[across], high[up] - low[up])
         middle = (low + high) / 2
@@ -44,4 +66,9 @@ def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> by
             panel.set_title(f"{1000 * time:.4g} ms", fontsize=8)
         line[0].set_ylabel(f"{row['subtype']}\n{view}", fontsize=8)
     figure.tight_layout()
-    return png(figure)
+    return figure
+
+
+def motion_strip(clouds: list[Cloud], rows: list[dict], instants: int = 7) -> bytes:
+    """Return `strip_figure` as PNG bytes."""
+    return png(strip_figure(clouds, rows, instants))

@@ -28,6 +28,15 @@ def png(figure: Figure, colours: int = 0) -> bytes:
     return buffer.getvalue()
 
 
+def svg(figure: Figure) -> str:
+    """Return the figure as SVG and close it; no dates and no random names inside, so equal figures are equal texts."""
+    buffer = io.StringIO()
+    with plt.rc_context({"svg.hashsalt": "lowalt"}):
+        figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
+    plt.close(figure)
+    return buffer.getvalue()
+
+
 def embedded(data: bytes) -> str:
     """Return PNG bytes as a data URL, so that the page holds the picture itself."""
     return "data:image/png;base64," + base64.b64encode(data).decode()
