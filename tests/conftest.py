@@ -1,10 +1,24 @@
-"""Fixtures that several test files share."""
+"""Fixtures that several test files share, and in which order files of tests run."""
 
 import math
 
 import pytest
 
 from meshes import write_bird, write_quad
+
+# Files that take long, the longest first. Two processes share the files of tests, one file at a time: a long file that
+# begins last would keep one of them alone at the end.
+LONG = (
+    "test_workflow", "test_workflow_reruns", "test_recognition_training", "test_recognition_resume",
+    "test_recognition_ranks", "test_contributing", "test_report_plots", "test_wheel", "test_attacks",
+    "test_recognition_export", "test_workflow_locks", "test_workflow_board", "test_turns", "test_targets_more",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    """Long files first; `--no-loadscope-reorder` lets pytest-xdist keep this order."""
+    place = {name: number for number, name in enumerate(LONG)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(LONG)))
 
 
 @pytest.fixture

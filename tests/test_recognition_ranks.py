@@ -14,67 +14,77 @@ from lowalt.recognition import checkpoint, predictions, schemes
 from lowalt.recognition.__main__ import main
 from trainings import SETTINGS, with_training
 
+# One start of the ranks for all that they are asked: importing torch takes each of them seconds.
+PROGRAM = """
+import json, sys
+from lowalt.recognition.__main__ import main
 
-def run_ranks(arguments, ranks):
-    if ranks == 1:
-        main(arguments)
-        return
+for line in json.loads(sys.argv[1]):
+    main(line)
+"""
+
+
+def on_two_ranks(folder, *lines):
+    """Run command lines of `python -m lowalt.recognition` one after the other under torchrun."""
+    (folder / "lines.py").write_text(PROGRAM)
     port = str(20000 + os.getpid() % 20000)
-    launch = ["-m", "torch.distributed.run", "--nproc-per-node", str(ranks), "--master-port", port]
+    launch = ["-m", "torch.distributed.run", "--nproc-per-node", "2", "--master-port", port]
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    command = [sys.executable, *launch, "-m", "lowalt.recognition", *arguments]
-    subprocess.run(command, check=True, capture_output=True, env=environment)
+    command = [sys.executable, *launch, str(folder / "lines.py"), json.dumps(lines)]
+    run = subprocess.run(command, capture_output=True, env=environment, text=True)
+    assert run.returncode == 0, run.stderr[-3000:]
 
 
-def predict_all(trained, views, out, ranks):
+def training_line(folder, views, name, batch):
+    """A command line that trains twelve steps without random images, into `folder`/`name`."""
+    table = folder / "schemes.csv"
+    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
+    settings = with_training(steps=12, validate_every=6, batch=batch)
+    settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
+    # The shipped backbone, whose batch norm needs the statistics of the whole batch.
+    shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
+    settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
+    return ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen",
+            "--scheme", "AB:VRP+VT", "--stations", "A", "B", "C", "--schemes", str(table),
+            "--out", str(folder / name)]  # fmt: skip
+
+
+def evaluation_line(folder, views, trained, name):
+    """A command line that evaluates a finished training, into `folder`/`name`."""
     settings = json.dumps({"batch": 6, "threads": 1, "precision": "fp32", "mirror": False})
-    run_ranks(["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
-               "--out", str(out)], ranks)  # fmt: skip
-    return predictions.read(out)
+    return ["evaluate", "--settings", settings, "--views", str(views), "--model", str(trained / "model.pt"),
+            "--out", str(folder / name)]  # fmt: skip
 
 
-def test_two_ranks_evaluate_to_the_same_bytes_as_one(trained, views, tmp_path):
-    found = predict_all(trained, views, tmp_path / "one.csv", 1)
-    predict_all(trained, views, tmp_path / "two.csv", 2)
-    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "two.csv").read_bytes()
+@pytest.fixture(scope="module")
+def both(views, trained, tmp_path_factory):
+    """A folder with the same training and the same evaluation by one rank and by two, and one of half the batch."""
+    folder = tmp_path_factory.mktemp("ranks")
+    main(training_line(folder, views, "one", 8))
+    main(training_line(folder, views, "half", 4))
+    main(evaluation_line(folder, views, trained, "one.csv"))
+    lines = training_line(folder, views, "two", 8), evaluation_line(folder, views, trained, "two.csv")
+    on_two_ranks(folder, *lines)
+    return folder
+
+
+def test_two_ranks_evaluate_to_the_same_bytes_as_one(both):
+    assert (both / "one.csv").read_bytes() == (both / "two.csv").read_bytes()
+    found = predictions.read(both / "one.csv")
     assert set(found.fold) == {"val", "test"}
     assert found.correct.mean() > 0.9
 
 
-def test_two_ranks_train_as_one_with_both_their_samples(views, tmp_path):
+def test_two_ranks_train_as_one_with_both_their_samples(both):
     """Gradients are means over the ranks' equal shares, so a step is that of one rank with the whole batch."""
-    table = tmp_path / "schemes.csv"
-    table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
     weights, losses = {}, {}
-    for name, ranks, batch in (("one", 1, 8), ("two", 2, 8), ("half", 1, 4)):
-        settings = with_training(steps=12, validate_every=6, batch=batch)
-        settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
-        # The shipped backbone, whose batch norm needs the statistics of the whole batch.
-        shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
-        settings["network"] = {**SETTINGS["network"], "dropout": 0.0, "backbone": shipped}
-        line = ["train", "--settings", json.dumps(settings), "--views", str(views), "--protocol", "seen"]
-        run_ranks(
-            [
-                *line,
-                "--scheme",
-                "AB:VRP+VT",
-                "--stations",
-                "A",
-                "B",
-                "C",
-                "--schemes",
-                str(table),
-                "--out",
-                str(tmp_path / name),
-            ],
-            ranks,
-        )
-        found = checkpoint.load(tmp_path / name / "model.pt")[1]["weights"]
+    for name, ranks in (("one", 1), ("two", 2), ("half", 1)):
+        found = checkpoint.load(both / name / "model.pt")[1]["weights"]
         assert any("running_var" in key for key in found)
         weights[name] = torch.cat([value.flatten() for value in found.values() if value.is_floating_point()])
-        with (tmp_path / name / "history.csv").open(newline="") as file:
+        with (both / name / "history.csv").open(newline="") as file:
             losses[name] = [float(row["validation_loss"]) for row in csv.DictReader(file)]
-        assert json.loads((tmp_path / name / "run.json").read_text())["ranks"] == ranks
+        assert json.loads((both / name / "run.json").read_text())["ranks"] == ranks
     apart = {name: float((weights[name] - weights["one"]).norm() / weights["one"].norm()) for name in ("two", "half")}
     # Sums in another order, which Adam magnifies where a gradient is zero except for rounding.
     assert apart["two"] < 1e-4 < 1e-3 < apart["half"]

@@ -4,8 +4,6 @@ import hashlib
 import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from lowalt.common.network import Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, read_table
 from lowalt.targets.cloud import read
+from snakemake_runs import run
 from snakemake_texts import MODULE, RULES, SPY, declared
 
 pytest.importorskip("snakemake")
@@ -29,6 +28,7 @@ OVERLAY = {
     "targets": {"select": ["DJI Mini 2", "DJI Mini 4 Pro", "Crow", "Walking Pedestrian 5"]},
     "motion": {"models": 20, "models_per_chunk": 10},
     "noise": {"snr_db": [8, float("inf")]},
+    "echo": {"job": "chunk"},
 }
 
 
@@ -48,10 +48,8 @@ def snakemake(folder: Path, *arguments: str, cores: int = 2, good: bool = True) 
     environment = {**os.environ, "PYTHONPATH": str(folder / "src")}
     environment.pop("LOWALT_INPUTS", None)
     environment |= {"LOWALT_TEST_IMPORTS": str(folder / "imports"), "LOWALT_TEST_PACKAGE": str(folder / "src/lowalt")}
-    command = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--configfile", "overlay.yaml", *arguments]
-    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    text = run.stdout + run.stderr
-    assert (run.returncode == 0) == good, text[-6000:]
+    status, text = run(folder, ["--cores", str(cores), "--configfile", "overlay.yaml", *arguments], environment)
+    assert (status == 0) == good, text[-6000:]
     return text
 
 
@@ -80,7 +78,7 @@ def finished(tmp_path_factory) -> Path:
 @pytest.mark.slow
 def test_one_core_and_two_a_job_a_station_and_one_for_all_give_the_same_bytes(finished, tmp_path):
     alone = workplace(tmp_path)
-    (alone / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"echo": {"job": "chunk"}}))
+    (alone / "overlay.yaml").write_text(yaml.safe_dump(OVERLAY | {"echo": {"job": "station"}}))
     snakemake(alone, "--", "data", cores=1)
     found, other = checksums(finished), checksums(alone)
     # The card states the configuration, and with it how echoes were split into jobs.
@@ -88,8 +86,8 @@ def test_one_core_and_two_a_job_a_station_and_one_for_all_give_the_same_bytes(fi
         assert found.pop(name) != other.pop(name)
     assert len(found) > 30
     assert other == found
-    jobs = {path.name for path in (alone / "results/test/benchmarks/echo").iterdir()}
-    assert jobs == {f"{path.stem}.jsonl" for path in (alone / "results/test/motion").iterdir()}
+    jobs = {path.name for path in (finished / "results/test/benchmarks/echo").iterdir()}
+    assert jobs == {f"{path.stem}.jsonl" for path in (finished / "results/test/motion").iterdir()}
 
 
 def test_a_finished_run_has_nothing_to_do(finished):
@@ -170,7 +168,7 @@ def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(fini
     for name in ("src", "workflow", "config"):
         shutil.copytree(finished / name, folder / name, dirs_exist_ok=True)
     path = tmp_path / "scene.yaml"
-    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}, "echo": {"job": "chunk"}}))
+    path.write_text(yaml.safe_dump({"effects": {"rotor_spread": {}}}))
     snakemake(folder, "--configfile", "overlay.yaml", str(path), "--", "signals")
     changed = 0
     for noisy in sorted((finished / "results/test/noisy").glob("*.npy")):
@@ -210,9 +208,8 @@ def test_any_one_sample_is_made_again_alone_from_its_row(finished):
 def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, tmp_path):
     (tmp_path / "Snakefile").write_text(MODULE.format(root=finished))
     environment = {**os.environ, "PYTHONPATH": str(finished / "src")}
-    command = [sys.executable, "-m", "snakemake", "--cores", "2"]
-    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert run.returncode == 0, run.stderr
+    status, text = run(tmp_path, ["--cores", "2"], environment)
+    assert status == 0, text
     for name in ("motion/unseen-00001.csv", "clouds/crow.npz"):
         path = tmp_path / "results/test" / name
         if path.exists():

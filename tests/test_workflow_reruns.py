@@ -45,6 +45,7 @@ from rerun_model import (
     next_jobs,
     with_what_follows,
 )
+from snakemake_runs import run
 from test_workflow import ROOT, workplace
 
 pytest.importorskip("snakemake")
@@ -160,11 +161,10 @@ for name, (overlay, edit) in json.loads(Path("changes.json").read_text()).items(
 
 
 def snakemake(folder, *arguments):
-    command = [sys.executable, "-m", "snakemake", "--cores", "1", "--configfile", "overlay.yaml", *arguments]
     environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
-    run = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert run.returncode == 0, (run.stdout + run.stderr)[-4000:]
-    return run.stdout + run.stderr
+    status, text = run(folder, ["--cores", "1", "--configfile", "overlay.yaml", *arguments], environment)
+    assert status == 0, text[-4000:]
+    return text
 
 
 def jobs(text):
@@ -211,8 +211,8 @@ def dry_runs(tmp_path_factory):
     plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items()}
     (folder / "changes.json").write_text(json.dumps(plan))
     environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
-    run = subprocess.run([sys.executable, "-c", DRIVER], cwd=folder, env=environment, capture_output=True, text=True)
-    assert run.returncode == 0, (run.stdout + run.stderr)[-4000:]
+    driver = subprocess.run([sys.executable, "-c", DRIVER], cwd=folder, env=environment, capture_output=True, text=True)
+    assert driver.returncode == 0, (driver.stdout + driver.stderr)[-4000:]
     return {name: (folder / "said" / f"{name}.txt").read_text() for name in CHANGES}
 
 
