@@ -187,6 +187,16 @@ def test_alarm_intervals_hold_the_rates_and_narrow_with_the_samples():
     assert 2 < widths[0] / widths[1] < 5
 
 
+def test_the_95_percent_interval_of_a_false_alarm_rate_is_196_standard_errors_wide_on_either_side():
+    """The threshold is certain and every second of 400 birds exceeds it, so the rate errs by sqrt(1 / 4 / 400)."""
+    label = np.repeat([0, 1], 400)
+    names = np.array([f"m{number}" for number in range(800)])
+    validation = statistics.AlarmPart(np.full(800, 0.5), label, names, label)
+    test = statistics.AlarmPart(np.where(np.arange(800) % 2, 0.9, 0.1), label, names, label)
+    _, (low, high) = statistics.alarm_intervals([validation], [test], 0.9, False, stream(3, "a"), 2, 2000)
+    assert (high - low) / 2 == pytest.approx(1.96 * np.sqrt(0.25 / 400), rel=0.08)
+
+
 @pytest.mark.parametrize(("uavs", "detection", "expected"), [(100, 0.9, True), (99, 0.9, False), (300, 0.99, False)])
 def test_a_detection_is_measurable_only_where_ten_uavs_may_lie_below_the_threshold(uavs, detection, expected):
     assert statistics.measurable(np.r_[np.zeros(uavs, int), np.ones(500, int)], detection) == expected
