@@ -1,5 +1,7 @@
 """The command that sets small faults into the package: which places it finds, what it writes, what kills a fault."""
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -7,17 +9,29 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from mutants import trial
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, shown_tests
+from mutation.kept import Kept
+from mutation.trials import Outcome, copy_of_tree, trial
 
+ROOT = Path(__file__).parents[1]
 SOURCE = '''"""A doc with 1 + 2."""
 LIMIT: int | None = 3
+kernel = lambda **options: lambda function: function
 
 
 def reach(a: float | None, b: float) -> float:
     """Add."""
     return a + b if a < LIMIT else -b
+
+
+@kernel(boundscheck=False)
+def kernel_of(a):
+    return a
+
+
+if __name__ == "__main__":
+    reach(1, 2 + 3)
 '''
 
 
@@ -32,9 +46,11 @@ def tree(tmp_path):
 def test_places_are_operations_and_constants_and_no_annotations(tree):
     found = of_file(tree, "src/lowalt/reach.py")
     names = {(mutant.line, mutant.operator.rpartition("/")[2]) for mutant in found}
-    assert (7, "ReplaceBinaryOperator_Add_Sub") in names and (7, "ReplaceComparisonOperator_Lt_LtE") in names
-    assert (2, "NumberReplacer") in names and (7, "ReplaceUnaryOperator_Delete_USub") in names
-    assert not any("BitOr" in name for _, name in names) and not any(line == 1 for line, _ in names)
+    assert (8, "ReplaceBinaryOperator_Add_Sub") in names and (8, "ReplaceComparisonOperator_Lt_LtE") in names
+    assert (2, "NumberReplacer") in names and (8, "ReplaceUnaryOperator_Delete_USub") in names
+    assert not any("BitOr" in name for _, name in names)
+    # No line of a docstring, of a compiler's settings, or of a command's start.
+    assert {line for line, _ in names} == {2, 8}
 
 
 def test_every_place_changes_the_text_in_its_own_line(tree):
@@ -58,6 +74,10 @@ def test_the_quickest_tests_of_a_line_come_first_until_time_is_up():
                      {"t.py::slow": 30.0, "t.py::quick": 1.0, "t.py::middle": 5.0, "u.py::one": 1.0})  # fmt: skip
     assert shown_tests(Path(), found, file, 7, 10.0) == ["t.py::quick", "t.py::middle"]
     assert shown_tests(Path(), found, file, 2, 10.0) == ["u.py::one"]
+    # Tests of the room come before quicker ones of other rooms.
+    near = Coverage({file: {7: ["t.py::quick", "tests/test_reach_far.py::slow"]}},
+                    {"t.py::quick": 1.0, "tests/test_reach_far.py::slow": 9.0})  # fmt: skip
+    assert shown_tests(Path(), near, file, 7, 10.0) == ["tests/test_reach_far.py::slow", "t.py::quick"]
     assert set(shown_tests(Path(), found, file, 5, 100.0)) == {"t.py::slow", "t.py::quick", "t.py::middle", "u.py::one"}
 
 
@@ -71,7 +91,65 @@ def test_a_fault_that_a_test_notices_is_killed_and_taken_out_again(tree):
         mutant.operator.rpartition("_")[2] + str(mutant.line): mutant for mutant in of_file(tree, "src/lowalt/reach.py")
     }
     tests = ["tests/test_reach.py::test_sum"]
-    assert trial(tree, found["Sub7"], tests, 1.0).killed
-    assert not trial(tree, found["LtE7"], tests, 1.0).killed
-    assert not trial(tree, found["Sub7"], ["tests/test_reach.py::test_nothing"], 1.0).killed
+    assert trial(tree, found["Sub8"], tests, 1.0).killed
+    assert not trial(tree, found["LtE8"], tests, 1.0).killed
+    assert not trial(tree, found["Sub8"], ["tests/test_reach.py::test_nothing"], 1.0).killed
     assert (tree / "src/lowalt/reach.py").read_text() == SOURCE
+
+
+def test_a_fault_in_a_kernel_that_another_file_calls_is_compiled_in_and_killed(tmp_path):
+    """Machine code of the caller is kept from a run without the fault, and that run's is used again afterwards."""
+    for folder in ("src", "tests"):
+        (tmp_path / folder).mkdir()
+    # Trials find this folder alone; the package comes from this checkout.
+    (tmp_path / "tests/conftest.py").write_text(f"import sys\nsys.path.append({str(ROOT / 'src')!r})\n")
+    jit = "from lowalt.common.jit import kernel\n\n\n@kernel()\ndef {}\n"
+    (tmp_path / "src/inner_kernel.py").write_text(jit.format("double(x):\n    return 2.0 * x"))
+    outer = "import inner_kernel\n" + jit.format("four_times(x):\n    return inner_kernel.double(2.0 * x)")
+    (tmp_path / "src/outer_kernel.py").write_text(outer)
+    test = "import outer_kernel\n\ndef test_it():\n    assert outer_kernel.four_times(1.0) == 4.0\n"
+    (tmp_path / "tests/test_it.py").write_text(test)
+    (fault,) = [found for found in of_file(tmp_path, "src/inner_kernel.py") if "Mul_Div" in found.operator]
+    tests = ["tests/test_it.py"]
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}/src:{ROOT}/src"}
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
+    assert subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True).returncode == 0
+    kept = {path.name: path.read_bytes() for path in (tmp_path / "src").rglob("*.nbi")}
+    assert {name.partition(".")[0] for name in kept} == {"inner_kernel", "outer_kernel"}
+    assert trial(tmp_path, fault, tests, 1.0).killed
+    after = {path.name: path.read_bytes() for path in (tmp_path / "src").rglob("inner_kernel*.nbi")}
+    assert after and after.items() <= kept.items()
+
+
+def test_outcomes_are_kept_until_the_source_or_a_survivor_s_tests_change(tree):
+    (tree / "tests/test_reach.py").write_text("")
+    one, two = of_file(tree, "src/lowalt/reach.py")[:2]
+    tests, calls = ["tests/test_reach.py::test_sum"], []
+
+    def tried(mutant, killed):
+        def try_it():
+            calls.append(mutant)
+            return Outcome(mutant, killed, 1)
+
+        return Kept(tree / "kept.jsonl", tree).of(mutant, tests, try_it)
+
+    for _ in range(2):
+        assert tried(one, True) == Outcome(one, True, 1) and tried(two, False) == Outcome(two, False, 1)
+    assert calls == [one, two]
+    (tree / "tests/test_reach.py").write_text("def test_sum(): pass\n")
+    tried(one, True), tried(two, False)
+    assert calls == [one, two, two]
+    (tree / "src/lowalt/reach.py").write_text(SOURCE + "# edited\n")
+    tried(one, True), tried(two, False)
+    assert calls == [one, two, two, one, two]
+
+
+def test_a_copy_of_the_tree_follows_the_checkout_and_keeps_machine_code(tmp_path):
+    copy = copy_of_tree(ROOT, tmp_path / "copy")
+    (copy / "src/lowalt/__pycache__").mkdir(exist_ok=True)
+    (copy / "src/lowalt/__pycache__/kept.nbi").touch()
+    (copy / "src/lowalt/stale.py").touch()
+    (copy / "src/lowalt/__init__.py").write_text("1 / 0\n")
+    assert copy_of_tree(ROOT, copy) == copy
+    assert (copy / "src/lowalt/__init__.py").read_bytes() == (ROOT / "src/lowalt/__init__.py").read_bytes()
+    assert (copy / "src/lowalt/__pycache__/kept.nbi").exists() and not (copy / "src/lowalt/stale.py").exists()

@@ -43,8 +43,13 @@ def _operators() -> dict:
 
 
 def _shown_only(node) -> bool:
-    """Whether a node lies in an annotation, whose value nothing computes with."""
+    """Whether a fault at a node can change no result: annotations, settings of a compiler, and `if __name__ ==`, whose
+    block a test that imports the module never runs."""
     while node is not None:
+        if node.type == "decorator" and "kernel" in node.get_code():
+            return True
+        if node.type == "if_stmt" and node.get_code().lstrip().startswith("if __name__"):
+            return True
         above = node.parent
         if above is not None and above.type in ("tfpdef", "annassign") and node is above.children[-1]:
             return above.type == "tfpdef" or len(above.children) == 2

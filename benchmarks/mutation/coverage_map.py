@@ -1,23 +1,24 @@
-"""Which tests run which lines of the package, and how long each test takes: one run of the suite with pytest-cov.
+"""Which tests run which lines of the package, and how long each test takes: every file of tests once, with pytest-cov.
 
-Compiled kernels run outside the interpreter, and lines of definitions run at import: there no test is recorded. A fault
-in such a line is shown to the tests that run any line of the same file, or else of a file that imports it.
+The map of a file of tests is kept until that file changes. Compiled kernels run outside the interpreter, and lines of
+definitions run at import: there no test is recorded. A fault in such a line is shown to the tests that run any line of
+the same file, or else of a file that imports it.
 """
 
+import hashlib
 import json
+import os
 import re
 import subprocess
 import sys
 from collections import defaultdict
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from coverage import CoverageData
-
-_RUN = """[run]
-data_file = {folder}/data
-"""
 
 
 class Coverage(NamedTuple):
@@ -27,41 +28,71 @@ class Coverage(NamedTuple):
     seconds: dict[str, float]
 
 
-def measure(root: Path, folder: Path) -> Coverage:
-    """Run the suite once under coverage and keep the map in `folder`/map.json.
+def measure(root: Path, folder: Path, jobs: int, go_on: Callable[[], bool]) -> Coverage | None:
+    """Run each file of tests once under coverage unless its map is kept in `folder`; None where time was up before.
 
-    Raises RuntimeError where a test fails: a fault cannot be told from a test that fails anyway.
+    A test that fails without a fault cannot judge one: it is named and left out.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "coverage.cfg").write_text(_RUN.format(root=root, folder=folder), encoding="utf-8")
-    command = [sys.executable, "-m", "pytest", "-n", "2", "--dist", "loadfile", "-p", "no:cacheprovider",
-               "-m", "not slow and not workflow", f"--junitxml={folder}/tests.xml", f"--cov={root}/src/lowalt",
-               "--cov-context=test", f"--cov-config={folder}/coverage.cfg", "--cov-report="]  # fmt: skip
-    if subprocess.run(command, cwd=root, check=False).returncode:
-        raise RuntimeError(f"{folder}/tests.xml: tests fail before any fault is set in")
-    found = Coverage(_lines(folder / "data", root), _seconds(folder / "tests.xml"))
-    (folder / "map.json").write_text(json.dumps(found._asdict()), encoding="utf-8")
-    return found
+    names = [f"tests/{path.name}" for path in sorted((root / "tests").glob("test_*.py"))]
+
+    def one(name: str) -> Coverage | None:
+        """The map of a file of tests, from `folder` where it is kept."""
+        digest = hashlib.sha256((root / name).read_bytes()).hexdigest()[:16]
+        kept = folder / f"{Path(name).stem}-{digest}.json"
+        if not kept.exists():
+            if not go_on():
+                return None
+            found = _of_file(root, name, folder / Path(name).stem)
+            kept.write_text(json.dumps(found._asdict()), encoding="utf-8")
+            print(f"mapped   {name}: {len(found.seconds)} tests, {sum(found.seconds.values()):.0f} s", flush=True)
+        content = json.loads(kept.read_text(encoding="utf-8"))
+        lines = {file: {int(line): tests for line, tests in rows.items()} for file, rows in content["lines"].items()}
+        return Coverage(lines, content["seconds"])
+
+    with ThreadPoolExecutor(jobs) as pool:
+        maps = list(pool.map(one, names))
+    return None if None in maps else joined(found for found in maps if found)
 
 
-def read(folder: Path) -> Coverage:
-    """The map that `measure` kept in `folder`.
+def joined(maps: Iterable[Coverage]) -> Coverage:
+    """One map of several files of tests."""
+    lines: dict[str, dict[int, list[str]]] = defaultdict(lambda: defaultdict(list))
+    seconds: dict[str, float] = {}
+    for found in maps:
+        seconds |= found.seconds
+        for file, rows in found.lines.items():
+            for line, tests in rows.items():
+                lines[file][line] += tests
+    return Coverage({file: dict(rows) for file, rows in lines.items()}, seconds)
 
-    Raises FileNotFoundError where none was kept.
-    """
-    kept = json.loads((folder / "map.json").read_text(encoding="utf-8"))
-    lines = {file: {int(line): tests for line, tests in rows.items()} for file, rows in kept["lines"].items()}
-    return Coverage(lines, kept["seconds"])
+
+def _of_file(root: Path, name: str, beside: Path) -> Coverage:
+    """Run one file of tests under coverage; `beside`: where its data and report are written for the moment."""
+    data, report, settings = (beside.with_suffix(end) for end in (".data", ".xml", ".cfg"))
+    settings.write_text(f"[run]\ndata_file = {data}\n", encoding="utf-8")
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", name,
+               "-m", "not slow and not workflow", f"--junitxml={report}", f"--cov={root}/src/lowalt",
+               "--cov-context=test", f"--cov-config={settings}", "--cov-report="]  # fmt: skip
+    environment = os.environ | {"PYTHONPATH": f"{root}/src"}
+    subprocess.run(command, cwd=root, env=environment, check=False, stdout=subprocess.DEVNULL)
+    seconds, failed = _seconds(report) if report.exists() else ({}, {name})
+    for test in sorted(failed):
+        print(f"left out {test}: it fails without a fault", flush=True)
+    lines = _lines(data, root, failed) if data.exists() else {}
+    for path in (data, report, settings):
+        path.unlink(missing_ok=True)
+    return Coverage(lines, {test: spent for test, spent in seconds.items() if test not in failed})
 
 
-def _lines(data: Path, root: Path) -> dict[str, dict[int, list[str]]]:
-    """For each measured file below `root`, the tests that run each line."""
+def _lines(data: Path, root: Path, failed: set[str]) -> dict[str, dict[int, list[str]]]:
+    """For each measured file below `root`, the tests that run each line, without those that failed."""
     kept = CoverageData(str(data))
     kept.read()
     found: dict[str, dict[int, list[str]]] = {}
     for file in kept.measured_files():
         rows = kept.contexts_by_lineno(file)
-        tests = {line: sorted({_test(name) for name in names if name}) for line, names in rows.items()}
+        tests = {line: sorted({_test(name) for name in names if name} - failed) for line, names in rows.items()}
         found[str(Path(file).relative_to(root))] = {line: names for line, names in tests.items() if names}
     return found
 
@@ -72,13 +103,18 @@ def _test(context: str) -> str:
     return re.sub(r"\[.*", "", name, flags=re.DOTALL) if phase == "run" else name.partition("::")[0]
 
 
-def _seconds(report: Path) -> dict[str, float]:
-    """Seconds of each test function, all its cases together."""
+def _seconds(report: Path) -> tuple[dict[str, float], set[str]]:
+    """Seconds of each test function, all its cases together, and the functions of which a case failed."""
     seconds: dict[str, float] = defaultdict(float)
+    failed = set()
     for case in ElementTree.parse(report).iter("testcase"):
         name = re.sub(r"\[.*", "", case.get("name", ""), flags=re.DOTALL)
-        seconds[f"{case.get('classname', '').replace('.', '/')}.py::{name}"] += float(case.get("time", 0))
-    return dict(seconds)
+        test = f"{case.get('classname', '').replace('.', '/')}.py::{name}"
+        if case.find("skipped") is None:
+            seconds[test] += float(case.get("time", 0))
+        if case.find("failure") is not None or case.find("error") is not None:
+            failed.add(test)
+    return dict(seconds), failed
 
 
 def importers(root: Path, file: str) -> set[str]:
@@ -91,21 +127,27 @@ def importers(root: Path, file: str) -> set[str]:
             if pattern.search(path.read_text(encoding="utf-8"))}  # fmt: skip
 
 
+def _of_room(test: str, file: str) -> bool:
+    """Whether the name of a file of tests says that it tests the room of `file`: tests/test_ROOM..."""
+    room = Path(file).parts[2].removesuffix(".py") if len(Path(file).parts) > 2 else ""
+    return bool(room) and test.startswith(f"tests/test_{room}")
+
+
 def shown_tests(root: Path, found: Coverage, file: str, line: int, limit: float) -> list[str]:
-    """Tests that run a line, the quickest first, until they take `limit` seconds together."""
+    """Tests that run a line until they take `limit` seconds together: those of its room first, each half the quickest
+    first."""
     rows = found.lines.get(file, {})
     names = set(rows.get(line, ()))
     if not names:
         names = {test for tests in rows.values() for test in tests}
-    if not names:
-        near = (found.lines.get(other, {}) for other in importers(root, file))
-        names = {test for lines in near for tests in lines.values() for test in tests}
+    near = [found.lines.get(other, {}) for other in importers(root, file)] if not rows.get(line) else []
+    names |= {test for lines in near for tests in lines.values() for test in tests}
     files = {name for name in names if "::" not in name}
     names |= {test for test in found.seconds if test.partition("::")[0] in files}
     chosen, total = [], 0.0
-    for name in sorted(names & found.seconds.keys(), key=lambda test: (found.seconds[test], test)):
+    for name in sorted(names & found.seconds.keys(), key=lambda test: (not _of_room(test, file), found.seconds[test])):
+        if chosen and total + found.seconds[name] > limit:
+            continue
         total += found.seconds[name]
-        if chosen and total > limit:
-            break
         chosen.append(name)
     return chosen

@@ -1,0 +1,92 @@
+"""A fault set into a copy of the tree, and the tests shown to it. Copies stay, so that their machine code is kept."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+from mutation.candidates import Mutant, mutated
+
+
+class Outcome(NamedTuple):
+    """A fault and its end: `killed` or not, how many tests were shown it, and whether they ran out of time."""
+
+    mutant: Mutant
+    killed: bool
+    tests: int
+    late: bool = False
+
+
+def copy_of_tree(root: Path, folder: Path) -> Path:
+    """A copy of the checkout's files, with its environment linked, in which faults can be set.
+
+    A copy that is there already gets the files that changed, and keeps its machine code.
+    """
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=root, check=True, capture_output=True, text=True).stdout
+    names = {name for name in files.split("\0") if name and (root / name).is_file()}
+    for path in [*folder.glob("src/**/*.py"), *folder.glob("tests/**/*.py")]:
+        if str(path.relative_to(folder)) not in names:
+            path.unlink()
+    for name in names:
+        there = folder / name
+        if not there.exists() or there.read_bytes() != (root / name).read_bytes():
+            there.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, there)
+    if not (folder / ".venv").exists():
+        (folder / ".venv").symlink_to((root / ".venv").resolve())
+    return folder
+
+
+@contextmanager
+def _fault(path: Path, text: str) -> Iterator[None]:
+    """Set `text` into the file for the time of the block; its time and the list of its kept machine code come back.
+
+    Numba lists machine code by time and size of the source, so the fault's list would replace that of the good file.
+    """
+    source, times = path.read_text(encoding="utf-8"), path.stat()
+    lists = f"{path.stem}.*.nbi"
+    with tempfile.TemporaryDirectory() as aside:
+        for entry in (path.parent / "__pycache__").glob(lists):
+            shutil.copy2(entry, aside)
+        try:
+            path.write_text(text, encoding="utf-8")
+            yield
+        finally:
+            path.write_text(source, encoding="utf-8")
+            os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
+            for entry in (path.parent / "__pycache__").glob(lists):
+                entry.unlink()
+            for entry in Path(aside).iterdir():
+                shutil.copy2(entry, path.parent / "__pycache__")
+
+
+def trial(tree: Path, mutant: Mutant, tests: list[str], seconds: float) -> Outcome:
+    """Set a fault into `tree`, run `tests` until one fails, and take the fault out again.
+
+    A fault that no test runs survives. `seconds`: the time that the tests take without a fault; a run of more than five
+    times that and three minutes is a loop without end, and kills.
+    """
+    if not tests:
+        return Outcome(mutant, False, 0)
+    path = tree / mutant.file
+    environment = os.environ | {"PYTHONPATH": f"{tree}/src", "PYTHONDONTWRITEBYTECODE": "1"}
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
+    late = False
+    with _fault(path, mutated(path.read_text(encoding="utf-8"), mutant)):
+        run = subprocess.Popen(command, cwd=tree, env=environment, stdout=subprocess.DEVNULL,
+                               stderr=subprocess.DEVNULL, start_new_session=True)  # fmt: skip
+        try:
+            ended = run.wait(180 + 5 * seconds)
+        except subprocess.TimeoutExpired:
+            late, ended = True, 1
+            os.killpg(run.pid, 9)
+            run.wait()
+    # 1: a test failed; 2 to 4: its file cannot be imported; 5: all tests named were left out, which is no judgement.
+    if ended == 5:
+        raise RuntimeError(f"{mutant.file}:{mutant.line}: pytest ran none of {tests}")
+    return Outcome(mutant, ended != 0, len(tests), late)
