@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lowalt.common.command import dispatch, parser, pick, run
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
@@ -197,17 +197,6 @@ def _score(arguments: list[str]) -> None:
         temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
 
 
-def _predict(arguments: list[str]) -> None:
-    """Print class probabilities of signals or a tile as JSON. Settings: network, spectra, images."""
-    from lowalt.recognition.runs import load, predict
-
-    line = parser("lowalt.recognition predict", _predict.__doc__)
-    line.add_argument("--model", required=True, help="model.pt of a training run")
-    line.add_argument("--input", required=True, help="signals (stations, symbols) complex64 (.npy) or a tile (.png)")
-    given = line.parse_args(arguments)
-    print(json.dumps(predict(load(given.model), existing(given.input, "input"), given.settings)))
-
-
 def _export(arguments: list[str]) -> None:
     """Write a trained model as a torch.export program (.pt2) or ONNX (.onnx). Settings: none ({})."""
     from lowalt.recognition.export import export
@@ -222,9 +211,8 @@ def _export(arguments: list[str]) -> None:
 
 
 COMMANDS = {
-    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train,
-    "evaluate": _evaluate, "tables": _tables, "transfer": _transfer, "score": _score, "predict": _predict,
-    "export": _export,
+    "views": _views, "freeze": _freeze, "distances": _distances, "train": _train, "evaluate": _evaluate,
+    "tables": _tables, "transfer": _transfer, "score": _score, "export": _export,
 }  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from lowalt.common.files import replacing
 from lowalt.common.street import PACKAGE, STREET, modules, purpose, rooms_imported
 from lowalt.report.figures.style import png
 
-WIDTH = 64
+WIDTH = 60
 """Characters in a line of a room's text."""
 
 
