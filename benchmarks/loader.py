@@ -35,7 +35,7 @@ from lowalt.shards.index import build
 from lowalt.shards.record import npy
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
-from lowalt.shards.write import write_shard
+from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, encode, paint
 
@@ -94,9 +94,8 @@ def pack(run: Path, folder: Path, models: int) -> dict[str, Path]:
                 group, part = source.stem.split("-")
                 shards.append(folder / kind / f"{group}-{fold}-{part}.tar")
                 content = png if kind == "image" else raw
-                write_shard(
-                    shards[-1], rows, snrs, config["split"], config["seed"], network, fold, kind, content
-                )  # fmt: skip
+                chunk = ChunkSamples(rows, snrs, config["split"], config["seed"], network)
+                write_shard(shards[-1], chunk, fold, kind, content)
         indexes[kind] = folder / kind / "index.json"
         build(shards, render, indexes[kind])
     return indexes

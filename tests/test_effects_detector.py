@@ -152,7 +152,7 @@ def test_noise_of_each_snr_is_its_own_and_the_noise_stage_adds_none():
     assert stacked.shape == (1, 3, 2, 40) and (stacked[0, :, 1] == 2 * found[0]).all()
 
 
-def test_a_clean_scene_keeps_every_bit_beside_an_idle_detector():
+def test_a_clean_scene_keeps_every_bit_with_an_idle_detector():
     radio = small(symbols=6, subcarriers=32)
     cloud, row = target([[0.0, 0.0, 0.0], [0.3, 0.1, 0.0]], x_m=30.0)
     plain = received_signal(Scene(radio, 3, None, ()), radio.stations[0], cloud, row)

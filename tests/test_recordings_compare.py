@@ -35,7 +35,7 @@ def test_scenes_as_recorded_lie_over_those_that_networks_learn_from():
     assert drone["hum_db"] != bird["hum_db"] and drone["snr_db"] == bird["snr_db"]
 
 
-def test_distances_of_one_test_recording_have_no_floor_and_stand_beside_simulated_classes(tmp_path):
+def test_distances_of_one_test_recording_have_no_floor_and_stand_next_to_simulated_classes(tmp_path):
     (tmp_path / "walker_24ghz").mkdir()
     time = np.arange(12000) / 12000
     wave = np.cos(2 * np.pi * 200.0 * time) * (time > 0.3) + 0.01 * np.random.default_rng(0).standard_normal(12000)

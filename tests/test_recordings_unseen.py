@@ -73,7 +73,7 @@ def test_swapped_channels_are_refused_where_the_direction_is_known(tmp_path):
     main([*call, str(drive(tmp_path, 22050, True, swapped=True))])
 
 
-def test_a_record_beside_a_new_file_goes_before_the_sets_pattern(tmp_path):
+def test_a_record_next_to_a_new_file_goes_before_the_sets_pattern(tmp_path):
     folder = tmp_path / "vehicle_24ghz"
     folder.mkdir()
     drive(folder, 22050, True, label="Pedestrian")

@@ -20,7 +20,7 @@ from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.size import sample_bytes
 from lowalt.shards.table import map_samples
 from lowalt.shards.verify import faults
-from lowalt.shards.write import write_shard
+from lowalt.shards.write import ChunkSamples, write_shard
 from pictures import NETWORK
 from test_shards_card import CONFIG
 
@@ -115,7 +115,8 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
     seen = []
     for fold in ("train", "val", "test"):
         path = tmp_path / f"unseen-{fold}-00000.tar"
-        write_shard(path, rows, [3.0, 8.0, np.inf], split, SEED, network, fold, "recipe", lambda *_: npy(echoes))
+        chunk = ChunkSamples(rows, [3.0, 8.0, np.inf], split, SEED, network)
+        write_shard(path, chunk, fold, "recipe", lambda *_: npy(echoes))
         with tarfile.open(path) as archive:
             for name in archive.getnames():
                 if name.endswith(".json"):
@@ -129,9 +130,10 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
 
     rows = [row | {"fold": "train"} for row in motion_rows("unseen", 1)]
     echoes, powers = np.full((3, 1, 400), 1 + 1j, np.complex64), np.array([[1e-3], [2.0], [0.0]])
+    split, network = {"by": "motion", "train": 1, "val": 1, "test": 1}, Network.from_settings(NETWORK)
     write_shard(
-        tmp_path / "unseen-train-00000.tar", rows, [3.0], {"by": "motion", "train": 1, "val": 1, "test": 1}, 3,
-        Network.from_settings(NETWORK), "train", "recipe", lambda *_: npy(echoes[:, 0]), powers=powers,
+        tmp_path / "unseen-train-00000.tar", ChunkSamples(rows, [3.0], split, 3, network, powers=powers), "train",
+        "recipe", lambda *_: npy(echoes[:, 0]),
     )  # fmt: skip
     with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
         name = next(name for name in archive.getnames() if name.endswith(".json"))

@@ -18,20 +18,24 @@ AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
 
 
 def box(size, at=(0, 0, 0)):
+    """A box of this size (3,) with its middle at a place (3,)."""
     shape = trimesh.creation.box(size)
     shape.apply_translation(at)
     return shape
 
 
 def body():
+    """The craft's body."""
     return box((0.22, 0.12, 0.06))
 
 
 def propeller(hub=(0.0, 0.0), height=0.05):
+    """A propeller of two blades above a hub."""
     return box((0.12, 0.012, 0.004), (*hub, height))
 
 
 def direction(axis):
+    """The unit vector of an axis such as "-x"."""
     return np.array(AXES[axis[-1]], float) * (-1 if axis[0] == "-" else 1)
 
 
@@ -41,10 +45,12 @@ def turned(up, front):
 
 
 def letter(vector):
+    """The axis along which a vector points, either way."""
     return "xyz"[int(np.abs(vector).argmax())]
 
 
 def record(unit, up="z", front="x", **more):
+    """The record of the craft in a file of this unit and these axes."""
     return {
         "row": dict(ROW),
         "source": "mesh",

@@ -16,6 +16,7 @@ NETWORK = {
 
 
 def craft() -> Cloud:
+    """The craft: ten points of the body and ten of a rotor."""
     rng = np.random.default_rng(0)
     count = 20
     return Cloud(
@@ -27,6 +28,7 @@ def craft() -> Cloud:
 
 
 def row(model: int) -> dict:
+    """The row of a motion model."""
     rng = np.random.default_rng(model)
     values = dict.fromkeys(NUMBERS, math.nan) | dict.fromkeys(("yaw_rad", "pitch_rad", "roll_rad"), 0.1)
     place = dict(zip(("x_m", "y_m", "z_m"), (200.0, 100.0 + model, 60.0), strict=True))

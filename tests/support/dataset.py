@@ -21,6 +21,7 @@ TARGETS = {"seen": [("DJI Mavic 3", "UAV"), ("Crow", "Bird")], "unseen": [("Mode
 
 
 def motion_rows(group, models=4):
+    """Rows of the motion table of a group, two subtypes a motion model."""
     rng = np.random.default_rng(len(group))
     rows = []
     for model in range(models):
@@ -34,6 +35,7 @@ def motion_rows(group, models=4):
 
 
 def write_settings(kind):
+    """Settings of the command `shards write` for a kind of shards, as JSON."""
     block = {"seed": SEED, "network": NETWORK, "snr_db": SNRS, "split": SPLIT, "shards": {"kind": kind}}
     return json.dumps(block)
 

@@ -16,12 +16,14 @@ from fuzzing import Reader
 
 
 def _bytes(write: Callable[[Path], object], name: str) -> bytes:
+    """The bytes of a file that `write` makes."""
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder) / name)
         return (Path(folder) / name).read_bytes()
 
 
 def _recording(kind: str) -> Callable[[Path], object]:
+    """A reader of recordings of one kind."""
     from lowalt.recordings.files import read
     from lowalt.recordings.record import record
 
@@ -31,6 +33,7 @@ def _recording(kind: str) -> Callable[[Path], object]:
 
 
 def _recordings() -> list[Reader]:
+    """Readers of recordings, each with a good file."""
     times = np.arange(2000) / 800
     wave = np.exp(2j * np.pi * 97 * times) * (1 + 0.3 * np.cos(5 * times)) * 0.4
     pair = np.stack([wave.real, wave.imag], axis=1)
@@ -45,6 +48,7 @@ def _recordings() -> list[Reader]:
 
 
 def _meshes() -> list[Reader]:
+    """Readers of meshes, each with a good file."""
     import trimesh
 
     from lowalt.targets.mesh_files import read_mesh
@@ -60,6 +64,7 @@ def _meshes() -> list[Reader]:
 
 
 def _texts() -> list[Reader]:
+    """Readers of configurations, tables and other texts, each with a good file."""
     from lowalt.common.command import settings
     from lowalt.common.config import check, merge
     from lowalt.common.csv_tables import read_csv
@@ -75,9 +80,11 @@ def _texts() -> list[Reader]:
     table = Path("config/targets.csv").read_bytes()
 
     def run(path: Path) -> object:
+        """The run of a configuration file."""
         return Run.of(merge(config, load_yaml(path)), schema, None)
 
     def sums(path: Path) -> object:
+        """Verify a file of checksums."""
         return freeze.verify(path)
 
     record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
@@ -105,6 +112,7 @@ def _texts() -> list[Reader]:
 
 
 def _captures() -> list[Reader]:
+    """Readers of motion capture, each with a good file."""
     from lowalt.targets.mocap_files import read_motion, read_skeleton
     from lowalt.targets.skeleton import NODES
     from walkers import asf, walk
@@ -121,6 +129,7 @@ def _captures() -> list[Reader]:
 
 
 def _arrays() -> list[Reader]:
+    """Readers of arrays, shards and models, each with a good file."""
     import torch
 
     from lowalt.recognition import checkpoint, predictions, samples
@@ -161,10 +170,12 @@ def _arrays() -> list[Reader]:
 
 
 def _all(tiles) -> list[bytes]:
+    """All images of a tiles file."""
     return [tiles[number] for number in range(len(tiles))]
 
 
 def _recipe() -> bytes:
+    """The bytes of a small recipe of a data set."""
     import tarfile
 
     from lowalt import __version__

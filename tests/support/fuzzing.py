@@ -119,6 +119,7 @@ def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
 
 
 def _apart(name: str, count: int, seed: int, queue) -> None:
+    """Read damaged files in a process of its own, with limited memory, and put the faults into the queue."""
     # Memory beyond the limit fails instead of filling the machine; the process itself needs some three gigabytes.
     resource.setrlimit(resource.RLIMIT_AS, ((LIMIT_MB + 6144) << 20,) * 2)
     with Path(os.devnull).open("w") as silent, tempfile.TemporaryDirectory() as folder:

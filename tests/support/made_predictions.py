@@ -14,6 +14,7 @@ SNRS = (3.0, 13.0, np.inf)
 
 
 def facts(models=10, snrs=SNRS):
+    """Facts of the samples of all subtypes, `models` motion models each."""
     rows = [
         (f"{name}-{model}-{snr:g}", name, model, snr, group, ("val", "test", *["train"] * 8)[model % 10], label)
         for name, (group, label) in SUBTYPES.items() for model in range(models) for snr in snrs
@@ -40,5 +41,6 @@ def run_files(folder, protocol, scheme, accuracy, seed=0, models=40):
 
 
 def read_rows(path):
+    """The rows of a CSV file as mappings."""
     with path.open(newline="") as file:
         return list(csv.DictReader(file))

@@ -23,6 +23,7 @@ class Page(HTMLParser):
         self.faults += [f"{tag} is not closed" for tag in self.open]
 
     def handle_starttag(self, tag, attrs):
+        """Note an opened tag, its name as a target and its link."""
         found = dict(attrs)
         if tag not in VOID:
             self.open.append(tag)
@@ -42,15 +43,18 @@ class Page(HTMLParser):
             self._cell = ""
 
     def handle_startendtag(self, tag, attrs):
+        """Note a tag that closes itself."""
         self.handle_starttag(tag, attrs)
         if tag not in VOID:
             self.handle_endtag(tag)
 
     def handle_data(self, data):
+        """Collect the text of a table cell."""
         if self._cell is not None:
             self._cell += data
 
     def handle_endtag(self, tag):
+        """Note a closed tag, and a fault where it was not the last one opened."""
         if tag in VOID:
             return
         if not self.open or self.open[-1] != tag:

@@ -25,6 +25,7 @@ SCALES = [Scale("linear"), Scale("decibel", 40.0), Scale("decibel", 60.0), Scale
 
 
 def renderer(scale=None, **changes):
+    """A renderer of the test network with these changes."""
     network = Network.from_settings({**NETWORK, **changes})
     return Renderer(network, Spectra(), Images(256, scale or Scale()))
 

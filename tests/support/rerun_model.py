@@ -119,6 +119,7 @@ class Change:
 
     @property
     def jobs(self):
+        """The jobs that the change makes run again."""
         settings = SETTINGS if self.overlay else set()
         return with_what_follows(self.first | settings) if self.expected is None else self.expected
 

@@ -25,6 +25,7 @@ SCHEME = schemes.Scheme("AB:VRP+VT", (0, 1), (0, 2))
 
 
 def with_training(**changes):
+    """The settings with these changes of the training."""
     return {**SETTINGS, "training": {**TRAINING, **changes}}
 
 
@@ -46,6 +47,7 @@ def write_views(path, models=20):
 
 
 def sources(path):
+    """The samples for training and validation from a cache of views."""
     return {
         part: samples.ViewSamples([path], SCHEME.columns, {("seen", fold)})
         for part, fold in (("train", "train"), ("validation", "val"))
@@ -53,9 +55,11 @@ def sources(path):
 
 
 def train(path, folder, settings=SETTINGS):
+    """Train into a folder; return the weights and the text of history.csv."""
     runs.train(sources(path), SCHEME, "seen", settings, folder)
     return checkpoint.load(folder / "model.pt")[1]["weights"], (folder / "history.csv").read_text()
 
 
 def equal(one, other):
+    """Whether two sets of weights are equal in every bit."""
     return one.keys() == other.keys() and all(torch.equal(value, other[key]) for key, value in one.items())

@@ -14,6 +14,7 @@ PUBLISHED = {"hgt_m": 1.75}
 
 
 def asf(bones: dict[str, np.ndarray], extra: str = "") -> str:
+    """The text of a skeleton file with these bones (x, y, z)."""
     lines = [":version 1.10", ":units", "length 0.45", "angle deg", ":root", "order TX TY TZ RX RY RZ", "axis XYZ"]
     lines += ["position 0 0 0", "orientation 0 0 0", ":bonedata"]
     for name in NODES[1:]:

@@ -15,7 +15,7 @@ from lowalt.recordings.record import Record
 from lowalt.recordings.sets import at_carrier, sampled
 from lowalt.recordings.twin import Twin
 from lowalt.shards.index import build
-from lowalt.shards.write import write_shard
+from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import trp, vrp, vt
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
@@ -73,7 +73,7 @@ def write(record: Record, twin: Twin, images: dict, folder: str | Path) -> int:
         rows = [_row(record, number) | {"fold": "test"} for number in range(len(tiles))]
         shard = folder / "shards" / "recording.tar"
         write_shard(
-            shard, rows, [math.inf], SPLIT, 0, network, "test", "image", lambda number, _: tiles[number]
+            shard, ChunkSamples(rows, [math.inf], SPLIT, 0, network), "test", "image", lambda number, _: tiles[number]
         )  # fmt: skip
         build(
             [shard],

@@ -13,7 +13,7 @@ from lowalt.shards.index import build
 from lowalt.shards.record import accompanied
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
-from lowalt.shards.write import write_shard
+from lowalt.shards.write import ChunkSamples, write_shard
 
 
 def write(arguments: list[str]) -> None:
@@ -48,7 +48,8 @@ def write(arguments: list[str]) -> None:
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:
         content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
-    write_shard(given.out, rows, snrs, split, seed, network, given.fold, kind, content, classes, powers, canceller)
+    samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
+    write_shard(given.out, samples, given.fold, kind, content)
 
 
 def _classes(settings: dict) -> tuple[str, ...]:

@@ -19,7 +19,7 @@ from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.index import build
 from lowalt.shards.record import npy
-from lowalt.shards.write import write_shard
+from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import write as write_cloud
 
 
@@ -78,11 +78,11 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     if kind == "recipe" and maker.echo["effects"]:
         powers = np.concatenate([maker.received(row)[1] for row in rows], axis=1)
 
+    samples = ChunkSamples(rows, list(levels), plan.split, plan.seed, maker.network, dataset.classes, powers, canceller)
     paths = []
     for name in plan.folds(chunk):
         paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
-        given = (rows, list(levels), plan.split, plan.seed, maker.network, name, kind, content)
-        write_shard(paths[-1], *given, dataset.classes, powers, canceller)
+        write_shard(paths[-1], samples, name, kind, content)
     return paths
 
 

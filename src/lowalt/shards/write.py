@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,24 @@ from lowalt.shards.record import model_key, rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Span, Writer
+
+
+class ChunkSamples(NamedTuple):
+    """The samples of a chunk: every motion model at every SNR.
+
+    rows: the motion table; snrs: dB; split, seed: how samples fall into folds; classes: in the order of their labels;
+    powers: (stations, rows) W, the powers that SNRs refer to, None for the echoes' own; canceller: settings of the
+    canceller that the noise passes (both for kind "recipe").
+    """
+
+    rows: list[dict]
+    snrs: list[float]
+    split: dict
+    seed: int
+    network: Network
+    classes: tuple[str, ...] = CATEGORIES
+    powers: np.ndarray | None = None
+    canceller: dict | None = None
 
 
 def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: str) -> list[tuple[int, int]]:
@@ -36,21 +55,18 @@ def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tupl
 
 
 def write_shard(
-    path: str | Path, rows: list[dict], snrs: list[float], split: dict, seed: int, network: Network, wanted: str,
-    kind: str, content: Callable[[int, int], bytes], classes: tuple[str, ...] = CATEGORIES,
-    powers: np.ndarray | None = None, canceller: dict | None = None,
-) -> dict:  # fmt: skip
-    """Write `path` (.tar) and its table next to it; return the table's header.
+    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Callable[[int, int], bytes]
+) -> dict:
+    """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
 
-    rows: the chunk's motion table; content: a function of (row, SNR index) that returns the bytes of the
-    sample's .png (kind "image") or .npy (kind "signal"), or of the row's clean echoes (kind "recipe"); classes: in
-    the order of their labels; powers (stations, rows) W: the powers that SNRs refer to, None for the
-    echoes' own; canceller: settings of the canceller that the noise passes (both for kind "recipe").
-    A recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
+    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy (kind
+    "signal"), or of the row's clean echoes (kind "recipe"). A recipe shard holds each motion model once, at the place
+    of its first sample; all its samples point there.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:
         raise InputError(f"{path}: fold {wanted!r} of kind {kind!r}, expected one of {FOLDS} and of {KINDS}")
+    rows, snrs, split, seed, network, classes, powers, canceller = chunk
     groups = sorted({row["group"] for row in rows})
     if len(groups) != 1:
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
