@@ -1,0 +1,31 @@
+"""The command compare: what differs between two finished runs, and by how much."""
+
+import json
+
+from lowalt.__main__ import main
+
+
+def run_folder(path, accuracy, seconds, **changes):
+    path.mkdir()
+    (path / "config.yaml").write_text(json.dumps({"run": path.name, "seed": 1, "motion": {"models": 3}} | changes))
+    (path / "accuracy.csv").write_text(
+        "protocol,scheme,snr_db,accuracy_percent\n"
+        # The average weighs samples, so it need not be the mean of the rows.
+        + "".join(f"seen,A:VT,{snr},{accuracy + more}\n" for snr, more in ((0, 0), (8, 9), ("avg", 1)))
+    )
+    (path / "stages.csv").write_text(f"rule,cpu_s\necho,{seconds}\n")
+    return path
+
+
+def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
+    one = run_folder(tmp_path / "one", 80, 5.0)
+    other = run_folder(tmp_path / "other", 81, 2.5, seed=2)
+    assert main(["compare", str(one), str(other), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["configuration"] == {"run": ["one", "other"], "seed": [1, 2]}
+    assert found["accuracy_percent"] == {"seen A:VT": [81.0, 82.0]}
+    assert found["processor_s"] == {"echo": [5.0, 2.5]} and found["data"] == {}
+    assert main(["compare", str(one), str(other)]) == 0
+    assert "81.00 | 82.00   +1.00" in capsys.readouterr().out
+    assert main(["compare", str(one), str(tmp_path)]) == 2
+    assert f"{tmp_path}: has no config.yaml" in capsys.readouterr().err
