@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented methods confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -222,6 +222,10 @@ space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/t
 reference-choices: $(SETUP)  ## keep the tables of a finished `make choices` and a finished `make confirm`
 	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
 	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
+
+rotors: $(BASE)  ## blade passing frequencies read from the default's signals, against the truth: results/reference/default-rotors.csv
+	$(SNAKEMAKE) -- data
+	$(BIN)/python -m lowalt.measure.rotor_estimates --run results/default --out results/reference/default-rotors.csv
 
 reference-methods: $(SETUP)  ## keep the tables of a finished `make methods`
 	for table in $(REFERENCE) alarms.csv accuracy_cost.csv; do cp results/methods/$$table results/reference/methods-$$table; done
