@@ -45,7 +45,7 @@ def copied(folder: Path) -> Path:
 def test_instructions_are_known_and_begin_with_a_python_that_the_package_allows():
     found = instructions()
     assert {name for name, _ in found} <= KNOWN and found[0][0] == "FROM"
-    version = re.fullmatch(r"python:3\.(\d+)-slim", found[0][1])
+    version = re.fullmatch(r"python:3\.(\d+)-slim-[a-z]+", found[0][1])
     asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["requires-python"]
     assert int(version[1]) >= int(asked.removeprefix(">=3."))
 
@@ -63,6 +63,25 @@ def test_run_lines_are_shell_and_install_extras_that_exist_from_files_copied_bef
                 asked = re.fullmatch(r"\.\[(.*)\]", words[-1])[1].split(",")
                 assert {"workflow", "recognition"} <= set(asked) <= set(extras)
                 assert {"pyproject.toml", "src", "envs"} <= there
+
+
+def test_packages_of_the_system_exist_in_the_release_that_the_image_stands_on():
+    """Asked of Debian's own index, on a machine of that release."""
+    release = dict(line.split("=", 1) for line in Path("/etc/os-release").read_text().splitlines() if "=" in line)
+    if instructions()[0][1].rpartition("-")[2] != release.get("VERSION_CODENAME") or not shutil.which("apt-cache"):
+        pytest.skip("this machine has another release than the image")
+    lines = [rest for name, rest in instructions() if name == "RUN" and "apt-get install" in rest]
+    words = [word for line in lines for word in line.partition("apt-get install")[2].partition("&&")[0].split()]
+    packages = [word for word in words if not word.startswith("-")]
+    assert packages
+
+    def offered(package: str) -> bool:
+        answer = subprocess.run(["apt-cache", "policy", package], capture_output=True, text=True).stdout
+        return bool(re.search(r"Candidate: \d", answer))
+
+    if not offered("libgl-dev"):
+        pytest.skip("no index of Debian's packages is here")
+    assert [package for package in packages if not offered(package)] == []
 
 
 @pytest.mark.workflow
