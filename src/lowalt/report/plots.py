@@ -5,6 +5,7 @@ scripts; by Vega in the page, with values at the pointer, zoom, and a legend tha
 to the page. Vega-Lite was chosen since a plot is a table and a mapping, which a test can check; its scripts add 0.9 MB.
 """
 
+import functools
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -41,10 +42,16 @@ def whole(plot: Plot) -> dict:
 
 
 def svg(plot: Plot) -> str:
-    """Return the plot as SVG; equal rows give equal text."""
+    """Return the plot as SVG; equal rows give equal text. A plot that was drawn before is not drawn again."""
+    return _drawn(json.dumps(whole(plot)))
+
+
+@functools.lru_cache(maxsize=64)
+def _drawn(specification: str) -> str:
+    """The SVG of a whole specification (JSON)."""
     import vl_convert
 
-    return vl_convert.vegalite_to_svg(whole(plot), vl_version=VEGA_LITE)
+    return vl_convert.vegalite_to_svg(json.loads(specification), vl_version=VEGA_LITE)
 
 
 def scripts() -> str:
