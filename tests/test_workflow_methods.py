@@ -30,6 +30,14 @@ def test_every_row_of_the_methods_is_trained_in_both_protocols_or_timed():
     assert run.image_sizes == [24] and run.asked.sees == "images"
 
 
+def test_the_run_of_uavs_and_birds_has_two_classes_and_the_default_s_rows_and_groups():
+    run, whole = run_of(load_yaml("config/uav-bird.yaml")), run_of()
+    assert run.classes == ("UAV", "Bird") and len(run.records) == 20
+    assert {name: item["published"] for name, item in run.records.items()} == {
+        name: whole.records[name]["published"] for name in run.records
+    }
+
+
 def test_a_training_reads_what_its_method_sees_from_the_data_set_s_own_run():
     _, products, _ = parts({"run": "mine", "data": "default", "recognition": METHODS})
     found = {
