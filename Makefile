@@ -44,7 +44,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 $(DOCS): $(BASE)
@@ -80,7 +80,7 @@ measured: $(SETUP)  ## recordings held against their radars' twins: make measure
 	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
 
 test: $(TESTING)  ## the test suite
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -m "not slow"
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --strict-skips -m "not slow"
 
 test-slow: $(TESTING)  ## the slow checks
 	$(BIN)/python -m pytest -m slow

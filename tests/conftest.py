@@ -5,6 +5,7 @@ import math
 import pytest
 
 from meshes import write_bird, write_quad
+from skips import Skips
 
 # Files that take long, the longest first. Two processes share the files of tests, one file at a time: a long file that
 # begins last would keep one of them alone at the end.
@@ -13,6 +14,17 @@ LONG = (
     "test_recognition_ranks", "test_contributing", "test_report_plots", "test_wheel", "test_attacks",
     "test_recognition_export", "test_workflow_locks", "test_workflow_board", "test_turns", "test_targets_more",
 )  # fmt: skip
+
+
+def pytest_addoption(parser):
+    """An option of this suite."""
+    parser.addoption("--strict-skips", action="store_true", help="fail where a test is skipped for an unlisted reason")
+
+
+def pytest_configure(config):
+    """Count skips in the process that collects all reports."""
+    if not hasattr(config, "workerinput"):
+        config.pluginmanager.register(Skips())
 
 
 def pytest_collection_modifyitems(items):
