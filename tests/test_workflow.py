@@ -4,6 +4,8 @@ import hashlib
 import os
 import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -73,6 +75,15 @@ def finished(tmp_path_factory) -> Path:
     folder = workplace(tmp_path_factory.mktemp("two-cores"))
     snakemake(folder, "--", "data")
     return folder
+
+
+def test_no_job_asks_for_the_network(finished):
+    """The run was made with the network refused; here the refusal itself is seen to work."""
+    environment = os.environ | {"PYTHONPATH": str(finished / "src"), "LOWALT_TEST_IMPORTS": str(finished / "imports")}
+    for program in ("import socket; socket.create_connection(('127.0.0.1', 9))", "import urllib.request as r; "
+                    "r.urlopen('http://localhost:9')"):  # fmt: skip
+        asked = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+        assert asked.returncode and "a job asked for the network" in asked.stderr
 
 
 @pytest.mark.slow

@@ -6,7 +6,8 @@ from pathlib import Path
 from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parents[2]
-# Python imports this by itself at start: every job notes its command and the package's modules it ended up with.
+# Python imports this by itself at start: every job notes its command and the package's modules it ended up with, and a
+# job that asks for the network ends.
 SPY = """
 import atexit, os, pathlib, sys, uuid
 
@@ -21,6 +22,12 @@ def note():
 
 if "LOWALT_TEST_IMPORTS" in os.environ:
     atexit.register(note)
+
+    def refuse(event, arguments):
+        if event == "socket.getaddrinfo" or event == "socket.connect" and not isinstance(arguments[1], (str, bytes)):
+            raise RuntimeError(f"a job asked for the network: {event} {arguments[1:]}")
+
+    sys.addaudithook(refuse)
 """
 RULES = {
     "targets/__main__.py": "cloud", "targets/gallery.py": "gallery", "motion/__main__.py": "motion",
