@@ -81,6 +81,7 @@ def _train(arguments: list[str]) -> None:
     line = parser("lowalt.recognition train", _train.__doc__)
     name_sources(line)
     line.add_argument("--extra", nargs="+", help="caches of views of other runs that are trained on too")
+    line.add_argument("--stream", help="config.yaml of a run with clouds, of which fresh motion models are trained on")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
@@ -102,6 +103,11 @@ def _train(arguments: list[str]) -> None:
     if given.extra:
         more = ViewSamples(given.extra, scheme.columns, folds(given.protocol, "train"))
         samples["train"] = with_extra(samples["train"], more)
+    if given.stream:
+        from lowalt.recognition.stream import streamed
+
+        models = settings["training"].get("stream_models", 0)
+        samples["train"] = streamed(samples["train"], given.stream, scheme.columns, given.protocol, models)
     train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
 
 

@@ -43,7 +43,7 @@ def opened(config: str | Path) -> Dataset:
     return Dataset(load_yaml(config), folder / "clouds", occluders=read_all(surfaces) if surfaces else None)
 
 
-def _sha256(cloud: Cloud) -> str:
+def cloud_sha256(cloud: Cloud) -> str:
     """SHA-256 of all arrays of a cloud, in the order of its fields."""
     arrays = [
         value for value in (getattr(cloud, field.name) for field in fields(cloud)) if isinstance(value, np.ndarray)
@@ -135,7 +135,7 @@ class DatasetSamples:
         """
         maker, subtypes = self.dataset.maker, sorted({self.rows[place]["subtype"] for place, _ in self.chosen})
         clouds = {name: self.dataset.clouds[name] for name in subtypes}
-        sums = {name: _sha256(cloud) for name, cloud in clouds.items()}
+        sums = {name: cloud_sha256(cloud) for name, cloud in clouds.items()}
         rows = hashlib.sha256(json.dumps([self.rows[place] for place, _ in self.chosen], sort_keys=True).encode())
         settings = {"size": self.size, "columns": self.columns, "render": maker.render, "echo": maker.echo}
         told = json.dumps([settings, self.dataset.plan.seed, sums, rows.hexdigest()], sort_keys=True)

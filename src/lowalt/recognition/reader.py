@@ -30,4 +30,6 @@ class Reader(Dataset):
             seen = augment_signals(seen, self.augmentation, generator)
         else:
             seen = augment(seen, self.columns, self.augmentation, generator)
-        return torch.from_numpy(seen), torch.from_numpy(self.source.facts.label[mine]).long()
+        # A source with a stream knows labels of samples that are not among its facts.
+        told = getattr(self.source, "labels", self.source.facts.label.__getitem__)(mine)
+        return torch.from_numpy(seen), torch.from_numpy(told).long()

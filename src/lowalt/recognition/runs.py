@@ -65,6 +65,10 @@ def train(
         _record(folder / "run.json", classical_runs.train(samples, scheme, protocol, settings, folder))
         return
     augment.check(settings["augmentation"])
+    if bool(block["stream"]) != hasattr(samples["train"], "fresh"):
+        raise InputError(
+            f"training: stream is {block['stream']}, expected a share above 0 together with --stream, or neither"
+        )
     machine = Machine.here(block["precision"])
     own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
     # Leave out settings that change no weight, and name the precision that this machine computes with.

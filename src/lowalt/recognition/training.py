@@ -24,7 +24,7 @@ from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.objective import descent
-from lowalt.recognition.order import batches, epoch_order
+from lowalt.recognition.order import batches, epoch_order, with_fresh
 from lowalt.recognition.reader import Reader
 from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.statistics import cross_entropy
@@ -88,6 +88,12 @@ class Trainer:
     def _order(self, epoch: int) -> np.ndarray:
         """Return the sample numbers of an epoch in training order."""
         return epoch_order(self.train.facts, self.seed, self.keys, epoch, self.block["snrs_per_model"])
+
+    def _numbered(self, parts: list[np.ndarray]) -> list[tuple[int, np.ndarray]]:
+        """Return the sample numbers of the next batches, each with its step, which alone decides what a batch holds."""
+        share, known = self.block["stream"], len(self.train.facts)
+        numbered = enumerate(parts, start=self.at.steps)
+        return [(step, with_fresh(part, step, share, known) if share else part) for step, part in numbered]
 
     def save(self) -> None:
         """Write the checkpoint; refuses to write weights that are not finite."""
@@ -196,8 +202,7 @@ class Trainer:
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
             rest = parts[self.at.batch : self.at.batch + steps - self.at.steps]
-            # A batch depends on its step alone, so a training resumes at any step.
-            read = self.read(list(enumerate(rest, start=self.at.steps)))
+            read = self.read(self._numbered(rest))
             while self.at.batch < len(parts) and self.at.steps < steps and not self.at.done:
                 asked = time.monotonic()
                 batch = next(read)

@@ -61,6 +61,11 @@ def fidelity(wildcards: Any, input: Any) -> str:
     return f"--fidelity {input.fidelity}" if input.fidelity else ""
 
 
+def stream(wildcards: Any, input: Any) -> str:
+    """The configuration whose fresh motion models are trained on."""
+    return f"--stream {input.stream}" if input.get("stream") else ""
+
+
 def samples(wildcards: Any, input: Any) -> str:
     """Option that names the signals, the shrunk images, the index of the shards, or the configuration to make samples
     from."""

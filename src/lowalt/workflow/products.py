@@ -39,21 +39,31 @@ class Products(DataProducts):
         if scheme.sees != "images":
             return {"signals": [f"{base}/slow_time/{shard}.npz" for shard in self._run.plan.shards]}
         if self._config["recognition"].get("input") == "dataset":
-            clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
-            surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
-            hidden = {"surfaces": surfaces} if "occlusion" in self._config["effects"] else {}
-            return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
+            return self._made()
         if not self._config["recognition"]["cache"]:
             return {"index": f"{base}/shards/index.json"}
         size = self._run.pixels(scheme)
         return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
+
+    def _made(self) -> dict[str, str | list[str]]:
+        """Files from which samples are made on the spot: configuration, clouds, and surfaces that hide points."""
+        base = f"results/{self._run.data}"
+        clouds = [f"{base}/clouds/{subtype}.npz" for subtype in self._run.subtypes]
+        surfaces = [path.replace("/clouds/", "/occluders/") for path in clouds]
+        hidden = {"surfaces": surfaces} if "occlusion" in self._config["effects"] else {}
+        return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files that one training reads: `samples`, and the images of other runs that the configuration adds."""
         size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
         names = self._config["recognition"].get("extra", [])
         extra = [path for name in names for path in self._extra(name, size)]
-        return {**self.samples(wildcards), **({"extra": extra} if extra else {}), **self._own_backbone(wildcards)}
+        found = {**self.samples(wildcards), **({"extra": extra} if extra else {}), **self._own_backbone(wildcards)}
+        sees = self._run.schemes_by_slug[wildcards.scheme].sees
+        if self._config["recognition"]["training"].get("stream", 0) and sees == "images":
+            made = self._made()
+            found |= {"stream": made.pop("dataset"), **made}
+        return found
 
     def _own_backbone(self, wildcards: Any) -> dict[str, str]:
         """The user's file that a scheme's backbone is made in, none for a library's backbone."""
