@@ -9,6 +9,7 @@ import pytest
 import torch
 import yaml
 
+from configured import Inputs, parts
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.recognition import checkpoint, samples, schemes
@@ -21,7 +22,6 @@ from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.workflow import options
 from test_dataset import configuration
-from test_workflow_products import Inputs, parts
 
 SIZE, COLUMNS = 24, [0, 2, 3, 5]
 ONE_OF_EACH = ["DJI Mini 2", "Crow", "AITO M9 2024", "Walking Pedestrian 1", "Owl"]
@@ -96,7 +96,7 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
         main([*line, f"--{name}", str(source), "--out", str(tmp_path / name)])
         weights.append(checkpoint.load(tmp_path / name / "model.pt")[1]["weights"])
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
-    with pytest.raises(InputError, match="one of --views, --index and --dataset"):
+    with pytest.raises(InputError, match="one of --views, --signals, --index and --dataset"):
         main([*line, "--out", str(tmp_path / "none")])
 
 
@@ -117,7 +117,7 @@ def test_the_configuration_names_the_source():
     overlay = {"recognition": {"cache": False, "input": "dataset"}, "effects": {"occlusion": {}},
                "echo": {"tolerance": 1e-3}}  # fmt: skip
     _, products, _ = parts(overlay)
-    found = products.samples(SimpleNamespace(scheme="x"))
+    found = products.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
     assert found["dataset"] == "results/default/config.yaml" and len(found["clouds"]) == len(found["surfaces"]) == 40
     assert options.samples(None, Inputs(found)) == "--dataset results/default/config.yaml"
     with pytest.raises(InputError, match=r"recognition\.input"):

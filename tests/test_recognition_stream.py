@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
+from configured import Inputs, parts
 from lowalt.common.errors import InputError
 from lowalt.common.splits import fold
 from lowalt.recognition import checkpoint, order, recipe, runs, schemes
@@ -21,7 +22,6 @@ from lowalt.tiles.resample import resize
 from lowalt.workflow import options
 from test_dataset import configuration
 from test_recognition_made import ONE_OF_EACH
-from test_workflow_products import Inputs, parts
 from trainings import SETTINGS, TRAINING, equal
 
 COLUMNS, SIZE = [0, 2, 3, 5], 32
