@@ -3,33 +3,19 @@
 import hashlib
 import itertools
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from builtin_records import BIRDS, CARS, NAMES, RECORDS, TABLE, UAVS, WRITTEN
 from lowalt.targets.assemble import turn
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES
 from lowalt.targets.cloud import check, write
 from lowalt.targets.dimensions import rows as dimension_rows
-from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.surfaces import inside
-
-CONFIG = Path(__file__).parents[1] / "config"
-TABLE = load_table(CONFIG / "targets.csv")
-WRITTEN = {
-    name: record
-    for file in ("uav", "bird", "vehicle")
-    for name, record in read_records(CONFIG / "targets" / f"{file}.yaml").items()
-}
-RECORDS = {name: merge(TABLE[name], record, name) for name, record in WRITTEN.items()}
-UAVS, BIRDS, CARS = (
-    [name for name, row in TABLE.items() if row["category"] == category] for category in ("UAV", "Bird", "Vehicle")
-)
-NAMES = [*UAVS, *BIRDS, *CARS]
 
 
 @pytest.fixture(scope="module")

@@ -1,28 +1,14 @@
 """Built-in models with other settings: counts of points, coaxial rotors, rolling wheels, wing beats."""
 
-from pathlib import Path
-
 import pytest
 
+from builtin_records import NAMES, RECORDS, TABLE, WRITTEN
 from lowalt.common.errors import InputError
 from lowalt.targets.assemble import allot
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES
-from lowalt.targets.records import load_table, merge, read_records
+from lowalt.targets.records import merge
 from lowalt.targets.uav_pieces import hubs, motor_diagonal
-
-CONFIG = Path(__file__).parents[1] / "config"
-TABLE = load_table(CONFIG / "targets.csv")
-WRITTEN = {
-    name: record
-    for file in ("uav", "bird", "vehicle")
-    for name, record in read_records(CONFIG / "targets" / f"{file}.yaml").items()
-}
-RECORDS = {name: merge(TABLE[name], record, name) for name, record in WRITTEN.items()}
-UAVS, BIRDS, CARS = (
-    [name for name, row in TABLE.items() if row["category"] == category] for category in ("UAV", "Bird", "Vehicle")
-)
-NAMES = [*UAVS, *BIRDS, *CARS]
 
 
 def variant(name, **changes):
