@@ -6,7 +6,7 @@ import re
 from lowalt.__main__ import main
 from lowalt.commands.compare import compared
 from pages import browsed, sound
-from test_commands import run_folder
+from test_commands_compare import run_folder
 
 
 def made(folder):

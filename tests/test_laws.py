@@ -13,7 +13,7 @@ from scipy import stats
 from lowalt.common.splits import FOLDS, fold
 from lowalt.noise.chunk import noisy_signals
 from lowalt.recognition import statistics, tables
-from lowalt.recognition.evaluated import Run
+from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import bootstrap, model_shares
 from lowalt.spectra import trp, vrp, vt
 from made_predictions import run_files
@@ -127,11 +127,11 @@ def test_tables_do_not_depend_on_the_order_of_predictions_or_of_runs(seed):
         folder = Path(name)
         cases = [("A:VT", 0), ("A:VT", 1), ("ABC:VRP+TRP+VT", 0)]
         paths = [run_files(folder, "seen", scheme, 0.8, seed, models=20)[0] for scheme, seed in cases]
-        tables.write([Run(path) for path in paths], ["A:VT", "ABC:VRP+TRP+VT"], {}, folder / "before", 1)
+        tables.write([Evaluated(path) for path in paths], ["A:VT", "ABC:VRP+TRP+VT"], {}, folder / "before", 1)
         for path in paths:
             head, *lines = path.read_text().splitlines()
             path.write_text("\n".join([head, *rng.permutation(lines)]) + "\n")
-        mixed = [Run(paths[number]) for number in rng.permutation(len(paths))]
+        mixed = [Evaluated(paths[number]) for number in rng.permutation(len(paths))]
         tables.write(mixed, ["A:VT", "ABC:VRP+TRP+VT"], {}, folder / "after", 1)
         written = sorted(path.name for path in (folder / "before").iterdir())
         assert "accuracy.csv" in written and len(written) > 6

@@ -11,11 +11,12 @@ from lowalt.common.errors import InputError
 from lowalt.recognition import inference, network, objective, recipe, runs
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.reader import Reader
+from lowalt.recognition.schemes import SPECTRA
 from lowalt.tiles import colour_map
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 
 MACHINE = inference.Machine(torch.device("cpu"), "fp32")
-PALETTES = np.stack([colour_map("gray")] * len(runs.SPECTRA))
+PALETTES = np.stack([colour_map("gray")] * len(SPECTRA))
 
 
 def gradients(views, backbone="test_vit2", again=False, dropout=0.0, **changes):

@@ -44,8 +44,8 @@ def test_every_command_works_with_this_many_stations(tmp_path, count):
     assert average["scheme"] == name and int(average["samples"]) == 8
     text = reported(tmp_path, config, clouds)
     assert f"{count} base station" in text and f"<td>{name}</td>" in text
-    # A panel of the viewer for each spectrum of each station.
-    assert [text.count(f">{station}: ") for station in stations] == [3] * count
+    # A panel of the viewer for the echo and for each of the three spectra of each station.
+    assert [text.count(f">{station}: ") for station in stations] == [4] * count
 
 
 def test_a_station_of_the_layer_below_is_taken_out_and_a_scheme_must_name_known_ones(tmp_path):
