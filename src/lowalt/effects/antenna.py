@@ -49,6 +49,6 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     antenna_loops.power_gain(
         places.reshape(-1, 3), np.asarray(station.position_m, float), axes, np.array([math.cos(tilt), math.sin(tilt)]),
         10 ** (element.gain_dbi / 10), nepers * 12.0 * math.degrees(1.0 / element.width_deg) ** 2, most,
-        antenna_loops.halvings(most), np.empty((7, antenna_loops.TILE)), out.reshape(-1),
+        antenna_loops.halvings(most), np.empty((7, antenna_loops.STRIP)), out.reshape(-1),
     )  # fmt: skip
     return out

@@ -9,7 +9,7 @@ from numpy.polynomial import chebyshev
 from lowalt.common.jit import VECTOR
 from lowalt.echo.fast.vector_loops import horner
 
-TILE = 256
+STRIP = 256
 """Directions that pass through the loops together."""
 STRETCH = 0.7
 """Largest exponent of the polynomial for exp; larger ones are halved so often, and the result is squared as often."""
@@ -72,11 +72,11 @@ def power_gain(places, station, axes, tilt, peak, rate, most, squarings, work, o
 
     axes: (4,) horizontal components of the panel's normal and of its horizontal axis; tilt: (2,) cosine and sine of the
     downtilt; peak: largest power gain; rate: loss (nepers of power) per rad^2; most: largest loss, 2^squarings
-    STRETCH at most; work: (7, TILE). Source: 3GPP TR 38.901, Table 7.3-1.
+    STRETCH at most; work: (7, STRIP). Source: 3GPP TR 38.901, Table 7.3-1.
     """
     ahead, side, up, flat, square, turn, angle = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
-    for first in range(0, len(places), TILE):
-        size = min(TILE, len(places) - first)
+    for first in range(0, len(places), STRIP):
+        size = min(STRIP, len(places) - first)
         for i in range(size):
             x, y, z = places[first + i, 0] - station[0], places[first + i, 1] - station[1], places[first + i, 2]
             z -= station[2]

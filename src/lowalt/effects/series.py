@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.common.jit import VECTOR
 
-TILE = 256
+STRIP = 256
 """Places that pass through the loops together."""
 ENOUGH = 1e-14
 """Share of the largest coefficient below which the last quarter of a series must be."""
@@ -18,11 +18,11 @@ LONGEST = 64
 def summed(places, middle, half, terms, work, out):
     """Fill out (K,) with the Chebyshev series `terms` (count,) complex at places (K,), Clenshaw's rule; count is even.
 
-    The series runs from middle - half to middle + half; work: (5, TILE).
+    The series runs from middle - half to middle + half; work: (5, STRIP).
     """
     x, re, im, last_re, last_im = work[0], work[1], work[2], work[3], work[4]
-    for first in range(0, len(places), TILE):
-        size = min(TILE, len(places) - first)
+    for first in range(0, len(places), STRIP):
+        size = min(STRIP, len(places) - first)
         for i in range(size):
             x[i] = 2.0 * (places[first + i] - middle) / half
             re[i], im[i], last_re[i], last_im[i] = 0.0, 0.0, 0.0, 0.0
@@ -59,7 +59,7 @@ def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.n
         if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
             out = np.empty(places.shape, np.complex128)
             flat = np.ascontiguousarray(places, np.float64).reshape(-1)
-            summed(flat, middle, half, terms, np.empty((5, TILE)), out.reshape(-1))
+            summed(flat, middle, half, terms, np.empty((5, STRIP)), out.reshape(-1))
             return out
         count *= 2
     return np.asarray(function(places), np.complex128)

@@ -35,7 +35,7 @@ class ReadAhead:
         )  # fmt: skip
 
     def __call__(self, items: Sequence) -> Iterator:
-        """Return the batches of these items; the workers drop what they still read for an earlier call."""
+        """Return the batches of these items; the workers drop batches of an earlier call."""
         # The loader keeps this very list, and asks it for items anew at every pass.
         self._items[:] = items
         return iter(self._loader)

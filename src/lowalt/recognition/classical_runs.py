@@ -1,4 +1,4 @@
-"""From settings to the files of a classical training: the same as those of a network's, so the same rules read them."""
+"""From settings to the files of a classical training, which are those of a network's, so the same rules read them."""
 
 import time
 from dataclasses import asdict

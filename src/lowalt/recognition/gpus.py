@@ -1,4 +1,4 @@
-"""GPUs of one's own: jobs of one machine that run at the same time never share a GPU; who finds none free waits.
+"""GPUs of one's own: jobs of one machine that run at the same time never share a GPU; a job that finds none free waits.
 
 A job locks one file a GPU, and the system frees the locks of a job that ends. One process chooses its GPU itself
 (`Machine.here`). Several processes of one training get theirs together, before they start:

@@ -14,6 +14,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -79,6 +80,30 @@ def fingerprint(facts: Facts, *content: bytes | memoryview) -> str:
     for part in content:
         hasher.update(part)
     return hasher.hexdigest()
+
+
+class Cached(NamedTuple):
+    """Content of a cache file: facts of all its samples, which of them are asked for (samples,) bool, and arrays."""
+
+    facts: Facts
+    keep: np.ndarray
+    arrays: dict[str, np.ndarray]
+
+
+def cached(path: Path, what: str, folds: set[tuple[str, str]], *names: str) -> Cached | None:
+    """Return the arrays `names` of a cache file, None where no sample is of one of the (group, fold) pairs `folds`.
+
+    what: word for the file's content in messages. Raises: InputError naming a file that is no such cache.
+    """
+    checked_archive(path, what)
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            facts = Facts(*(data[name] for name in FACTS))
+            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
+            keep = np.array([pair in folds for pair in pairs], dtype=bool)
+            return Cached(facts, keep, {name: data[name] for name in names}) if keep.any() else None
+    except UNREADABLE as error:
+        raise InputError(f"{path}: not a {what} file ({error})") from error
 
 
 class ViewSamples:
@@ -149,17 +174,11 @@ def with_extra(own: ViewSamples, extra: ViewSamples) -> ViewSamples:
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:
     """Return the images and facts of a cache file that are in `folds`, None where none is."""
-    checked_archive(path, "views")
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            facts = Facts(*(data[name] for name in FACTS))
-            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
-            keep = np.array([pair in folds for pair in pairs], dtype=bool)
-            if not keep.any():
-                return None
-            images, spectra = data["views"], data["spectra"].tolist()
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not a views file ({error})") from error
+    found = cached(path, "views", folds, "views", "spectra")
+    if found is None:
+        return None
+    facts, keep, images = found.facts, found.keep, found.arrays["views"]
+    spectra = found.arrays["spectra"].tolist()
     count = len(spectra) * facts.range_m.shape[1]
     if images.ndim != 4 or images.shape[:2] != (len(facts), count) or images.dtype != np.uint8:
         raise InputError(f"{path}: views {images.dtype} {images.shape}, expected uint8 ({len(facts)}, {count}, S, S)")

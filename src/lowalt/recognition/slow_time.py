@@ -13,14 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
 from lowalt.motion import read_table
 from lowalt.recognition.features import NAMES, features
-from lowalt.recognition.samples import FACTS, Facts, fingerprint, joined
+from lowalt.recognition.samples import FACTS, Facts, cached, fingerprint, joined
 from lowalt.recognition.views import facts_of, located
 from lowalt.shards import ShardSet
 from lowalt.tiles.signals import load_signals
@@ -70,7 +69,7 @@ def of_stations(signals: np.ndarray, network: Network) -> np.ndarray:
 def cache_shard(index: str | Path, name: str, out: str | Path, source: Noisy | None = None) -> int:
     """Write the cache file of the shard `name` and return its number of samples.
 
-    source: the noisy signals of the shard's chunk; without, shards that hold signals are read.
+    source: the noisy signals of the shard's chunk; without it, the shards themselves hold the signals.
     Raises: InputError where the index has no such shard, it holds no signals, or it is damaged.
     """
     shards, numbers = located(index, name)
@@ -119,17 +118,10 @@ class SlowTimeSamples:
 
 def _load(path: Path, kind: str, stations: list[int], folds: set) -> tuple[np.ndarray, Facts] | None:
     """Return the values and facts of a cache file that are in `folds`, None where none is."""
-    checked_archive(path, "signals")
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            facts = Facts(*(data[name] for name in FACTS))
-            pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
-            keep = np.array([pair in folds for pair in pairs], dtype=bool)
-            if not keep.any():
-                return None
-            values = data[kind]
-    except UNREADABLE as error:
-        raise InputError(f"{path}: not a file of signals ({error})") from error
+    found = cached(path, "signals", folds, kind)
+    if found is None:
+        return None
+    facts, keep, values = found.facts, found.keep, found.arrays[kind]
     wanted = {"signals": np.complex64, "features": np.float32}[kind]
     if values.ndim != 3 or values.shape[:2] != (len(facts), facts.range_m.shape[1]) or values.dtype != wanted:
         raise InputError(f"{path}: {kind} {values.dtype} {values.shape}, expected {wanted.__name__} of all stations")

@@ -1,4 +1,4 @@
-"""The options of a command line that name samples, and the check of what they name."""
+"""The options of a command line that name samples, and the check of these samples."""
 
 from argparse import ArgumentParser
 from typing import Any
@@ -19,6 +19,6 @@ def name_sources(line: ArgumentParser) -> None:
 def of_size(found: Any, scheme: Scheme, size: int) -> Any:
     """Return the samples; refuse images or signals of another size than the settings'."""
     if found.size != size and scheme.sees != "features":
-        what = f"images of {found.size} pixels" if scheme.sees == "images" else f"signals of {found.size} symbols"
-        raise InputError(f"--{'views' if scheme.sees == 'images' else 'signals'}: {what}, settings say {size}")
+        content = f"images of {found.size} pixels" if scheme.sees == "images" else f"signals of {found.size} symbols"
+        raise InputError(f"--{'views' if scheme.sees == 'images' else 'signals'}: {content}, settings say {size}")
     return found

@@ -3,7 +3,7 @@
 Neighbouring patches share rows and columns, so a spectral line at the edge of one patch lies inside the next.
 Source: Gong, Chung and Glass, AST: Audio Spectrogram Transformer, Interspeech 2021 (patches of 16, 10 apart; 768
 features, 12 layers, 12 heads: `ast_base`). Ours sees colours of one spectrum where theirs sees one channel of 128 mel
-bands, and starts from random weights where theirs come from ImageNet. `ast_micro` is the same in small.
+bands, and starts from random weights where theirs come from ImageNet. `ast_micro` is a small version of it.
 """
 
 from typing import NamedTuple

@@ -13,7 +13,7 @@ from lowalt.common.shipped import SHIPPED
 from lowalt.common.street import PACKAGE
 
 COUNTED = (".py", ".smk", ".yaml")
-"""Endings of the files of the package that decide what a run makes."""
+"""Endings of the files of the package that decide a run's products."""
 
 
 def revision(folder: Path = SHIPPED) -> str:
@@ -80,7 +80,7 @@ def _differing(base: dict, config: dict) -> dict:
 
 
 def checksums(files: dict[str, str | list[str]]) -> list[dict]:
-    """Return path, bytes and SHA-256 of every file of a manifest but those of benchmarks and of the kept reference.
+    """Return path, bytes and SHA-256 of every file of a manifest except those of benchmarks and of the kept reference.
 
     files: path or list of paths by name. Files that several names share stand once.
     """

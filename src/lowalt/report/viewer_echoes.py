@@ -53,7 +53,7 @@ def folded(speed_mps: float, frequency_hz: float, interval_s: float) -> tuple[fl
 
 
 def echoes(signals: np.ndarray, geometry: dict[str, dict[str, float]], network: Network) -> list[dict]:
-    """Return what the page shows of a sample's signals (stations, symbols) complex, station by station.
+    """Return the page's entries of a sample's signals (stations, symbols) complex, station by station.
 
     geometry: of the sample's record, with `radial_mps` of each station, receding positive; None where it has no place.
     """

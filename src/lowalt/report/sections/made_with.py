@@ -31,7 +31,7 @@ def versions() -> list[tuple[str, str]]:
 
 
 def machines(run: ReportedRun) -> list[tuple[str, str]]:
-    """Return (what was made, machine) of the trainings, by their own records, and of the page."""
+    """Return (product, machine) of the trainings, by their own records, and of the page."""
     rows = run.inputs.table("seeds")
     trained = {
         f"training: {row['protocol']} {row['scheme']}, seed {row['seed']}": row.get("hardware", "") for row in rows
