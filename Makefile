@@ -17,7 +17,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
 
 all: default
 
@@ -132,6 +132,10 @@ bench-make: $(SETUP)  ## wall and processor time of `make` from an empty clone, 
 
 bench-walk: $(SETUP)  ## a new user's walk through the documents, each step timed, from clone to a network of one's own in the report: results/benchmarks/walk.csv
 	$(BIN)/python benchmarks/walk.py --out results/benchmarks/walk.csv --label '$(LABEL)'
+
+# The default's samples twenty times over: make long-run MODELS=2000
+long-run: $(BASE)  ## 200 000 samples end to end as signals, verified, with time and peak memory by stage: results/benchmarks/long_run.csv
+	$(BIN)/python benchmarks/long_run.py $(if $(MODELS),--models $(MODELS)) --out results/benchmarks/long_run.csv
 
 status: $(SETUP)  ## what a run in another terminal is doing
 	@$(BIN)/python -m lowalt.workflow.status
