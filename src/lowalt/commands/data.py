@@ -31,9 +31,9 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
         "predict", help="class probabilities of a tile or of signals by a trained model",
-        epilog="example: lowalt predict results/default/models/seen/abc-vrp-trp-vt/0/model.pt sample.npy",
+        epilog="example: lowalt predict default-seen sample.npy",
     )  # fmt: skip
-    predict.add_argument("model", type=Path, help="model.pt of a training")
+    predict.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
     predict.add_argument("input", type=Path, help="tile (.png), or signals (stations, symbols) complex (.npy)")
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
     predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
@@ -80,16 +80,19 @@ def remake(given: argparse.Namespace) -> str:
 def predict(given: argparse.Namespace) -> str:
     """Return the probability of each class, the most probable first.
 
+    A model file that knows how its images were made of signals is asked with that, unless overlays are given.
     Raises: InputError for a file that is no model, tile or signal.
     """
-    from lowalt.recognition.runs import load as load_model
     from lowalt.recognition.runs import predict as probabilities
+    from lowalt.recognition.zoo import opened
 
-    config = load([given.base, *given.overlay], given.schema)
-    settings = {key: config[key] for key in ("network", "spectra", "images")}
     if given.input.suffix not in (".png", ".npy"):
         raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
-    found = probabilities(load_model(given.model), existing(given.input, "input"), settings)
+    model, settings = opened(given.model)
+    if given.overlay or not settings:
+        config = load([given.base, *given.overlay], given.schema)
+        settings = {key: config[key] for key in ("network", "spectra", "images")}
+    found = probabilities(model, existing(given.input, "input"), settings)
     if given.json:
         return json.dumps(found)
     return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))

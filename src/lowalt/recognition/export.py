@@ -1,4 +1,6 @@
-"""A trained model for other programs: index images in, class probabilities out, as torch.export or ONNX."""
+"""A trained model for other programs: index images in, class probabilities out, as torch.export or ONNX; or its weights
+and records as safetensors, with a card.
+"""
 
 from pathlib import Path
 
@@ -7,6 +9,7 @@ from torch import nn
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
 
 
@@ -24,14 +27,20 @@ class Probabilities(nn.Module):
 
 
 def export(trained: Trained, out: str | Path) -> None:
-    """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size.
+    """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size; or its weights and records
+    (.safetensors) with a card (.md) next to them.
 
-    Raises: InputError for another suffix, a model that sees no images, or where ONNX is asked for and its packages are
-    not installed.
+    Raises: InputError for another suffix, a program of a model that sees no images, or where ONNX is asked for and its
+    packages are not installed.
     """
     suffix = Path(out).suffix
-    if suffix not in (".pt2", ".onnx"):
-        raise InputError(f"--out {out}: expected a name ending in .pt2 or .onnx")
+    if suffix not in (".pt2", ".onnx", ".safetensors"):
+        raise InputError(f"--out {out}: expected a name ending in .pt2, .onnx or .safetensors")
+    if suffix == ".safetensors":
+        content = model_file.of_run(trained.path)
+        model_file.write(out, content)
+        model_card.write(out, content, model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name))
+        return
     if trained.scheme.sees != "images":
         raise InputError(f"--model: scheme {trained.scheme.name!r} sees {trained.scheme.sees}, expected one on images")
     model = Probabilities(trained.model).eval()

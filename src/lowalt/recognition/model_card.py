@@ -1,0 +1,126 @@
+"""The card of a trained model, Markdown with the block of metadata that hubs read: written next to every model file.
+
+It holds the training's record, the run's table of accuracy, and how 8-bit weights change the answers.
+"""
+
+from pathlib import Path
+
+import yaml
+
+from lowalt import __version__
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.files import replacing
+from lowalt.recognition.model_file import EIGHT, ModelFile, run_folder
+from lowalt.recognition.schemes import SPECTRA
+from lowalt.shards.hub import TAGS
+
+RUN = {
+    "train_samples": "training samples", "steps": "steps", "batch": "batch", "samples_seen": "samples seen",
+    "parameters": "trained values", "validation_accuracy": "accuracy on the validation fold when training ended",
+    "hardware": "hardware", "train_s": "training, s", "precision": "arithmetic of the training", "torch": "torch",
+    "timm": "timm",
+}  # fmt: skip
+"""Entries of run.json that a card shows, and their words."""
+MEANING = {
+    "seen": "trained and tested on the same subtypes, with different motion models",
+    "unseen": "tested on subtypes that no training sample shows",
+}
+LIMITS = """\
+- It has seen simulated echoes only, of the network and the effects that its run was configured with.
+- One target a sample, tracked perfectly. It always answers with one of its classes, also for noise alone.
+- Accuracy on subtypes that it was not trained on is lower: compare the tables of both protocols.
+"""
+
+
+def accuracy_rows(model: str | Path, protocol: str, scheme: str) -> list[dict[str, str]]:
+    """Return the rows of the run's accuracy.csv for a model.pt; none where it lies in no run with such a table."""
+    folder = run_folder(model)
+    if folder is None or not (folder / "accuracy.csv").is_file():
+        return []
+    rows = read_csv(folder / "accuracy.csv", "protocol", "scheme", "snr_db", "accuracy_percent", "samples", "seeds")
+    return [row for row in rows if (row["protocol"], row["scheme"]) == (protocol, scheme)]
+
+
+def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
+    """A Markdown table."""
+    lines = [header, tuple("---" for _ in header), *rows]
+    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines) + "\n"
+
+
+def _shown(value: object) -> str:
+    """A value of a record as text of a card."""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _accuracy(rows: list[dict[str, str]]) -> str:
+    """The section on accuracy on the test fold."""
+    if not rows:
+        return "The run had no table of accuracy when this card was written.\n"
+    seeds = rows[0]["seeds"]
+    whose = "of this model" if seeds == "1" else f"mean over the {seeds} trainings of the run, of which this is one"
+    cells = [("all" if row["snr_db"] == "avg" else row["snr_db"], row["accuracy_percent"], row["samples"])
+             for row in rows]  # fmt: skip
+    return (
+        f"From the run's accuracy.csv: accuracy {whose}, with weights as trained, on the test fold of the protocol, "
+        "evaluated as the run's\nconfiguration says (there, answers may be means over a sample and its mirror image; "
+        "`lowalt predict` takes no such mean).\n\n"
+        + _table(("SNR (dB)", "accuracy (%)", "test samples"), cells)
+    )  # fmt: skip
+
+
+def _rounded(measured: dict) -> str:
+    """The section on 8-bit weights."""
+    return f"""## Weights in 8 bits
+
+Matrices are whole numbers of 8 bits with one scale a row; everything else is float32. Both sets of weights answered
+all {measured["samples"]} samples of the validation fold, in float32:
+
+{
+        _table(
+            ("weights", "accuracy (%)"),
+            [("as trained", f"{measured['exact_percent']:.3f}"), ("8 bits", f"{measured['percent']:.3f}")],
+        )
+    }
+{measured["changed"]} answers differ; the largest change of a probability is {measured["largest_change"]:.4f}.
+"""
+
+
+def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
+    """Return the card of a model; accuracy: rows of the run's table (`accuracy_rows`); name: of the model's file."""
+    state, scheme = content.model, content.model["scheme"]
+    front = {
+        "license": "mit", "library_name": "lowalt", "tags": [*(tag for tag in TAGS if tag != "webdataset"),
+        "safetensors"],
+    }  # fmt: skip
+    method = scheme.get("method") or scheme.get("backbone") or state["network"].get("backbone", "")
+    spectra = "+".join(SPECTRA[number] for number in scheme["spectra"])
+    facts = [
+        ("classes", ", ".join(state["classes"])), ("scheme", scheme["name"]), ("protocol", state["protocol"]),
+        ("network", f"{method}, fusion {scheme['fusion']}"),
+        ("sees", f"{spectra}, {state['size']} x {state['size']} pixels each" if spectra else "the slow-time signals"),
+        ("seed", state["seed"]),
+        *((words, _shown(content.run[key])) for key, words in RUN.items() if key in content.run),
+        *((f"SHA-256 of the {part} samples", f"`{digest}`")
+          for part, digest in sorted(content.identity.get("samples", {}).items())),
+    ]  # fmt: skip
+    parts = [
+        f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
+        f"A network that tells {', '.join(state['classes'])} apart by their echoes at base stations, trained by lowalt "
+        f"{__version__}.\nProtocol {state['protocol']}: {MEANING.get(state['protocol'], 'of the user')}.\n",
+        "## Training\n", _table(("entry", "value"), facts), "## Accuracy\n", _accuracy(accuracy),
+        _rounded(content.measured) if content.weights == EIGHT and content.measured else "",
+        f"## Use\n\n    lowalt predict {name}.safetensors sample.npy\n\n"
+        "`sample.npy` holds the signals of one sample, (stations, symbols) complex; a tile (.png) does as well. The "
+        "file's metadata, the entry `lowalt`,\nholds everything that determined the weights, and how signals become "
+        "images.\n",
+        f"## Limits\n\n{LIMITS}",
+    ]  # fmt: skip
+    return "\n".join(part for part in parts if part)
+
+
+def write(out: str | Path, content: ModelFile, accuracy: list[dict[str, str]]) -> Path:
+    """Write the card next to the model file `out`, as .md, and return its path."""
+    path = Path(out).with_suffix(".md")
+    with replacing(path) as temporary:
+        temporary.write_text(card(content, accuracy, path.stem))
+    return path

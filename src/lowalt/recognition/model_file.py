@@ -1,0 +1,136 @@
+"""A trained model as one safetensors file, which any program reads without running code: weights, and all known of it.
+
+The file's metadata has one entry, `lowalt`, a JSON object (the library writes several entries in random order):
+    identity    all that determined the weights, as in the training's checkpoint: settings, scheme, protocol, SHA-256 of
+                the samples, version of torch
+    model       scheme, protocol, network, size, seed, colour_map, classes
+    run         content of the training's run.json; {} where there was none
+    input       network, spectra and images of the run's configuration; {} where there was none
+    weights     "as trained", or "8 bits" (`eight_bits`)
+    measured    of 8-bit weights: how they change the answers (`zoo`)
+    digest      SHA-256 of everything above and of every tensor
+"""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+
+from lowalt.common.classes import stated
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing, replacing, text_of
+from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition import checkpoint
+from lowalt.recognition.classical_models import of_arrays
+from lowalt.recognition.eight_bits import restored
+from lowalt.recognition.methods import built
+from lowalt.recognition.runs import Trained
+from lowalt.recognition.schemes import Scheme
+
+INPUT = ("network", "spectra", "images")
+"""Blocks of a configuration that say how a model's images are made of signals."""
+EXACT, EIGHT = "as trained", "8 bits"
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """Content of a file: `tensors` by name, as stored; the other fields as in the metadata."""
+
+    tensors: dict[str, torch.Tensor]
+    identity: dict
+    model: dict
+    run: dict
+    input: dict
+    weights: str = EXACT
+    measured: dict | None = None
+
+    def about(self) -> dict:
+        """Return the metadata without its digest."""
+        return {name: value for name, value in vars(self).items() if name != "tensors"}
+
+
+def run_folder(model: str | Path) -> Path | None:
+    """Return the folder of the run that a model.pt lies in, RUN/models/PROTOCOL/SCHEME/SEED/; None elsewhere."""
+    parents = Path(model).resolve().parents
+    return parents[4] if len(parents) > 4 and parents[3].name == "models" else None
+
+
+def of_run(path: str | Path) -> ModelFile:
+    """Return the content of a file for a training's model.pt, with the records next to it and above it.
+
+    Raises: InputError where the model is missing or damaged.
+    """
+    identity, state = checkpoint.load(path)
+    tensors = {name: value.contiguous() for name, value in state.pop("weights").items()}
+    record, folder = Path(path).with_name("run.json"), run_folder(path)
+    config = load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
+    return ModelFile(
+        tensors, json.loads(identity), {**state, "classes": list(stated(state))},
+        json.loads(text_of(record, "run record")) if record.is_file() else {},
+        {name: config[name] for name in INPUT} if config else {},
+    )  # fmt: skip
+
+
+def _digest(tensors: dict[str, torch.Tensor], about: dict) -> str:
+    """SHA-256 of the metadata and of all tensors, by name."""
+    hasher = hashlib.sha256(json.dumps(about, sort_keys=True).encode())
+    for name, value in sorted(tensors.items()):
+        hasher.update(f"{name} {value.dtype} {tuple(value.shape)}".encode())
+        hasher.update(value.contiguous().flatten().view(torch.uint8).numpy().tobytes())
+    return hasher.hexdigest()
+
+
+def packed(content: ModelFile) -> bytes:
+    """Return the bytes of a model file; equal content gives equal bytes."""
+    about = content.about()
+    about["digest"] = _digest(content.tensors, about)
+    return save(content.tensors, {"lowalt": json.dumps(about, sort_keys=True)})
+
+
+def write(path: str | Path, content: ModelFile) -> None:
+    """Write a model file."""
+    with replacing(path) as temporary:
+        temporary.write_bytes(packed(content))
+
+
+def read(path: str | Path) -> ModelFile:
+    """Return the content of a model file.
+
+    Raises: InputError where it is missing, damaged, or not written by this project.
+    """
+    existing(path, "model")
+    try:
+        with safe_open(path, framework="pt") as file:
+            about = json.loads((file.metadata() or {})["lowalt"])
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        digest = about.pop("digest")
+        content = ModelFile(tensors, **about)
+    except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(f"{path}: not a model file of lowalt ({type(error).__name__}: {str(error)[:200]})") from error
+    if _digest(tensors, about) != digest:
+        raise InputError(f"{path}: model file is damaged, its content does not match its SHA-256")
+    return content
+
+
+def trained(content: ModelFile, path: str | Path) -> Trained:
+    """Return the model of a file's content, ready to answer; path: where it came from.
+
+    Raises: InputError where weights and settings do not fit together.
+    """
+    try:
+        state = content.model
+        weights = restored(content.tensors) if content.weights == EIGHT else content.tensors
+        scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
+        if scheme.sees == "features":
+            model = of_arrays(weights)
+        else:
+            block = {**state["network"], "weights": "none"}
+            model = built(scheme, block, state["size"], state["colour_map"], len(stated(state)))
+            model.load_state_dict(weights)
+        return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
+    except (KeyError, TypeError, RuntimeError) as error:
+        raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error

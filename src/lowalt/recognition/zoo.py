@@ -1,0 +1,145 @@
+"""The zoo: small trained models under 1 MB in `results/zoo`, which `lowalt predict` takes by name.
+
+`python -m lowalt.recognition.zoo --model MODEL.pt --views FILES --name NAME` makes an entry of a finished run: weights
+in 8 bits, their answers on the whole validation fold held against those of the weights as trained, and a card.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from lowalt.common.command import run
+from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.recognition import model_card, model_file
+from lowalt.recognition.eight_bits import rounded
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.model_file import EIGHT, ModelFile
+from lowalt.recognition.protocols import folds
+from lowalt.recognition.runs import Trained, load
+from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.slow_time import SlowTimeSamples
+
+ZOO = Path("results/zoo")
+"""Where entries lie, from the folder of the checkout."""
+LARGEST_BYTES = 1_000_000
+FEWER_POINTS = 0.5
+"""An entry that loses more of the validation accuracy, in percentage points, is not written."""
+Samples = ViewSamples | SlowTimeSamples
+
+
+def names(zoo: Path = ZOO) -> list[str]:
+    """Return the names of all entries, sorted."""
+    return sorted(path.stem for path in zoo.glob("*.safetensors"))
+
+
+def opened(given: str | Path, zoo: Path = ZOO) -> tuple[Trained, dict]:
+    """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
+
+    given: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo.
+    Raises: InputError naming the entries there are, or what is wrong with the file.
+    """
+    path = Path(given)
+    if path.suffix == "" and not path.is_file():
+        path = zoo / f"{given}.safetensors"
+        if str(given) not in names(zoo):
+            raise InputError(f"model {str(given)!r}: not a file, and {zoo} has {names(zoo)}")
+    if path.suffix != ".safetensors":
+        return load(path), {}
+    content = model_file.read(path)
+    return model_file.trained(content, path), content.input
+
+
+def small(content: ModelFile) -> ModelFile:
+    """Return a model with its trained matrices in 8 bits.
+
+    Raises: InputError for a model that is no network: its numbers are no rows of weights.
+    """
+    found = model_file.trained(content, "model")
+    if found.scheme.sees == "features":
+        raise InputError(f"--model: method {found.scheme.method!r}, expected a network; `export` writes it as it is")
+    matrices = {name for name, value in found.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
+    return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
+
+
+def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 64) -> dict:
+    """Return how an entry answers samples next to the weights as trained: both in float32, without mirroring.
+
+    Keys: samples; exact_percent, percent: accuracies; changed: samples with another answer; largest_change: of any
+    probability.
+    """
+    machine, everything = Machine(torch.device("cpu"), "fp32"), np.arange(len(samples.facts))
+    one, other = (probabilities(model.model, samples, everything, machine, batch) for model in (exact, entry))
+    labels = samples.facts.label
+    return {
+        "samples": len(labels),
+        "exact_percent": 100 * float(np.mean(one.argmax(1) == labels)),
+        "percent": 100 * float(np.mean(other.argmax(1) == labels)),
+        "changed": int(np.sum(one.argmax(1) != other.argmax(1))),
+        "largest_change": float(np.abs(one - other).max()),
+    }
+
+
+def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO) -> dict:
+    """Write NAME.safetensors and NAME.md into the zoo and return what was measured.
+
+    model: model.pt of a training; samples: its validation fold.
+    Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
+    an entry of 1 MB or more, or one that loses accuracy.
+    """
+    if not name or slug(name) != name:
+        raise InputError(f"--name: {name!r}, expected lower-case letters, digits and hyphens")
+    content = model_file.of_run(model)
+    if content.identity.get("samples", {}).get("validation") != samples.sha256():
+        raise InputError(f"{model}: was validated on other samples, expected the validation fold of its own run")
+    reduced = small(content)
+    size = len(model_file.packed(reduced))
+    if size >= LARGEST_BYTES:
+        raise InputError(f"--model: {size} bytes in 8 bits, expected less than {LARGEST_BYTES}")
+    exact, answering = (model_file.trained(each, model) for each in (content, reduced))
+    measured = held_against(exact, answering, samples)
+    if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
+        raise InputError(
+            f"--model: 8 bits fall from {measured['exact_percent']:.2f} to {measured['percent']:.2f} % of the "
+            f"validation fold, expected at most {FEWER_POINTS} points less"
+        )
+    reduced = replace(reduced, measured=measured)
+    out = zoo / f"{name}.safetensors"
+    model_file.write(out, reduced)
+    model_card.write(out, reduced, model_card.accuracy_rows(model, exact.protocol, exact.scheme.name))
+    return measured
+
+
+def main(arguments: list[str]) -> None:
+    """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation fold, and a card."""
+    line = argparse.ArgumentParser(prog="python -m lowalt.recognition.zoo", description=main.__doc__)
+    line.add_argument("--model", required=True, help="model.pt of a training run")
+    line.add_argument("--views", nargs="+", help="caches of views (.npz) that hold the validation fold")
+    line.add_argument("--signals", nargs="+", help="for models on signals: their caches (.npz)")
+    line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
+    line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
+    given = line.parse_args(arguments)
+    found = load(given.model)
+    wanted = "views" if found.scheme.sees == "images" else "signals"
+    paths, pairs = getattr(given, wanted), folds(found.protocol, "validation")
+    if not paths:
+        raise InputError(f"--{wanted}: missing, the model sees {found.scheme.sees}")
+    if wanted == "views":
+        samples: Samples = ViewSamples(paths, found.scheme.columns, pairs)
+    else:
+        samples = SlowTimeSamples(paths, found.scheme.sees, found.scheme.columns, pairs)
+    if samples.size != found.size:
+        raise InputError(f"--{wanted}: size {samples.size}, the model sees {found.size}")
+    measured = entry(given.model, samples, given.name, given.out)
+    print(
+        f"{given.name}: {(given.out / given.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
+        f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "
+        f"{measured['changed']} of {measured['samples']} answers differ"
+    )
+
+
+if __name__ == "__main__":
+    run(main)
