@@ -35,7 +35,7 @@ def export(trained: Trained, out: str | Path) -> None:
     """
     suffix = Path(out).suffix
     if suffix not in (".pt2", ".onnx", ".safetensors"):
-        raise InputError(f"--out {out}: expected a name ending in .pt2, .onnx or .safetensors")
+        raise InputError(f"--out {out}: expected a name ending in .safetensors, .pt2 or .onnx")
     if suffix == ".safetensors":
         content = model_file.of_run(trained.path)
         model_file.write(out, content)
