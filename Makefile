@@ -13,11 +13,12 @@ SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
 # The oldest and the newest NumPy that pyproject.toml allows.
 NUMPYS := 2.0.0 2.4.6
+OLDEST_SNAKEMAKE := 9.23.0
 REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-arm manifest help
+.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -198,6 +199,10 @@ check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/r
 # Two environments of their own, so that this one keeps its NumPy.
 check-numpy: $(SETUP)  ## the tiny data set with the oldest and the newest NumPy that pyproject.toml allows
 	for version in $(NUMPYS); do .ci/numpy.sh $(PYTHON) $$version || exit 1; done
+
+# An environment of its own too; the newest Snakemake is the pinned one, which the tests run.
+check-snakemake:  ## the tiny data set with the oldest Snakemake that pyproject.toml allows
+	.ci/snakemake.sh $(PYTHON) $(OLDEST_SNAKEMAKE)
 
 # Debian's packages of another architecture; everything goes into ARM, nothing is installed.
 ARM ?= .venv/arm

@@ -3,7 +3,7 @@ import sys
 
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.23")
 
 
 configfile: "config/default.yaml"
