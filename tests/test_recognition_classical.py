@@ -10,7 +10,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.measure import network_speed
 from lowalt.recognition import checkpoint, classical, runs, schemes, slow_time
-from test_recognition_signals import sources, write_signals
+from signal_trainings import share_right, sources, write_signals
 from trainings import SETTINGS
 
 METHODS = tuple(classical.MAKERS)
@@ -76,11 +76,7 @@ def test_a_training_leaves_the_files_of_a_network_and_its_model_predicts(quick, 
     runs.train(sources(path, "features"), scheme(method), "seen", SETTINGS, tmp_path / "out")
     assert (tmp_path / "out/history.csv").read_text().startswith("candidate,rounds,validation_loss")
     trained = runs.load(tmp_path / "out/model.pt")
-    asked = slow_time.SlowTimeSamples([path], "features", [0, 1, 2], {("seen", "test")})
-    evaluation = {"batch": 8, "threads": 1, "precision": "auto", "mirror": True}
-    runs.evaluate(trained, asked, evaluation, tmp_path / "out.csv")
-    shares = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1, usecols=range(9, 13))
-    assert np.mean(shares.argmax(1) == asked.facts.label) > 0.9
+    assert share_right(trained, path, "features", "auto", tmp_path / "out.csv") > 0.9
     # Nothing in the file is code: it loads as tensors and plain values alone.
     assert checkpoint.load(tmp_path / "out/model.pt")[1]["scheme"]["method"] == method
 

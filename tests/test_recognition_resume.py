@@ -14,11 +14,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint, recipe, runs, schemes
 from lowalt.recognition.__main__ import main
-from trainings import SCHEME, TRAINING, equal, sources, train, with_training
-
-
-class Killed(Exception):
-    pass
+from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training
 
 
 def test_resuming_after_any_step_ends_in_the_same_weights_and_history(views, tmp_path, monkeypatch):
@@ -103,14 +99,7 @@ def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trai
 
 def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path, monkeypatch):
     """Inverted images, the same keys and labels: another run, though every count is the same."""
-    step = runs.Trainer._step
-
-    def breaking(self, *batch):
-        if self.at.steps == 5:
-            raise Killed
-        step(self, *batch)
-
-    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    step = kill_at(monkeypatch, 5)
     settings = with_training(checkpoint_s=0)
     with pytest.raises(Killed):
         train(views, tmp_path, settings)

@@ -14,6 +14,7 @@ from lowalt.recognition import methods, runs, schemes, signal_networks, slow_tim
 from lowalt.recognition.augment_signals import augment_signals
 from lowalt.shards import ShardSet
 from pictures import IMAGES, NETWORK, SPECTRA
+from signal_trainings import share_right, sources, write_signals
 from trainings import SETTINGS, with_training
 
 METHODS = tuple(signal_networks.BACKBONES)
@@ -115,34 +116,6 @@ def test_augmented_signals_are_mirrored_shifted_and_turned_alike_for_all_station
     assert (augment_signals(given, KEEP, stream(1, "a")) == same).all()
 
 
-def write_signals(path, models=12):
-    """Four classes that differ in how fast their phase turns; mirrored they are the same."""
-    rng = stream(8, "turns")
-    rows, values = [], []
-    for label in range(4):
-        for model in range(models):
-            for snr in (3.0, np.inf):
-                turn = 0.2 + 0.8 * label + rng.uniform(-0.1, 0.1)
-                values.append(np.exp(1j * turn * np.arange(64) * np.ones((3, 1))) + 0.1 * rng.standard_normal((3, 64)))
-                fold = ("val", "test", "train", "train", "train")[model % 5]
-                rows.append((f"s{label}-{model}-{snr:g}", f"s{label}", model, snr, "seen", fold, label))
-    columns = [np.array(column) for column in zip(*rows, strict=True)]
-    facts = dict(zip(slow_time.FACTS, columns, strict=False))
-    facts |= {"range_m": np.full((len(rows), 3), np.nan), "aspect_rad": np.full((len(rows), 3), np.nan)}
-    found = np.array(values, np.complex64)
-    features = np.zeros((*found.shape[:2], len(slow_time.NAMES)), np.float32)
-    features[..., 0] = np.abs(np.angle(found[..., 1:] * found[..., :-1].conj())).mean(-1)
-    np.savez(path, signals=found, features=features, **facts)
-    return path
-
-
-def sources(path, kind, stations=(0, 1, 2)):
-    return {
-        part: slow_time.SlowTimeSamples([path], kind, list(stations), {("seen", fold)})
-        for part, fold in (("train", "train"), ("validation", "val"))
-    }
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_a_short_training_learns_turns_of_the_phase_and_its_model_is_read_back(method, tmp_path):
     path = write_signals(tmp_path / "a.npz")
@@ -150,11 +123,7 @@ def test_a_short_training_learns_turns_of_the_phase_and_its_model_is_read_back(m
     settings = {**with_training(steps=60, validate_every=30), "size": 64}
     runs.train(sources(path, "signals"), mine, "seen", settings, tmp_path / "out")
     trained = runs.load(tmp_path / "out/model.pt")
-    asked = slow_time.SlowTimeSamples([path], "signals", [0, 1, 2], {("seen", "test")})
-    evaluation = {"batch": 8, "threads": 1, "precision": "fp32", "mirror": True}
-    runs.evaluate(trained, asked, evaluation, tmp_path / "out.csv")
-    rows = np.loadtxt(tmp_path / "out.csv", delimiter=",", skiprows=1, usecols=range(9, 13))
-    assert np.mean(rows.argmax(1) == asked.facts.label) > 0.9
+    assert share_right(trained, path, "signals", "fp32", tmp_path / "out.csv") > 0.9
     assert json.loads((tmp_path / "out/run.json").read_text())["backbone"] == method
     signal = np.load(path)["signals"][-1]
     np.save(tmp_path / "one.npy", signal)

@@ -22,7 +22,7 @@ from lowalt.tiles.resample import resize
 from lowalt.workflow import options
 from test_dataset import configuration
 from test_recognition_made import ONE_OF_EACH
-from trainings import SETTINGS, TRAINING, equal
+from trainings import SETTINGS, TRAINING, Killed, equal, kill_at
 
 COLUMNS, SIZE = [0, 2, 3, 5], 32
 
@@ -93,10 +93,6 @@ def test_batches_take_their_share_and_never_a_fresh_sample_twice():
     assert order.with_fresh(part, 2, 1.0, 100).tolist() == list(range(116, 124))
 
 
-class Killed(Exception):
-    pass
-
-
 def line(run, settings, out):
     views = [str(path) for path in sorted((run / "views").glob("*.npz"))]
     return ["train", "--settings", json.dumps(settings), "--views", *views, "--protocol", "seen", "--stations", "A",
@@ -113,14 +109,7 @@ def test_a_stopped_training_on_a_stream_resumes_exactly_and_workers_change_no_bi
     settings = {**SETTINGS, "size": SIZE, "training": training}
     main(line(run, settings, tmp_path / "whole"))
     main(line(run, {**settings, "training": {**training, "workers": 2}}, tmp_path / "workers"))
-    step = runs.Trainer._step
-
-    def breaking(self, *batch):
-        if self.at.steps == 5:
-            raise Killed
-        step(self, *batch)
-
-    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    step = kill_at(monkeypatch, 5)
     with pytest.raises(Killed):
         main(line(run, settings, tmp_path / "parts"))
     monkeypatch.setattr(runs.Trainer, "_step", step)

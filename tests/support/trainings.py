@@ -63,3 +63,21 @@ def train(path, folder, settings=SETTINGS):
 def equal(one, other):
     """Whether two sets of weights are equal in every bit."""
     return one.keys() == other.keys() and all(torch.equal(value, other[key]) for key, value in one.items())
+
+
+class Killed(Exception):
+    """A training ends as if it were killed."""
+
+
+def kill_at(monkeypatch, steps):
+    """Let the next training end after so many steps; returns the trainer's own step, to be put back."""
+    step = runs.Trainer._step
+
+    def breaking(self, *batch):
+        """Take one step, or end."""
+        if self.at.steps == steps:
+            raise Killed
+        step(self, *batch)
+
+    monkeypatch.setattr(runs.Trainer, "_step", breaking)
+    return step
