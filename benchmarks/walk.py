@@ -37,7 +37,7 @@ SHOWN = {
     ".venv/bin/lowalt run config/tiny.yaml with_mine.yaml": ("results/with-mine/subtypes.csv", "My drone"),
     ".venv/bin/lowalt run config/tiny.yaml my_network.yaml": ("results/my-network/report.html", "my_network.py:small"),
 }
-"""What must be there after a command: a file, and a word in it."""
+"""A file that must be there after a command, and a word in it."""
 
 
 class Step(NamedTuple):

@@ -1,4 +1,4 @@
-"""The command compare: what differs between two finished runs, and by how much."""
+"""The command compare: the differences between two finished runs, and their size."""
 
 import json
 

@@ -30,7 +30,7 @@ def book(made, page):
 
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
-    """A folder with links to what a checkout holds, and to the environment of this Python."""
+    """A folder with links to the contents of a checkout and to the environment of this Python."""
     for name in ("config", "design", "examples", "workflow", "src"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / ".venv").symlink_to(sys.prefix)
@@ -41,7 +41,7 @@ def checkout(tmp_path, monkeypatch):
 
 
 def run(notebook, folder):
-    """Run all cells in one kernel; returns what they print. Fails at the first cell that raises."""
+    """Run all cells in one kernel; returns their printed text. Fails at the first cell that raises."""
     client = pytest.importorskip("nbclient")
     pytest.importorskip("ipykernel")
     (folder / "notebooks").mkdir()

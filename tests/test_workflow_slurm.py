@@ -99,7 +99,7 @@ rule evaluate:
 
 
 def submit(folder, *arguments, snakefile=GREEDY):
-    """Run a small workflow in the queue by the profile; return its exit status and what it said."""
+    """Run a small workflow in the queue by the profile; return its exit status and its text."""
     (folder / "Snakefile").write_text(snakefile)
     command = [sys.executable, "-m", "snakemake", "--profile", ROOT / "profiles/slurm", "--workflow-profile", "none"]
     command += ["--slurm-status-command", "squeue", "--config", f"python={sys.executable}", *arguments]

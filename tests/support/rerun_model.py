@@ -43,7 +43,7 @@ def views_of(group, part):
 
 
 def next_jobs(job):
-    """Jobs that read what a job makes."""
+    """Jobs that read a job's products."""
     rule, *names = job
     if rule == "cloud":
         # A subtype that is added belongs to no chunk that was there.

@@ -12,7 +12,7 @@ EXPECTED = (
     "mounting a file system needs root", "no Slurm of two nodes", "zipfile wrote other headers before",
     r"no [\w-]+ here", "no bash", "no Chromium on this machine", "no real inputs", "not a git checkout",
 )  # fmt: skip
-"""Beginnings of reasons that the machine gives: what it cannot do or does not hold."""
+"""Beginnings of reasons that the machine gives: it cannot do a thing, or lacks it."""
 
 
 class Skips:

@@ -24,13 +24,13 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
-    line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
+    line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
     line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
     line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
 
 
 def run(given: argparse.Namespace) -> str:
-    """Make what is asked for; return what was written.
+    """Make the page or the gallery; return the names of the files written.
 
     Raises: InputError where neither or both are asked for, and as `page` and `gallery`.
     """

@@ -40,7 +40,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     actions = target.add_subparsers(dest="action", required=True)
     inspect = actions.add_parser(
-        "inspect", help="what a mesh file holds: unit, sizes, pieces, what may move; and a picture",
+        "inspect", help="unit, sizes, pieces and possible moves of a mesh file, and a picture",
         epilog="example: lowalt target inspect inputs/mydrone.stl",
     )  # fmt: skip
     inspect.add_argument("file", type=Path)
@@ -48,7 +48,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
     inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
     new = actions.add_parser(
-        "new", help="draft a record of a mesh file, with what must be confirmed marked",
+        "new", help="draft a record of a mesh file; figures to confirm are marked",
         epilog='example: lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml',
     )  # fmt: skip
     new.add_argument("file", type=Path)

@@ -30,7 +30,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
     state = commands.add_parser(
-        "status", help="what a run in another terminal is doing", epilog="example: lowalt status"
+        "status", help="the state of a run in another terminal", epilog="example: lowalt status"
     )
     state.add_argument("--json", action="store_true", help="print JSON for a program")
 

@@ -55,7 +55,7 @@ def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
 
 
 def _classical(scheme: Scheme, settings: dict, path: str | None, limit_s: float) -> dict:
-    """Return what `measure` does for a trained classical method: there is no training step to time.
+    """Return the entries of `measure` for a trained classical method, which has no training step to time.
 
     Raises: InputError where no model is given.
     """

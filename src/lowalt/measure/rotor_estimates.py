@@ -5,7 +5,7 @@
 rotors.csv, one row a craft with rotors and SNR:
     subtype, group, snr_db, blades, models    blades of a rotor (its record); motion models tried
     right_percent                             estimates within 1 Hz of the truth, blades times rate, both folded
-    chance_percent                            what a guess anywhere in the searched range would reach
+    chance_percent                            share of right guesses anywhere in the searched range
     median_error_hz, level                    median distance to the truth; median level of the comb over the noise
 """
 

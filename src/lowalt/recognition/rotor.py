@@ -7,8 +7,8 @@ any multiple of the symbol rate plus or minus N F give the same lines. The lines
 have, are too weak to tell N from F in the default's signals: in a trial, the number of blades came out no better than
 by chance.
 Source: Peng and Hwang, Null Space Pursuit, IEEE Trans. Signal Process. 58, 2010 (the separation); Chen, The
-Micro-Doppler Effect in Radar, 2nd ed. 2019, ch. 3 (the comb). The rotor estimator that the paper cites was not to be
-had; this is as near to it as can be said.
+Micro-Doppler Effect in Radar, 2nd ed. 2019, ch. 3 (the comb). The rotor estimator that the paper cites could not be
+obtained, so how near this one is to it is unknown.
 """
 
 import functools

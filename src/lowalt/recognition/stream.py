@@ -61,7 +61,7 @@ class Stream:
         self._round = functools.lru_cache(maxsize=16)(self._drawn)
 
     def __getstate__(self) -> dict:
-        # Workers draw and keep for themselves.
+        # Each worker draws and keeps samples for itself.
         return {name: value for name, value in self.__dict__.items() if name != "_round"} | {"_made": {}}
 
     def __setstate__(self, state: dict) -> None:

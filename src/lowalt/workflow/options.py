@@ -52,7 +52,7 @@ def noisy_chunk(wildcards: Any, input: Any) -> str:
 
 
 def timed_model(wildcards: Any, input: Any) -> str:
-    """The trained model to time, where time depends on what was learnt."""
+    """The trained model to time, where its time depends on its training."""
     return f"--model {input.model}" if input.model else ""
 
 

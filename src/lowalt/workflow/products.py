@@ -103,7 +103,7 @@ class Products(DataProducts):
         return {"noisy": noisy, "motion": self.motion(wildcards)}
 
     def timed_model(self, wildcards: Any) -> list[str]:
-        """The trained model that is timed, where time depends on what was learnt: a classical method's; else none."""
+        """The trained model that is timed, where its time depends on its training: a classical method's; else none."""
         if self._run.schemes_by_slug[wildcards.scheme].sees != "features":
             return []
         seed = self._config["recognition"]["seeds"][0]

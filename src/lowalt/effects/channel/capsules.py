@@ -20,7 +20,7 @@ def _square_between(p, d, a, e, flat):
     ww = w0 * w0 + w1 * w1 + w2 * w2
     t = min(max(-ew / ee, 0.0), 1.0) if ee > 0.0 else 0.0
     own = ww + t * (2.0 * ew + t * ee)
-    # On the ray's line the best t is unclamped or an end; a convex function of t alone once s is at its best.
+    # With the best s for each t the distance is a convex function of t, so the best t is its minimum or an end.
     cross = ee - de * de
     t = min(max((de * dw - ew) / cross, 0.0), 1.0) if cross > flat * ee else t
     s = dw + t * de
@@ -33,7 +33,7 @@ def _square_between(p, d, a, e, flat):
 def capsules(place, nodes, bones, radius, hidden):
     """Set hidden (N, L) where a capsule round a bone stands between a node (N, L, 3) and the station.
 
-    A node stands for the skin round it: capsules it lies in, or ends, do not hide it.
+    A node stands for the skin round it: a capsule does not hide the nodes that lie in it or end its bone.
     """
     d, e = np.empty(3), np.empty(3)
     for n in range(nodes.shape[0]):

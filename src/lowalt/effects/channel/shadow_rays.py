@@ -20,11 +20,11 @@ from lowalt.effects.channel.surface_tree import Tree
 SLOTS = 1 << 14
 """Lists of triangles that are kept at a time; a power of two."""
 POOL = 1 << 18
-"""Triangles in all of them."""
+"""Triangles in all kept lists together."""
 STEPS, FINEST, COARSEST = 3.0, 0.02, 0.15
 """Cells of direction along a part's way through them, and their least and largest size (rad)."""
 CODES = 1 << 19
-"""More than cells of direction."""
+"""Larger than the number of any cell of direction."""
 
 
 class Lists(NamedTuple):
@@ -74,7 +74,7 @@ def _slot(keys, key):
 
 @LEAN
 def _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, spread):
-    """Fill the free slot of the list `key` with the triangles of part p that the rays of `met` can meet; the slot."""
+    """Fill the free slot of the list `key` with the triangles of part p that the rays of `met` can meet; return it."""
     mask = len(lists.key) - 1
     end = tree.skip[tree.root[p]]
     # A list has at most the part's triangles; without room for them, all lists are dropped.
