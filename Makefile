@@ -123,7 +123,7 @@ bench: .venv/bench  ## all benchmarks, into results/benchmarks
 	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
 	$(BIN)/python benchmarks/interval_coverage.py --out results/benchmarks/interval_coverage.csv
 
-bench-workflow: $(SETUP)  ## what Snakemake itself takes of 1 000 and of 10 000 short jobs: results/benchmarks/scheduling.csv
+bench-workflow: $(SETUP)  ## time of Snakemake itself for 1 000 and for 10 000 short jobs: results/benchmarks/scheduling.csv
 	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/scheduling.csv
 
 # LABEL names the rows, for example a revision; COLD=--cold fetches all packages from their index.
@@ -138,10 +138,10 @@ bench-walk: $(SETUP)  ## a new user's walk through the documents, each step time
 long-run: $(BASE)  ## 200 000 samples end to end as signals, verified, with time and peak memory by stage: results/benchmarks/long_run.csv
 	$(BIN)/python benchmarks/long_run.py $(if $(MODELS),--models $(MODELS)) --out results/benchmarks/long_run.csv
 
-status: $(SETUP)  ## what a run in another terminal is doing
+status: $(SETUP)  ## the state of a run in another terminal
 	@$(BIN)/python -m lowalt.workflow.status
 
-cost: $(SETUP)  ## what the echo's accuracy costs in time, up to 1600 points: results/cost/cost.csv and cost.png
+cost: $(SETUP)  ## time of the echo over its accuracy, up to 1600 points: results/cost/cost.csv and cost.png
 	$(SNAKEMAKE) --configfile config/cost.yaml -- cost
 
 gallery: $(BASE)  ## a page that links all runs and compares any two: results/index.html
@@ -150,7 +150,7 @@ gallery: $(BASE)  ## a page that links all runs and compares any two: results/in
 hard-cases: $(BASE)  ## inputs on which a naive formula fails, its error, ours and the bound: results/default/hard_cases.csv
 	$(BIN)/python -m lowalt.measure.hard_cases --out results/default/hard_cases.csv
 
-accuracy-cost: $(SETUP)  ## what recognition accuracy costs in time: results/default/accuracy_cost.csv and .png
+accuracy-cost: $(SETUP)  ## recognition accuracy over time: results/default/accuracy_cost.csv and .png
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
 	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
 	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost
@@ -161,7 +161,7 @@ scenes: $(SETUP)  ## small trials of the paper's scene and three others: accurac
 	for scene in urban rural worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
 		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
 
-effects-cost: $(SETUP)  ## what each effect costs and does, alone and together: results/default/effects.csv and .png
+effects-cost: $(SETUP)  ## time and influence of each effect, alone and together: results/default/effects.csv and .png
 	$(SNAKEMAKE) -- effects_cost
 
 tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data, into results/tables; three times: make tables OVERLAY=config/seeds.yaml
@@ -212,7 +212,7 @@ check-arm: $(SETUP)  ## the tiny data set on an emulated 64-bit ARM processor: D
 manifest:  ## keep the checksums of the finished default and tiny runs
 	for run in default tiny; do $(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 
-estimate: $(SETUP)  ## what the larger configurations would cost, scaled from the reference run's measured stages
+estimate: $(SETUP)  ## time and disk of the larger configurations, scaled from the reference run's measured stages
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 
@@ -224,7 +224,7 @@ campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes
 	$(BIN)/python -m lowalt.workflow.campaign --configfile $(CONFIGFILE) --kills $(KILLS) --disks $(DISKS) \
 		$(if $(MEMORY_GROUP),--memory-group $(MEMORY_GROUP)) --out results/benchmarks/campaign.csv
 
-space: $(SETUP)  ## measure what jobs write and hold: make space RUNS='results/tiny results/default' (finished, small to large)
+space: $(SETUP)  ## disk and memory of jobs, measured: make space RUNS='results/tiny results/default' (finished, small to large)
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
 		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
 

@@ -91,6 +91,12 @@ def test_every_target_of_make_exists():
     assert len(wanted) > 8 and not wanted - targets
 
 
+def test_every_target_that_make_help_lists_stands_in_a_document():
+    listed = set(re.findall(r"^([a-z-]+):.*##", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    named = {command.split()[1] for _, command in NAMED if command.startswith("make ")}
+    assert len(listed) > 30 and not listed - named
+
+
 @pytest.mark.parametrize("page", [page.relative_to(ROOT).as_posix() for page in PAGES])
 def test_every_link_and_every_file_of_a_command_exists(page):
     text = (ROOT / page).read_text()
