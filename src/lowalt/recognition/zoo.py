@@ -40,7 +40,7 @@ def opened(given: str | Path, zoo: Path = ZOO) -> tuple[Trained, dict]:
     """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
 
     given: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo.
-    Raises: InputError naming the entries there are, or what is wrong with the file.
+    Raises: InputError naming the entries there are, or the fault of the file.
     """
     path = Path(given)
     if path.suffix == "" and not path.is_file():
@@ -84,7 +84,7 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
 
 
 def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO) -> dict:
-    """Write NAME.safetensors and NAME.md into the zoo and return what was measured.
+    """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
     model: model.pt of a training; samples: its validation fold.
     Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
