@@ -18,7 +18,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -37,7 +37,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(PIP) -c envs/constraints.txt uv || true
 	$(call install,-e '.[workflow$(comma)cost]')
-	rm -f $(SETUP) $(TESTING) $(DOCS) .venv/set-up-methods
+	rm -f $(SETUP) $(TESTING) $(DOCS) .venv/set-up-methods .venv/set-up-audit
 	touch $@
 
 $(SETUP): $(BASE)
@@ -191,6 +191,14 @@ methods: $(METHODS)  ## methods that people ask about, on the default's data: fu
 
 confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
 	$(SNAKEMAKE) --configfile config/confirm.yaml
+
+# Its own stamp: nothing else needs pip-audit. Without the internet the table is all there is, and the status says so.
+.venv/set-up-audit: $(BASE)
+	$(call install,$(call of_extra,audit))
+	touch $@
+
+audit: .venv/set-up-audit  ## known vulnerabilities of the pinned packages; without internet their versions and dates, .venv/pins.csv
+	$(BIN)/python .ci/audit_pins.py --pins envs/constraints.txt --out .venv/pins.csv
 
 check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/reference and compare every byte
 	for run in $(filter-out $(if $(LOWALT_INPUTS),,real),$(basename $(notdir $(wildcard results/reference/*.sha256)))); do $(SNAKEMAKE) --forceall --configfile config/$$run.yaml -- data && \
