@@ -25,11 +25,8 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, text_of
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
-from lowalt.recognition.classical_models import of_arrays
 from lowalt.recognition.eight_bits import restored
-from lowalt.recognition.methods import built
-from lowalt.recognition.runs import Trained
-from lowalt.recognition.schemes import Scheme
+from lowalt.recognition.runs import Trained, of_state
 
 INPUT = ("network", "spectra", "images")
 """Blocks of a configuration that say how a model's images are made of signals."""
@@ -122,15 +119,7 @@ def trained(content: ModelFile, path: str | Path) -> Trained:
     Raises: InputError where weights and settings do not fit together.
     """
     try:
-        state = content.model
         weights = restored(content.tensors) if content.weights == EIGHT else content.tensors
-        scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
-        if scheme.sees == "features":
-            model = of_arrays(weights)
-        else:
-            block = {**state["network"], "weights": "none"}
-            model = built(scheme, block, state["size"], state["colour_map"], len(stated(state)))
-            model.load_state_dict(weights)
-        return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
+    return of_state({**content.model, "weights": weights}, path)

@@ -133,7 +133,14 @@ def load(path: str | Path) -> Trained:
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
-    _, state = checkpoint.load(path)
+    return of_state(checkpoint.load(path)[1], path)
+
+
+def of_state(state: dict, path: str | Path) -> Trained:
+    """Return the trained model of what a model file keeps: `weights` and the settings of its network; path: its file.
+
+    Raises: InputError where weights and settings do not fit together.
+    """
     try:
         block = {**state["network"], "weights": "none"}
         scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
@@ -142,9 +149,9 @@ def load(path: str | Path) -> Trained:
         else:
             model = built(scheme, block, state["size"], state["colour_map"], len(stated(state)))
             model.load_state_dict(state["weights"])
+        return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
-    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
 
 
 def check_size(samples: Samples, size: int) -> None:

@@ -5,16 +5,14 @@ data set is not published.
 """
 
 import argparse
-import os
 from pathlib import Path
 from typing import Any
 
+from lowalt.common import hub_upload
 from lowalt.common.command import run
 from lowalt.common.errors import InputError
 from lowalt.shards.index import load
 from lowalt.shards.verify import faults
-
-TOKEN = "HF_TOKEN"
 
 
 def published_files(index_path: str | Path) -> list[str]:
@@ -35,14 +33,10 @@ def upload(index_path: str | Path, repository: str, client: Any, private: bool =
     client: a `huggingface_hub.HfApi` with its token, or an object with the same methods.
     Raises: InputError where the data set is damaged or the repository's name is not USER/NAME.
     """
-    if repository.count("/") != 1 or not all(repository.split("/")):
-        raise InputError(f"--repository: {repository!r}, expected USER/NAME")
+    hub_upload.check_repository(repository)
     names = published_files(index_path)
-    client.create_repo(repository, repo_type="dataset", private=private, exist_ok=True)
-    client.upload_folder(
-        repo_id=repository, repo_type="dataset", folder_path=str(Path(index_path).parent), allow_patterns=names,
-        commit_message=f"Data set {load(index_path)['sha256'][:12]}",
-    )  # fmt: skip
+    message = f"Data set {load(index_path)['sha256'][:12]}"
+    hub_upload.send(client, repository, "dataset", Path(index_path).parent, names, message, private)
     return len(names)
 
 
@@ -50,15 +44,9 @@ def main(arguments: list[str]) -> None:
     """Check every byte of a data set and upload it with the token in HF_TOKEN."""
     options = argparse.ArgumentParser(prog="python -m lowalt.shards.upload", description=main.__doc__)
     options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--repository", required=True, metavar="USER/NAME", help="dataset repository on the hub")
-    options.add_argument("--public", action="store_true", help="make a new repository public (default: private)")
+    hub_upload.add_options(options, "dataset")
     given = options.parse_args(arguments)
-    token = os.environ.get(TOKEN)
-    if not token:
-        raise InputError(f"{TOKEN}: not set in the environment, expected a token with the right to write")
-    from huggingface_hub import HfApi
-
-    count = upload(given.index, given.repository, HfApi(token=token), private=not given.public)
+    count = upload(given.index, given.repository, hub_upload.client(), private=not given.public)
     print(f"{given.repository}: {count} files")
 
 
