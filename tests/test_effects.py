@@ -142,7 +142,7 @@ WORK = {
     "transmitter": (interface.DrawsData, interface.ChangesWaveform, interface.PicksSubcarriers, interface.SamplesTime),
     "channel": (
         interface.PointsBeams, interface.SetsCrossSections, interface.WeighsPoints, interface.WeighsRoutes,
-        interface.AddsPaths, interface.AddsEchoes, interface.AddsTargets, interface.BoundsItself,
+        interface.AddsPaths, interface.AddsEchoes, interface.AddsSignals, interface.AddsTargets, interface.BoundsItself,
     ),
     "motion": (interface.PerturbsMotion,), "receiver": (interface.ChangesSamples,),
     "detection": (interface.FiltersCells, interface.ChoosesCells),
@@ -199,10 +199,10 @@ NOTHING = {
     "cell_error": {"probability": 0}, "slow_time": {"downlink": 1}, "data_symbols": {"order": 4},
     "power_amplifier": {"backoff_db": None}, "comb_pilots": {"spacing": 1}, "pointing_error": {"sigma_deg": 0},
     "transmit_leakage": {"isolation_db": None}, "cell_noise": {"snr_db": float("inf")},
-    "detector": {"cfar": "none", "gate_cells": None},
+    "detector": {"cfar": "none", "gate_cells": None}, "link_offset": {"sigma_ppm": 0, "sigma_s": 0},
     "companions": {"count": [0, 0]}, "line_of_sight": {"blocked_db": 0}, "walls": {"facades": []},
-    "reflected_aspect": {"follow": []}, "background_channel": {"reference_points": 0},
-    "direct_path": {"loss_db": None}, "link_offset": {"sigma_ppm": 0, "sigma_s": 0},
+    "background_channel": {"reference_points": 0}, "direct_path": {"loss_db": None},
+    "interference": {"loss_db": None, "isolation_db": None, "by_target": False}, "reflected_aspect": {"follow": []},
 }  # fmt: skip
 """Every effect that has a strength, without any."""
 

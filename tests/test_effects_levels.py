@@ -122,7 +122,8 @@ def test_set_snrs_refer_to_the_echo_as_it_arrives():
 def documented():
     """The table of levels in the design note: name -> (value, unit)."""
     rows = {}
-    for line in (ROOT / "design/effects.md").read_text().splitlines():
+    section = (ROOT / "design/effects.md").read_text().split("## Absolute levels")[1]
+    for line in section.splitlines():
         cells = [cell.strip() for cell in line.replace(r"\|", "!").strip("|").split("|")]
         if len(cells) == 3 and cells[1].split()[-1] in ("dBm", "dB", "dBi", "dBsm"):
             rows[cells[0].replace("!", "|")] = (float(cells[1].split()[0]), cells[1].split()[1])

@@ -59,6 +59,15 @@ def test_the_kept_levels_of_a_scene_follow_by_hand(name):
         assert table["loss beyond the cyclic prefix"] == pytest.approx(20 * log10(1 - lost * 0.12), abs=0.06)
 
 
+def test_the_note_on_other_stations_has_the_kept_levels():
+    section = (ROOT / "design/effects.md").read_text().split("## Other stations")[1].split("## ")[0]
+    rows = [[cell.strip() for cell in line.split("|")] for line in section.splitlines() if "dB" in line and "|" in line]
+    given, table = {row[1]: float(row[2].split()[0]) for row in rows}, kept("reuse")
+    assert len(given) == 7 and given == {name: table[name] for name in given}
+    ways = [10 ** (value / 10) for name, value in table.items() if name.startswith("station ")]
+    assert table["other stations, one range cell"] == pytest.approx(10 * log10(sum(ways) / 256), abs=0.1)
+
+
 @pytest.mark.parametrize(
     "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
 )

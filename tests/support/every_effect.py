@@ -55,7 +55,7 @@ class Case(NamedTuple):
 def strengths(u: dict[str, float]) -> dict[str, dict]:
     """Settings of every effect from one number in [0, 1] each; none of physics by need."""
     pick = {name: partial(_one_of, value) for name, value in u.items()}
-    ground = u["ground_reflection"]
+    ground, clocks = u["ground_reflection"], {"sigma_ppm": 10 ** (-6 + 4 * u["link_offset"]), "sigma_s": 1e-8}
     return {
         "rotor_spread": {"spread": 0.01 + 0.2 * u["rotor_spread"], "wander": 0.1 * u["rotor_spread"]},
         "gusts": {"wind_mps": 0.5 + 20.0 * u["gusts"]},
@@ -86,6 +86,7 @@ def strengths(u: dict[str, float]) -> dict[str, dict]:
         "reflected_aspect": {},
         "companions": {"count": pick["companions"]([1, 1], [2, 2]), "spread_m": 10.0 + 20.0 * u["companions"]},
         "direct_path": {"loss_db": 60.0 - 60.0 * u["direct_path"]},
+        "interference": {"leakage_db": 60.0 * u["interference"], "loss_db": 20.0, **clocks},
         "clutter": {"clutter_to_signal_db": 60.0 * u["clutter"] - 30.0, "wind_mps": pick["clutter"](0.0, 5.0)},
         "background_channel": {
             "environment": pick["background_channel"]("RMa", "UMa", "UMi"),
@@ -93,7 +94,7 @@ def strengths(u: dict[str, float]) -> dict[str, dict]:
         },
         "receiver_noise": {"noise_figure_db": 10.0 * u["receiver_noise"]},
         "cell_noise": {"snr_db": 40.0 - 50.0 * u["cell_noise"]},
-        "link_offset": {"sigma_ppm": 10 ** (-6 + 4 * u["link_offset"]), "sigma_s": 1e-8},
+        "link_offset": clocks,
         "timing_offset": {"sigma_s": 1e-7 * u["timing_offset"] + 1e-10},
         "clock_offset": {"sigma_ppm": 10 ** (4 * u["clock_offset"] - 3)},
         "carrier_offset": {"sigma_ppm": 10 ** (4 * u["carrier_offset"] - 5)},
@@ -136,12 +137,12 @@ def fitting(named: dict[str, dict], network: Network) -> dict[str, dict]:
 
 
 def networks(u: np.ndarray, linked: bool) -> Network:
-    """A network with a station 25 m up, and a second one with a link to it."""
+    """A network with a station 25 m up and a second one on the same sub-band, with a link to it on request."""
     carrier = 10 ** (9.0 + 0.8 * u[0])
     shape = (1 + int(7.99 * u[1]), 1 + int(3.99 * u[2]))
     a, b = Station("A", (0.0, 0.0, 25.0), 0.3, carrier), Station("B", (300.0, 40.0, 20.0), 2.5, carrier)
     link = Station("A-B", b.position_m, b.normal_rad, a.frequency_hz, a, b)
-    return Network(carrier, 120e3, 32, 10, 2.5e-3, 12, shape, shape, 1.0, (a, link, b) if linked else (a,))
+    return Network(carrier, 120e3, 32, 10, 2.5e-3, 12, shape, shape, 1.0, (a, link, b) if linked else (a, b))
 
 
 def targets(rng: np.random.Generator, size_m: float, recorded: bool) -> tuple[Cloud, dict | None]:

@@ -126,6 +126,11 @@ class Network:
         if set(block) != keys:
             raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
         step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
+        if step < 0:
+            raise InputError(
+                f"network: guard_subcarriers is {block['guard_subcarriers']}, expected at least "
+                f"{1 - block['subcarriers']}, at which all stations share one sub-band"
+            )
         stations = []
         names = station_names(block)
         for index, name in enumerate(name for name in names if "transmit" not in block["stations"][name]):

@@ -36,6 +36,7 @@ LISTED = (
     "channel/cyclic_prefix",
     "channel/companions",
     "channel/direct_path",
+    "channel/interference",
     "channel/clutter",
     "channel/background_channel",
     "receiver/receiver_noise",

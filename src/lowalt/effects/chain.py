@@ -13,6 +13,7 @@ from lowalt.effects import need, waveform
 from lowalt.effects.catalogue import NamedEffect, placed, providing, stream_name
 from lowalt.effects.interface import (
     AddsEchoes,
+    AddsSignals,
     Amplifies,
     ChangesResponse,
     ChoosesCells,
@@ -20,6 +21,7 @@ from lowalt.effects.interface import (
     Quantises,
     SamplesTime,
 )
+from lowalt.effects.listening import Listening
 from lowalt.effects.sending import Sending
 from lowalt.effects.target_echo import EXACT, TargetEcho
 from lowalt.effects.view import View
@@ -126,10 +128,13 @@ class Chain:
                 spectrum = spectrum + other.own_response[rows]
             if self._clutter is not None:
                 spectrum = spectrum + self._clutter[rows]
-            spectrum, left = self._responded(spectrum)
-            if not left and not self.sending.distorts:
-                return self.sending.cells(spectrum)
+            if self._unknown is None:
+                spectrum, left = self._responded(spectrum)
+                if not left and not self.sending.distorts:
+                    return self.sending.cells(spectrum)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
+        if self._unknown is not None:
+            samples = samples + self._unknown[rows]
         for effect in left:
             draws = self.draws(stream_name(effect.name))
             if providing([effect], Quantises):
@@ -204,6 +209,14 @@ class Chain:
             for effect in providing(self.channel, AddsEchoes)
         ]
         return sum(added[1:], added[0]) if added else None
+
+    @cached_property
+    def _unknown(self) -> np.ndarray | None:
+        """Time samples (N, M) of signals that the receiver does not know, None where there are none."""
+        given = Listening(self.view, self.sending, self.names, self.draws, self.target.weight)
+        heard = [one.module.heard(one.settings, given) for one in providing(self.channel, AddsSignals)]
+        found = [samples for samples in heard if samples is not None]
+        return sum(found[1:], found[0]) if found else None
 
     @cached_property
     def _frame(self) -> Frame:

@@ -39,6 +39,11 @@ def check(config: dict) -> CheckedScene:
         raise InputError(
             f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
         )
+    if scene.network.guard_subcarriers < 0 and "interference" not in scene.effects:
+        raise InputError(
+            f"network.guard_subcarriers: {scene.network.guard_subcarriers}, sub-bands overlap, expected "
+            "effects.interference in the same scene"
+        )
     noisy = [snr for snr in scene.snr_db if snr != float("inf")]
     if "receiver_noise" in scene.effects and noisy:
         raise InputError(

@@ -4,8 +4,7 @@ An effect is a module, `effects/{place}/{name}.py`. It must offer everything in 
 one protocol that names its place below; those marked optional come in addition. The chain asks by `isinstance`.
 
 N symbols, L points, P parts, M subcarriers. Arrays are complex128 or float64. `settings` holds every key of `DEFAULTS`.
-`rng` is the stream (seed, "effect", name, subtype, model[, station]), so no effect moves another effect's draws.
-Only type declarations belong here.
+`rng` is the stream (seed, "effect", name, subtype, model[, station]), so no effect moves another's draws. Types only.
 """
 
 from __future__ import annotations
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     from lowalt.effects.antenna import Element as AntennaElement
     from lowalt.effects.catalogue import NamedEffect
     from lowalt.effects.checks import CheckedScene
+    from lowalt.effects.listening import Listening
     from lowalt.effects.response import ImagePath
     from lowalt.effects.transmitter.slow_time import Sampling
     from lowalt.effects.view import Beams, View
@@ -55,9 +55,9 @@ class Amplifies(Protocol):
     """Optional, not motion or channel: an effect that can make an error of its input larger."""
 
     def amplifies(self, settings: dict) -> float:
-        """Return the largest factor on an error: on its 2-norm (transmitter, receiver), or summed over symbols.
+        """Return the largest factor on an error's 2-norm (transmitter, receiver) or sum over symbols; 1 if not offered.
 
-        math.inf where the effect is not continuous. An effect without this function has the factor 1.
+        math.inf where the effect is not continuous.
         """
 
 
@@ -182,6 +182,14 @@ class AddsEchoes(Protocol):
 
     def scatter(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         """Return a frequency response (N, M) in the units of the target's, sqrt(W) a subcarrier."""
+
+
+@runtime_checkable
+class AddsSignals(Protocol):
+    """Channel: an effect by which the receiver hears what it does not know (other stations)."""
+
+    def heard(self, settings: dict, given: Listening) -> np.ndarray | None:
+        """Return time samples (N, M) to add to the look's, None for none."""
 
 
 @runtime_checkable

@@ -40,15 +40,11 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     network, station = view.network, view.station
     sender = station.transmitter or station
     out, back = (float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in (sender, station))
-    range_m = 0.5 * (out + back)
-    wavelength = SPEED_OF_LIGHT / network.carrier_hz
-    sent = dbm(network.power)
+    range_m, sent = 0.5 * (out + back), dbm(network.power)
     arrays = [10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive)]
-    path = 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * out**2 * back**2))
     section = 10 * math.log10(float(view.cloud.rcs_m2.sum()))
     elements = _elements(view)
-    both = 2 * elements[0].value if len(elements) == 1 else sum(level.value for level in elements)
-    expected = sent + sum(arrays) + both + path + section
+    expected = expected_dbm(view)
     ways = f"path out and back, {out:.1f} m, 1 m2" if sender is station else f"path, {out:.1f} m and {back:.1f} m, 1 m2"
     result = [
         Level(f"transmit power, {network.subcarriers} subcarriers", dbm(network.power * network.subcarriers), "dBm"),
@@ -56,7 +52,7 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
         Level("transmit array", arrays[0], "dB"),
         Level("receive array", arrays[1], "dB"),
         *elements,
-        Level(ways, path, "dB"),
+        Level(ways, path_db(view), "dB"),
         Level("mean cross section", section, "dBsm"),
         Level("expected echo", expected, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
@@ -79,6 +75,8 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     if "transmit_leakage" in effects:
         leaked = sent - effects["transmit_leakage"].settings["isolation_db"]
         result.append(Level("transmit leakage, one subcarrier", leaked, "dBm"))
+    if "interference" in effects:
+        result += _others(view, effects["interference"], expected)
     if "receiver_noise" in effects:
         noisy = effects["receiver_noise"]
         noise = dbm(noisy.module.variance(noisy.settings, network.subcarrier_spacing_hz))
@@ -89,6 +87,44 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
             Level("expected echo over noise, in a range cell", expected - cell, "dB"),
         ]
     return result
+
+
+def expected_dbm(view: View) -> float:
+    """Return the power (dBm) of a subcarrier's echo, points in mid-beam added without their phases."""
+    network, elements = view.network, _elements(view)
+    arrays = sum(10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive))
+    both = 2 * elements[0].value if len(elements) == 1 else sum(level.value for level in elements)
+    return dbm(network.power) + arrays + both + path_db(view) + 10 * math.log10(float(view.cloud.rcs_m2.sum()))
+
+
+def path_db(view: View) -> float:
+    """Return the loss (dB, negative) of an echo of 1 m2 at the aim, from the sender to the target and on."""
+    ends = view.station.transmitter or view.station, view.station
+    out, back = (float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in ends)
+    wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
+    return 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * out**2 * back**2))
+
+
+def _others(view: View, effect: NamedEffect, expected: float) -> list[Level]:
+    """Levels of other stations' signals: mean over the receiver's subcarriers, then all of them in a range cell."""
+    interference, settings = effect.module, effect.settings
+    result, total = [], 0.0
+    for sends in interference.others(view):
+        share = float(np.mean(interference.lying(settings, view.network, sends, view.station)[0] ** 2))
+        powers = {
+            one.way: float(np.mean(abs(one.response) ** 2))
+            for one in interference.arrivals({**settings, "by_target": False}, view, sends, frozenset(), lambda _: 1.0)
+        }
+        if settings["by_target"]:
+            powers["by the target"] = 10 ** (expected_dbm(interference.pair(view, sends)) / 10 - 3)
+        result += [
+            Level(f"station {sends.name} {way}, one subcarrier", dbm(share * power), "dBm")
+            for way, power in powers.items()
+        ]
+        total += share * sum(powers.values())
+    cell = dbm(total / view.network.subcarriers)
+    other = "expected echo over other stations, in a range cell"
+    return [*result, Level("other stations, one range cell", cell, "dBm"), Level(other, expected - cell, "dB")]
 
 
 def _elements(view: View) -> list[Level]:

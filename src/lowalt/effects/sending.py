@@ -44,7 +44,11 @@ class Sending:
     @cached_property
     def aired_before(self) -> np.ndarray:
         """The subcarriers (N, M) on the air in the symbol before each symbol of the look."""
-        return self._amplified(self._drawn("previous waveform"))
+        return self.aired_as("previous waveform")
+
+    def aired_as(self, name: str) -> np.ndarray:
+        """Return subcarriers (N, M) on the air whose data come of the stream `name`, another symbol's or station's."""
+        return self._amplified(self._drawn(name))
 
     def cells(self, spectrum: np.ndarray) -> np.ndarray:
         """Return the range cells of responses (N, M): all M, or those of the pilots' comb."""

@@ -31,9 +31,14 @@ class TargetEcho:
         self.error = EXACT
         self.by_need = {effect.name: effect for effect in providing(channel, BoundsItself)}
         self._seen: dict[str, np.ndarray] = {}
-        self.factor: np.ndarray | float = 1.0
-        for effect in providing(channel, WeighsPoints):
-            self.factor = self.factor * self._visible(effect, view)
+        self.factor: np.ndarray | float = self.weight(view)
+
+    def weight(self, view: View) -> np.ndarray | float:
+        """Return the product (N, L) of all factors on the points' amplitudes, as the station of `view` hears them."""
+        result: np.ndarray | float = 1.0
+        for effect in providing(self.channel, WeighsPoints):
+            result = result * self._visible(effect, view)
+        return result
 
     @property
     def bent(self) -> bool:

@@ -122,7 +122,11 @@ class View:
     def seen_from(self, place_m: np.ndarray) -> "View":
         """Return the same target, at the same instants and under the same beams, seen from another place (3,) m."""
         place = tuple(float(value) for value in place_m)
-        other = replace(self, station=replace(self.station, position_m=place))
+        return self.of(replace(self.station, position_m=place))
+
+    def of(self, station: Station) -> "View":
+        """Return the same target, at the same instants and under the same beams, as another station hears it."""
+        other = replace(self, station=station)
         # The motion does not depend on the station.
         known = {name: self.__dict__[name] for name in ("motion", "places", "normals") if name in self.__dict__}
         other.__dict__.update(known)

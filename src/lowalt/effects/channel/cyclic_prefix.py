@@ -9,6 +9,8 @@ point is cut at its direct delay, on the reflected paths too; other echoes are c
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.effects.prefix import length_s as length_s
+from lowalt.effects.prefix import turn as turn
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -17,18 +19,10 @@ SOURCE = (
 )
 DEFAULTS = {"prefix_s": None}
 
-NORMAL = 144 / 2048
-"""Length of the normal cyclic prefix, in useful symbol lengths."""
-
 
 def idle(settings: dict) -> bool:
     """Return False: a scene that names this effect gets it wherever an echo may be later than the prefix."""
     return False
-
-
-def length_s(settings: dict, network: Network) -> float:
-    """Return the prefix's length (s): the given one, or NR's normal prefix."""
-    return NORMAL / network.subcarrier_spacing_hz if settings["prefix_s"] is None else settings["prefix_s"]
 
 
 def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
@@ -55,11 +49,6 @@ def first_samples(settings: dict, view: View) -> np.ndarray:
     delay = 2 * np.sqrt(np.einsum("nli,nli->nl", away, away)) / SPEED_OF_LIGHT
     late = (delay - length_s(settings, network)) * network.subcarriers * network.subcarrier_spacing_hz
     return np.clip(np.ceil(late), 0, network.subcarriers).astype(np.int64)
-
-
-def turn(settings: dict, network: Network, baseband_hz: np.ndarray) -> np.ndarray:
-    """Return the factor (M,) exp(j 2 pi f T_cp) of the previous symbol, which ends a prefix before the window."""
-    return np.exp(2j * np.pi * baseband_hz * length_s(settings, network))
 
 
 def convolved(

@@ -8,11 +8,8 @@ names this effect, without loss or with it; everything physical that is not mode
 import numpy as np
 
 from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Station
-from lowalt.echo.pointwise.terms import aim_cosines
-from lowalt.echo.radar import radar
-from lowalt.effects.antenna import gain
 from lowalt.effects.checks import CheckedScene
+from lowalt.effects.crossing import crossing
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -54,27 +51,5 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     shape = len(view.times_s), network.subcarriers
     if sends is None:
         return np.zeros(shape, np.complex128)
-    away = np.asarray(hears.position_m) - np.asarray(sends.position_m)
-    distance = float(np.linalg.norm(away))
-    elements = np.prod(network.transmit) * np.prod(network.receive)
-    level = np.sqrt(network.power / elements) * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi * distance)
-    level *= _array(view, sends, network.transmit, hears) * _array(view, hears, network.receive, sends)
-    if view.element is not None:
-        ends = ((sends, hears), (hears, sends))
-        gains = [gain(view.element, one, np.asarray(other.position_m, float)) for one, other in ends]
-        level *= np.sqrt(np.prod(gains))
-    frequency = hears.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
-    turned = np.exp(-2j * np.pi * frequency * (distance / SPEED_OF_LIGHT)) * level * 10 ** (-settings["loss_db"] / 20)
+    turned = crossing(view, sends, hears)[0] * 10 ** (-settings["loss_db"] / 20)
     return np.broadcast_to(turned, shape).copy()
-
-
-def _array(view: View, station: Station, counts: tuple[int, int], other: Station) -> complex:
-    """Sum over a station's array, steered to the target, toward another station."""
-    radio = radar(view.network, station)
-    axes = radio.station, radio.sine, radio.cosine
-    toward = aim_cosines(np.asarray(other.position_m, np.float64), *axes)
-    steered = aim_cosines(np.asarray(view.aim_m, np.float64), *axes)
-    total = 1.0 + 0.0j
-    for count, seen, aimed in zip(counts, toward, steered, strict=True):
-        total *= np.exp(1j * np.pi * radio.kappa * np.arange(count) * (seen - aimed)).sum()
-    return total

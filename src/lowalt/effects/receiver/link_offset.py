@@ -7,8 +7,8 @@ from B to A the opposite. A station that receives its own signal has no offset.
 import numpy as np
 
 from lowalt.common.errors import InputError
-from lowalt.common.network import Network
 from lowalt.effects.checks import CheckedScene
+from lowalt.effects.clocks import errors
 from lowalt.effects.waveform import Frame, turned
 
 SOURCE = (
@@ -28,13 +28,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a network without links."""
     if all(station.transmitter is None for station in scene.network.stations):
         raise InputError("effects.link_offset: no station of the network is a link, expected {transmit, receive}")
-
-
-def errors(settings: dict, network: Network, rng: np.random.Generator) -> dict[str, tuple[float, float]]:
-    """Return each station's frequency error (ppm) and clock error (s) in a look, by name; two draws a station."""
-    names = [station.name for station in network.stations if station.transmitter is None]
-    drawn = rng.standard_normal((len(names), 2)) * [settings["sigma_ppm"], settings["sigma_s"]]
-    return dict(zip(names, map(tuple, drawn.tolist()), strict=True))
 
 
 def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
