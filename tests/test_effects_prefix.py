@@ -8,7 +8,8 @@ from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
 from lowalt.effects.channel import cyclic_prefix
-from lowalt.effects.explain import prefix_line
+from lowalt.effects.explain import prefix
+from lowalt.effects.explain_text import prefix_line
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import response
 from test_effects_bounds import network, target
@@ -113,7 +114,7 @@ def test_an_echo_within_the_prefix_keeps_every_bit():
 
 def test_explain_says_the_loss_of_every_echo():
     radio = network()
-    assert "covers 88 m: this echo is within it" in prefix_line(scene(radio, {}), 80.0)
-    line = prefix_line(scene(radio, {}), 290.0)
+    assert "covers 88 m: this echo is within it" in prefix_line(prefix(scene(radio, {}), 80.0))
+    line = prefix_line(prefix(scene(radio, {}), 290.0))
     assert "loses 16% of its window, -1.5 dB; interference -5 dB a subcarrier, -29 dB a range cell" in line
     assert "not modelled" in line

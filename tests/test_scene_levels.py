@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.effects.explain import explain_scene
+from lowalt.common.config import load
+from lowalt.effects.explain import scene_facts
+from lowalt.effects.explain_text import text as explanation
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -75,9 +77,8 @@ def test_explain_says_the_cyclic_prefix_and_the_levels_of_every_scene(name, monk
     monkeypatch.chdir(ROOT)
     paths = [ROOT / "config/default.yaml", ROOT / f"config/scenes/{name}.yaml"]
     station = "A-B" if name == "links" else "A"
-    text = explain_scene(
-        paths, ROOT / "workflow/schemas/config.schema.yaml", None, [scene_levels.SAMPLE], station, False
-    )
+    config = load(paths, ROOT / "workflow/schemas/config.schema.yaml")
+    text = explanation(scene_facts(config, None, [scene_levels.SAMPLE], station, False))
     assert "cyclic prefix 0.586 us, covers 88 m: this echo loses 26% of its window" in text
     assert ("(computed)" if name == "worst" else "not modelled") in text
     assert "levels of one subcarrier:" in text and "expected echo" in text

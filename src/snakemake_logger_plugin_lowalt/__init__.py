@@ -6,6 +6,7 @@ and the log of each job, whose last lines are shown when it fails. A dry run pri
 """
 
 import contextlib
+import json
 import logging
 import os
 import shutil
@@ -82,6 +83,7 @@ class LogHandler(LogHandlerBase):
         try:
             with self._guard:
                 if self._all:
+                    self._plan(record)
                     if self._plain.filter(record):
                         self._plain.handle(record)
                 else:
@@ -99,6 +101,14 @@ class LogHandler(LogHandlerBase):
                 print(self._board.total(time.time()), file=self._stream, flush=True)
                 self._board = None
         super().close()
+
+    def _plan(self, record: logging.LogRecord) -> None:
+        """Add a job that would run to the file that `status.PLANNED_JOBS` names; rules without files only collect."""
+        path = os.environ.get(status.PLANNED_JOBS)
+        if path and getattr(record, "event", None) == LogEvent.JOB_INFO and record.output:
+            job = {"rule": record.rule_name, "files": list(map(str, record.output)), "reason": str(record.reason)}
+            with Path(path).open("a") as file:
+                file.write(json.dumps(job) + "\n")
 
     def _take(self, record: logging.LogRecord) -> None:
         """Update the display by one record of Snakemake."""

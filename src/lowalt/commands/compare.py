@@ -5,6 +5,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
@@ -18,7 +19,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         epilog="example: lowalt compare results/default results/tiny",
     )  # fmt: skip
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
-    line.add_argument("--json", action="store_true", help="print JSON for a program")
+    json_option(line)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
@@ -96,7 +97,7 @@ def run(given: argparse.Namespace) -> str:
     """
     found = compared(*given.runs)
     if given.json:
-        return json.dumps(found, indent=1)
+        return as_json(found)
     lines = []
     for part, rows in found.items():
         if not rows:

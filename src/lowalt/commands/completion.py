@@ -5,8 +5,10 @@ import argparse
 SCRIPT = """# Completion of lowalt for bash and zsh; load it by: source <(lowalt completion)
 if [ -n "${{ZSH_VERSION-}}" ]; then autoload -Uz compinit bashcompinit && compinit -u && bashcompinit; fi
 _lowalt() {{
+  # In zsh, number arrays from 0 and split words as bash does.
+  if [ -n "${{ZSH_VERSION-}}" ]; then emulate -L ksh; fi
   local word="${{COMP_WORDS[COMP_CWORD]}}" path="" next="" options="" names=""
-  for next in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
+  for next in "${{COMP_WORDS[@]:1:$((COMP_CWORD - 1))}}"; do
     case "$path $next" in
 {paths}
     esac

@@ -1,9 +1,9 @@
 """The commands `lowalt verify`, `lowalt remake` and `lowalt predict`: check a data set, remake samples, ask a model."""
 
 import argparse
-import json
 from pathlib import Path
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
@@ -26,7 +26,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     remake.add_argument("index", type=Path, help="index.json of the data set")
     remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
     for line in (verify, remake):
-        line.add_argument("--json", action="store_true", help="print JSON for a program")
+        json_option(line)
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
@@ -38,12 +38,12 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
     predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     predict.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
-    predict.add_argument("--json", action="store_true", help="print JSON for a program")
+    json_option(predict)
 
 
-def _ended(lines: list[str], good: str, as_json: bool) -> str:
+def _ended(lines: list[str], good: str, machine: bool) -> str:
     """The text to print, or JSON with the faults; a fault ends the command with status 1."""
-    text = json.dumps({"good": not lines, "faults": lines}) if as_json else "\n".join(lines) or good
+    text = as_json({"good": not lines, "faults": lines}) if machine else "\n".join(lines) or good
     if lines:
         print(text)
         raise SystemExit(1)
@@ -94,5 +94,5 @@ def predict(given: argparse.Namespace) -> str:
         settings = {key: config[key] for key in ("network", "spectra", "images")}
     found = probabilities(model, existing(given.input, "input"), settings)
     if given.json:
-        return json.dumps(found)
+        return as_json(found)
     return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))

@@ -8,6 +8,7 @@ import yaml
 
 from lowalt.commands import workflow
 from lowalt.commands.compare import facts
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.shipped import located, shipped
@@ -27,6 +28,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
     line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
     line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
+    json_option(line)
 
 
 def run(given: argparse.Namespace) -> str:
@@ -36,7 +38,7 @@ def run(given: argparse.Namespace) -> str:
     """
     if given.gallery == (given.run is not None):
         raise InputError("report: expected the folder of a run, such as results/default, or --gallery")
-    return gallery(given.results) if given.gallery else page(given)
+    return gallery(given) if given.gallery else page(given)
 
 
 def page(given: argparse.Namespace) -> str:
@@ -56,20 +58,22 @@ def page(given: argparse.Namespace) -> str:
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
         yaml.safe_dump({"run": name, **changes(located(load_yaml(shipped(BASE))), config)}, overlay)
         overlay.flush()
-        workflow.run(argparse.Namespace(
+        answer = workflow.ended(argparse.Namespace(
             overlay=[Path(overlay.name)], configfile=[], target=[written], cores=given.cores,
-            dry_run=given.dry_run, profile=None,
+            dry_run=given.dry_run, profile=None, json=given.json,
         ))  # fmt: skip
-    return "" if given.dry_run else written
+    files = [] if given.dry_run or answer["status"] else [written]
+    return workflow.said(given, {"files": files, **answer}, "".join(files))
 
 
-def gallery(results: Path) -> str:
+def gallery(given: argparse.Namespace) -> str:
     """Write index.html into the folder of runs; return what was written.
 
     Raises: InputError where the folder holds no run, or a run's tables or configuration cannot be read.
     """
     from lowalt.report.gallery import gallery
 
+    results = given.results
     folders = sorted(path.parent for path in results.glob("*/config.yaml"))
     if not folders:
         raise InputError(f"{results}: no run, expected folders with a config.yaml such as results/default")
@@ -77,4 +81,6 @@ def gallery(results: Path) -> str:
     text = gallery({path.name: facts(path) for path in folders}, pages)
     with replacing(results / "index.html") as temporary:
         temporary.write_text(text)
+    if given.json:
+        return as_json({"files": [results / "index.html"], "runs": [path.name for path in folders]})
     return f"{results / 'index.html'}: {len(folders)} run{'s' if len(folders) > 1 else ''}"

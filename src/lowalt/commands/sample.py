@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
@@ -28,7 +29,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the base configuration")
     line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
-    line.add_argument("--json", action="store_true", help="print JSON for a program")
+    json_option(line)
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 
@@ -62,4 +63,4 @@ def run(given: argparse.Namespace) -> str:
     with replacing(given.out / f"{key}.npy") as temporary:
         np.save(temporary, signal)
     paths = [str(given.out / name) for name in (*written, f"{key}.npy")]
-    return json.dumps({"key": key, "files": paths}) if given.json else "\n".join(paths)
+    return as_json({"key": key, "files": paths}) if given.json else "\n".join(paths)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.config import load
 from lowalt.common.hardware import describe
 from lowalt.common.timing import median_s
@@ -24,29 +25,44 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the base configuration")
     line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
+    json_option(line)
 
 
-def described(config: dict) -> str:
-    """Return lines on each spectrum of a checked configuration: size, index of zero, time, settings, source."""
+def facts(config: dict) -> list[dict]:
+    """Return the facts on each spectrum of a checked configuration: size, index of zero, time, settings, source."""
     renderer = Renderer.from_settings({key: config[key] for key in ("network", "spectra", "images")})
     symbols = renderer.network.symbols
     signal = normalised(np.exp(0.1j * np.arange(symbols) ** 1.5).astype(np.complex64))
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
-    lines = []
+    found = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
-        count = windows(symbols, settings.window, settings.hop, name)
         renderer.image(signal, 0, name, image)
-        ms = 1e3 * median_s(lambda name=name: renderer.image(signal, 0, name, image), REPEATS)
-        values = ", ".join(f"{key} {value}" for key, value in asdict(settings).items())
+        found.append({
+            "name": name, "title": kind.TITLE, "rows": kind.rows(settings),
+            "windows": windows(symbols, settings.window, settings.hop, name), "zero_index": zero_index(name),
+            "image_ms": 1e3 * median_s(lambda name=name: renderer.image(signal, 0, name, image), REPEATS),
+            "settings": asdict(settings), "source": kind.SOURCE,
+        })  # fmt: skip
+    return found
+
+
+def described(found: list[dict], hardware: str) -> str:
+    """Return the facts on each spectrum as lines of text; hardware: of the machine that measured the times."""
+    lines = []
+    for one in found:
+        values = ", ".join(f"{key} {value}" for key, value in one["settings"].items())
         lines += [
-            f"{name} ({kind.TITLE}): {kind.rows(settings)} rows, {count} windows, zero at index {zero_index(name)}, "
-            f"{ms:.2f} ms an image | {values}",
-            f"  {kind.SOURCE}",
+            f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, "
+            f"zero at index {one['zero_index']}, {one['image_ms']:.2f} ms an image | {values}",
+            f"  {one['source']}",
         ]
-    return "\n".join([*lines, f"medians of {REPEATS}; {describe()}"])
+    return "\n".join([*lines, f"medians of {REPEATS}; {hardware}"])
 
 
 def run(given: argparse.Namespace) -> str:
-    """Run the action and return its text. Raises: InputError where the configuration is wrong."""
-    return described(load([given.base, *given.overlay], given.schema))
+    """Return the facts as text, or as JSON. Raises: InputError where the configuration is wrong."""
+    found = facts(load([given.base, *given.overlay], given.schema))
+    if given.json:
+        return as_json({"spectra": found, "repeats": REPEATS, "hardware": describe()})
+    return described(found, describe())

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import yaml
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, slug
 from lowalt.common.shipped import SHIPPED
@@ -69,6 +70,8 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
+    for parser in (inspect, new, make, show):
+        json_option(parser)
     for parser in (new, make):
         parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
         parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
@@ -91,6 +94,12 @@ def _inspect(given: argparse.Namespace) -> str:
     out = given.out or Path(f"{given.file.stem}-inspect.png")
     with replacing(out) as temporary:
         temporary.write_bytes(inspection_picture(found))
+    if given.json:
+        parts = [vars(part) | {"extent": part.extent, "centre": part.centre} for part in found.components]
+        pieces = [{"name": name, "triangles": count, "extent": extent} for name, count, extent in found.pieces]
+        told = {name: value for name, value in vars(found).items() if name not in ("points", "owner")}
+        wings = {"wings_from_m": found.shoulder_m} if found.category == "Bird" else {}
+        return as_json({**told, "components": parts, "pieces": pieces, **wings, "picture": out})
     return f"{described(found)}\n\npicture  {out}"
 
 
@@ -108,13 +117,16 @@ def _new(given: argparse.Namespace) -> str:
     text = drafted(inspect_mesh(given.file, row["category"], given.unit), given.subtype, row, name)
     record = yaml.safe_load(text)[given.subtype]
     merge(row, record, f"draft: {given.subtype}")
+    moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
+    if given.out is not None:
+        if given.out.exists():
+            raise InputError(f"{given.out}: is there already, expected a new file")
+        with replacing(given.out) as temporary:
+            temporary.write_text(text)
+    if given.json:
+        return as_json({"file": given.out, "text": text, "moving_parts": moving, "marked_lines": marks})
     if given.out is None:
         return text
-    if given.out.exists():
-        raise InputError(f"{given.out}: is there already, expected a new file")
-    with replacing(given.out) as temporary:
-        temporary.write_text(text)
-    moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
     return f"{given.out}: {moving} moving parts drafted; confirm the {marks} marked lines"
 
 
@@ -138,6 +150,11 @@ def _make(given: argparse.Namespace) -> str:
     write(out, cloud)
     picture = _picture(out, out.with_suffix(".png"))
     guessed, figures = estimates(cloud.record)
+    if given.json:
+        return as_json({
+            "file": out, "points": len(cloud.points), "parts": cloud.kinds, "picture": picture,
+            "estimates": guessed, "figures": figures,
+        })  # fmt: skip
     words = f"; {guessed} of its {figures} figures are estimates" if guessed else ""
     return f"{out}: {len(cloud.points)} points in {len(cloud.kinds)} parts; {picture}{words}"
 
@@ -163,4 +180,5 @@ def run(given: argparse.Namespace) -> str:
         return _new(given)
     if given.action == "make":
         return _make(given)
-    return _picture(given.cloud, given.out or given.cloud.with_suffix(".png"))
+    picture = _picture(given.cloud, given.out or given.cloud.with_suffix(".png"))
+    return as_json({"picture": picture}) if given.json else picture

@@ -2,15 +2,19 @@
 
 import argparse
 import json
+import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
+from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED, shipped
 from lowalt.common.yaml_files import load_yaml
 from lowalt.workflow import status
+from lowalt.workflow.status import PLANNED_JOBS
 
 SNAKEFILE = SHIPPED / "Snakefile"
 
@@ -29,10 +33,11 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
+    json_option(line)
     state = commands.add_parser(
         "status", help="the state of a run in another terminal", epilog="example: lowalt status"
     )
-    state.add_argument("--json", action="store_true", help="print JSON for a program")
+    json_option(state)
 
 
 def command(given: argparse.Namespace) -> list[str]:
@@ -56,15 +61,43 @@ def command(given: argparse.Namespace) -> list[str]:
     return [*line, "--", *given.target] if given.target else line
 
 
+def ended(given: argparse.Namespace) -> dict:
+    """Run Snakemake in this folder and return its exit status, and with `given.json` what happened.
+
+    That is the command line, the seconds, and by name the stages whose jobs ran; of a dry run the jobs that would run,
+    each with its rule, files and reason. Snakemake's own text then goes to the standard error stream.
+    Raises: as `command`.
+    """
+    line = command(given)
+    if not given.json:
+        return {"status": subprocess.run(line).returncode}
+    begun = time.time()
+    with tempfile.TemporaryDirectory() as folder:
+        jobs = Path(folder, "jobs")
+        status_code = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)}).returncode
+        planned = [json.loads(text) for text in jobs.read_text().splitlines()] if jobs.exists() else []
+    answer = {"status": status_code, "command": line, "seconds": time.time() - begun}
+    if given.dry_run:
+        return answer | {"jobs": planned}
+    kept = [entry for entry in status.read() if entry["written"] >= begun]
+    return answer | {"stages": kept[-1]["board"]["stages"] if kept else {}}
+
+
+def said(given: argparse.Namespace, answer: dict, text: str) -> str:
+    """Return the text, or the answer as JSON; end with the workflow's status where that is not 0."""
+    text = as_json(answer) if given.json else text
+    if answer["status"]:
+        print(text, end="\n" if given.json else "")
+        raise SystemExit(answer["status"])
+    return text
+
+
 def run(given: argparse.Namespace) -> str:
     """Run Snakemake in this folder; end with its status where that is not 0.
 
     Raises: as `command`.
     """
-    ended = subprocess.run(command(given)).returncode
-    if ended:
-        raise SystemExit(ended)
-    return ""
+    return said(given, ended(given), "")
 
 
 def states(given: argparse.Namespace) -> str:
@@ -76,6 +109,6 @@ def states(given: argparse.Namespace) -> str:
     if not kept:
         raise InputError(f"no run has started here: {status.FOLDER} is empty")
     if given.json:
-        return json.dumps([entry | {"alive": status.alive(entry)} for entry in kept])
+        return as_json([entry | {"alive": status.alive(entry)} for entry in kept])
     living = [entry for entry in kept if status.alive(entry)]
     return "\n".join(status.describe(entry, time.time()) for entry in living or kept[-1:])

@@ -1,4 +1,6 @@
-"""The explanation that `lowalt explain SCENE` prints: effects, sources, decisions with their bounds, and costs.
+"""The facts that `lowalt explain SCENE` prints: effects, sources, decisions with their bounds, and costs.
+
+`lowalt.effects.explain_text` writes them as text and as data for a program.
 
 The costs are measured when the command runs, on one motion model of each category of the scene, at its first station.
 """
@@ -9,17 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.config import load
 from lowalt.common.errors import InputError
-from lowalt.common.hardware import describe
 from lowalt.common.network import SPEED_OF_LIGHT, Network, masts_m
 from lowalt.common.streams import stream
 from lowalt.common.timing import median_s
-from lowalt.echo import echo_signal, method_text
-from lowalt.effects.catalogue import BY_NEED, PLACES, NamedEffect, called
+from lowalt.echo import EchoResult, echo_signal
+from lowalt.effects.catalogue import PLACES, NamedEffect, called
 from lowalt.effects.channel import cyclic_prefix
 from lowalt.effects.checks import check
-from lowalt.effects.levels import levels, table
+from lowalt.effects.levels import Level, levels
+from lowalt.effects.need import Decision
 from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
 from lowalt.effects.view import View
 from lowalt.motion.sample import draw, region_polygon
@@ -36,6 +37,69 @@ class ExplainedSample(NamedTuple):
     cloud: Cloud
     row: dict
     occluders: dict | None
+
+
+class Prefix(NamedTuple):
+    """What the cyclic prefix covers: its length (s), the range (m) up to which an echo lies within it, the share of its
+    window that this echo loses, whether the scene computes that loss, and the number of subcarriers."""
+
+    length_s: float
+    covers_m: float
+    lost: float
+    computed: bool
+    subcarriers: int
+
+
+class OwnEcho(NamedTuple):
+    """A sample at a station that sends and receives: the target's echo alone, and the decisions on physics by need.
+
+    rms_change: rms change of the signal by all effects over the echo's rms; other_cells: share of symbols in which
+    another range cell is chosen.
+    """
+
+    echo: EchoResult
+    decisions: list[Decision]
+    rms_change: float
+    other_cells: float
+
+
+class LinkGeometry(NamedTuple):
+    """A sample on a link: metres from the transmitter to the target and on to the receiver, and the angle (rad) between
+    both ways."""
+
+    out_m: float
+    back_m: float
+    bistatic_rad: float
+
+
+class SampleFacts(NamedTuple):
+    """The facts on one sample at one station; `seen` tells a station that sends itself from a link."""
+
+    subtype: str
+    model: int
+    station: str
+    range_m: float
+    prefix: Prefix
+    levels: list[Level]
+    seen: OwnEcho | LinkGeometry
+
+
+class SceneFacts(NamedTuple):
+    """The facts on a scene.
+
+    idle: named effects that change nothing with their parameters; absent: effects that are not named; ms: as `costs`
+    returns it, empty where nothing was measured.
+    """
+
+    run: str
+    stations: list[str]
+    tolerance: float | None
+    snr_db: list[float]
+    effects: tuple[NamedEffect, ...]
+    idle: list[str]
+    absent: list[str]
+    ms: dict[str, float]
+    samples: list[SampleFacts]
 
 
 def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> list[ExplainedSample]:
@@ -92,117 +156,64 @@ def costs(scene: Scene, chosen: list[ExplainedSample], station_name: str) -> dic
     return result | {"together": mean(scene.effects)}
 
 
-def sample_lines(scene: Scene, sample: ExplainedSample, station_name: str) -> list[str]:
-    """Return lines that name the effects computed for one sample at one station, with their bounds."""
+def sample_facts(scene: Scene, sample: ExplainedSample, station_name: str) -> SampleFacts:
+    """Return the facts on one sample at one station: which effects are computed with their bounds, and levels."""
     station = scene.network.station(station_name)
     cloud = with_cross_sections(scene, sample.cloud)
     view = observe(scene, station, cloud, sample.row, sample.occluders)
-    if station.transmitter is not None:
-        return link_lines(scene, view, sample)
-    own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, scene.tolerance)
     received = received_signal(scene, station, sample.cloud, sample.row, sample.occluders)
-    range_m = np.linalg.norm(view.aim_m - np.asarray(station.position_m))
-    lines = [f"{sample.row['subtype']}, model {sample.row['model']}, station {station_name}, range {range_m:.0f} m"]
-    lines += [f"  {line}" for line in method_text(own).splitlines()]
-    lines.append(f"  {prefix_line(scene, float(range_m))}")
-    for decision in received.decisions:
-        verb = "computed" if decision.computed else "left out"
-        bound = "" if np.isinf(decision.bound) else f", bound {decision.bound:.2g} of the largest value"
-        lines.append(f"  {decision.name}: {verb}{bound} ({decision.reason})")
+    if station.transmitter is None:
+        own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, scene.tolerance)
+        power = received.power
+        moved = np.sqrt(np.mean(abs(received.signal - own.signal) ** 2) / power) if power > 0 else np.nan
+        other = np.mean(received.cell != own.cell)
+        range_m = float(np.linalg.norm(view.aim_m - np.asarray(station.position_m)))
+        seen = OwnEcho(own, received.decisions, float(moved), float(other))
+    else:
+        seen = link_geometry(view)
+        range_m = 0.5 * (seen.out_m + seen.back_m)
     named = {effect.name: effect for effect in scene.effects}
-    lines += [f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, received.power)))]
-    moved = np.sqrt(np.mean(abs(received.signal - own.signal) ** 2) / received.power) if received.power > 0 else np.nan
-    other = np.mean(received.cell != own.cell)
-    lines.append(
-        f"  against the target's echo alone: rms change {moved:.2g}, other range cell in {other:.1%} of symbols"
-    )
-    return lines
+    return SampleFacts(
+        sample.row["subtype"], sample.row["model"], station_name, range_m, prefix(scene, range_m),
+        levels(view, named, received.power), seen,
+    )  # fmt: skip
 
 
-def link_lines(scene: Scene, view: View, sample: ExplainedSample) -> list[str]:
-    """Return lines on one sample of a link between two stations: geometry, Doppler factor, level of the echo."""
+def link_geometry(view: View) -> LinkGeometry:
+    """Return the distances and the bistatic angle of a target that a link between two stations observes."""
     station = view.station
     ends = [np.asarray(one.position_m) - view.aim_m for one in (station.transmitter, station)]
     out, back = (float(np.linalg.norm(one)) for one in ends)
-    angle = math.acos(float(np.clip(ends[0] @ ends[1] / (out * back), -1.0, 1.0)))
-    power = received_signal(scene, station, sample.cloud, sample.row, sample.occluders).power
-    named = {effect.name: effect for effect in scene.effects}
-    return [
-        f"{sample.row['subtype']}, model {sample.row['model']}, link {station.name}: {out:.0f} m and {back:.0f} m",
-        f"  bistatic angle {math.degrees(angle):.0f} degrees: Doppler is {math.cos(angle / 2):.2f} of 2 v / lambda "
-        "along the bisector; all physics named is computed",
-        f"  {prefix_line(scene, 0.5 * (out + back))}",
-        *(f"  {line}" for line in ("levels of one subcarrier:", *table(levels(view, named, power)))),
-    ]
+    return LinkGeometry(out, back, math.acos(float(np.clip(ends[0] @ ends[1] / (out * back), -1.0, 1.0))))
 
 
-def prefix_line(scene: Scene, range_m: float) -> str:
-    """Return a line that says whether the cyclic prefix covers an echo from `range_m`, and its loss otherwise."""
+def prefix(scene: Scene, range_m: float) -> Prefix:
+    """Return what the cyclic prefix covers of an echo from `range_m`."""
     settings = {effect.name: effect.settings for effect in scene.effects}.get("cyclic_prefix")
-    network = scene.network
-    prefix = cyclic_prefix.length_s(settings or cyclic_prefix.DEFAULTS, network)
-    covered = f"cyclic prefix {1e6 * prefix:.3g} us, covers {0.5 * prefix * SPEED_OF_LIGHT:.0f} m"
-    lost = float(cyclic_prefix.lost(2 * range_m / SPEED_OF_LIGHT, prefix, network))
-    if lost == 0:
-        return f"{covered}: this echo is within it"
-    kept, spread = 1 - lost, max(1 - (1 - lost) ** 2, 1e-30)
-    level = f"{20 * np.log10(kept):.1f} dB" if kept > 0 else "gone"
-    modelled = "computed" if settings is not None else "not modelled, name effects.cyclic_prefix"
-    return (
-        f"{covered}: this echo loses {lost:.0%} of its window, {level}; interference {10 * np.log10(spread):.0f} dB a "
-        f"subcarrier, {10 * np.log10(spread / network.subcarriers):.0f} dB a range cell ({modelled})"
-    )
+    length = cyclic_prefix.length_s(settings or cyclic_prefix.DEFAULTS, scene.network)
+    lost = float(cyclic_prefix.lost(2 * range_m / SPEED_OF_LIGHT, length, scene.network))
+    return Prefix(length, 0.5 * length * SPEED_OF_LIGHT, lost, settings is not None, scene.network.subcarriers)
 
 
-def explain_scene(
-    paths: list[Path],
-    schema: Path,
-    inputs: Path | None,
-    named: list[tuple[str, int]],
-    station: str | None,
-    measure: bool,
-) -> str:
-    """Return the explanation of the scene of a base configuration and its overlays `paths`.
+def scene_facts(
+    config: dict, inputs: Path | None, named: list[tuple[str, int]], station: str | None, measure: bool
+) -> SceneFacts:
+    """Return the facts on the scene of a whole configuration.
 
     named: samples (subtype, model number), by default one a category; station: by default the first; measure: whether
     costs are measured. Raises: InputError where the configuration, a sample or a station is wrong.
     """
-    return explained(load(paths, schema), inputs, named, station, measure)
-
-
-def explained(
-    config: dict, inputs: Path | None, named: list[tuple[str, int]], station: str | None, measure: bool
-) -> str:
-    """Return the explanation of the scene of a whole configuration; arguments and errors as `explain_scene`."""
     checked = check(config)
     effects = tuple(called(config["effects"]))
     scene = Scene(Network.from_settings(config["network"]), config["seed"], config["echo"]["tolerance"], effects)
-    station = station or scene.network.stations[0].name
+    names = [station.name for station in scene.network.stations]
+    station = station or names[0]
     scene.network.station(station)
-    tolerance = "exact" if scene.tolerance is None else f"{scene.tolerance:g} of a sample's largest value"
-    lines = [
-        f"scene {config['run']}: stations {', '.join(s.name for s in scene.network.stations)}, tolerance {tolerance}, "
-        f"SNRs {', '.join(f'{float(snr):g}' for snr in config['noise']['snr_db'])} dB",
-        "always (Eq. 7): beam pattern over the target, spread over range cells, 1/r^2 over the target, exact range; "
-        "how, by sample, below",
-    ]
     chosen = samples(config, inputs, named)
-    price = costs(scene, chosen, station) if measure else {}
-    for effect in effects:
-        cost = f" | +{price[effect.name]:.2f} ms" if measure else ""
-        kind = "by need" if effect.name in BY_NEED else effect.place
-        values = ", ".join(f"{key} {value}" for key, value in effect.settings.items())
-        lines += [f"{effect.name} ({kind}): {values or 'no parameters'}{cost}", f"  {effect.module.SOURCE}"]
-    idle = [name for name in config["effects"] if name not in checked.effects]
-    if idle:
-        lines.append(f"named, but the identity with these parameters, so left out: {', '.join(idle)}")
-    absent = [name for name in PLACES if name not in config["effects"]]
-    lines.append(f"not named, so not imported and nothing drawn: {', '.join(absent) or 'none'}")
-    if measure:
-        lines.append(
-            f"time a sample and station: base {price['base']:.2f} ms, with all effects {price['together']:.2f} ms "
-            f"(medians of {REPEATS}, mean over {len(chosen)} samples; {describe()})"
-        )
-    for sample in chosen:
-        lines += ["", *sample_lines(scene, sample, station)]
-    return "\n".join(lines)
+    return SceneFacts(
+        config["run"], names, scene.tolerance, [float(snr) for snr in config["noise"]["snr_db"]], effects,
+        [name for name in config["effects"] if name not in checked.effects],
+        [name for name in PLACES if name not in config["effects"]],
+        costs(scene, chosen, station) if measure else {},
+        [sample_facts(scene, sample, station) for sample in chosen],
+    )  # fmt: skip

@@ -16,6 +16,8 @@ from lowalt.workflow.board import Board, span
 from lowalt.workflow.owner import started
 
 FOLDER = Path(".snakemake/status")
+PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
+"""Variable of the environment with the file to which a dry run adds each job that would run, a JSON object a line."""
 
 
 def write(board: Board, state: str, folder: Path = FOLDER) -> None:

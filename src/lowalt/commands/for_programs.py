@@ -1,0 +1,38 @@
+"""Answers of commands for programs: the option `--json`, and any answer as one JSON text."""
+
+import argparse
+import dataclasses
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+
+def json_option(line: argparse.ArgumentParser) -> None:
+    """Add `--json` to a command's line."""
+    line.add_argument("--json", action="store_true", help="print JSON for a program")
+
+
+def _plain(value: object) -> object:
+    """A value in the types that JSON has: no number stands as null, an infinity as "inf" or "-inf"."""
+    if dataclasses.is_dataclass(value):
+        value = {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None if math.isnan(value) else "inf" if value > 0 else "-inf"
+    return str(value) if isinstance(value, Path) else value
+
+
+def as_json(answer: object) -> str:
+    """Return an answer as one JSON text.
+
+    answer: nested mappings, sequences, dataclasses, arrays, paths, texts and numbers. NaN becomes null and an infinity
+    "inf" or "-inf", since JSON has neither. Raises: TypeError for a value of any other type.
+    """
+    return json.dumps(_plain(answer), indent=1, allow_nan=False)
