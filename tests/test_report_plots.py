@@ -50,6 +50,13 @@ def test_every_accuracy_of_the_table_is_a_point(plots):
     assert {row["scheme"] for row in rows if row["source"] == "paper"} <= schemes
 
 
+def test_snrs_stand_in_the_order_of_their_values_where_a_run_has_few_of_them():
+    ours = {"seen": {"A:VT": {"3": 50.0, "inf": 60.0, "-5": 20.0, "avg": 55.0}}}
+    paper = {"seen": {"A:VT": {"3": 90.0, "13": 95.0, "8": 93.0, "inf": 99.0}}}
+    plot = accuracy_plots.over_snr(ours, paper)
+    assert plot.spec["spec"]["encoding"]["x"]["sort"] == ["-5", "3", "8", "13", "∞"]
+
+
 def test_a_row_of_a_confusion_matrix_is_whole(plots):
     shares = {}
     for row in plots["confusion"].rows:

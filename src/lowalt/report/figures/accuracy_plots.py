@@ -36,7 +36,8 @@ def over_snr(ours: dict, published: dict) -> Plot:
         for scheme, values in schemes.items() if scheme in ours[protocol]
         for label, value in values.items() if label != "avg"
     ]  # fmt: skip
-    order = list(dict.fromkeys(row["snr_db"] for row in rows))
+    infinite = set(SNR_LABELS.values())
+    order = sorted({row["snr_db"] for row in rows}, key=lambda snr: float("inf" if snr in infinite else snr))
     across = {"field": "snr_db", "type": "ordinal", "sort": order, "title": "SNR (dB)", "axis": {"labelAngle": 0}}
     dash = {
         "field": "source",
@@ -47,7 +48,8 @@ def over_snr(ours: dict, published: dict) -> Plot:
     shown = _lines(across, {"strokeDash": dash})
     at = {"name": "at", "select": {"type": "point", "encodings": ["x"], "nearest": True, "on": "pointerover",
                                    "clear": "pointerout"}}  # fmt: skip
-    rule = {"mark": {"type": "rule", "color": "gray"}, "params": [at], "encoding": {
+    # The line under the pointer repeats each SNR; a screen reader passes it over.
+    rule = {"mark": {"type": "rule", "color": "gray", "aria": False}, "params": [at], "encoding": {
         "y": {"value": 0}, "y2": {"value": 280}, "strokeDash": {"value": [2, 2]}, "color": {"value": "gray"},
         "opacity": {"condition": {"param": "at", "empty": False, "value": 0.8}, "value": 0},
     }}  # fmt: skip
