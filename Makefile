@@ -8,6 +8,7 @@ comma := ,
 BASE := .venv/set-up-data
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
+KERNELS := .venv/set-up-kernels
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
@@ -37,7 +38,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
 	$(PIP) -c envs/constraints.txt uv || true
 	$(call install,-e '.[workflow$(comma)cost]')
-	rm -f $(SETUP) $(TESTING) $(DOCS) .venv/set-up-methods .venv/set-up-audit
+	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) .venv/set-up-methods .venv/set-up-audit
 	touch $@
 
 $(SETUP): $(BASE)
@@ -46,6 +47,11 @@ $(SETUP): $(BASE)
 
 $(TESTING): $(SETUP)
 	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	touch $@
+
+# Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time.
+$(KERNELS): $(BASE)
+	$(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log || { cat .venv/kernels.log >&2; exit 1; }
 	touch $@
 
 $(DOCS): $(BASE)
@@ -60,7 +66,7 @@ default: $(BASE)  ## the embedded default: data, training, evaluation, report in
 	$(SNAKEMAKE)
 
 # From a warm cache the packages are there in seconds; only a download is worth a Snakemake of its own.
-.PHONY: meanwhile
+.PHONY: meanwhile ready
 meanwhile: $(BASE)
 	@for second in 1 2 3 4 5 6 7 8; do test -e $(SETUP) && exit; sleep 1; done; $(SNAKEMAKE) -- prepared
 
@@ -80,7 +86,10 @@ measured: $(SETUP)  ## recordings held against their radars' twins: make measure
 	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
 	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
 
-test: $(TESTING)  ## the test suite
+ready: $(TESTING) $(KERNELS)
+
+test:  ## the test suite
+	@$(MAKE) --no-print-directory -j 2 ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --strict-skips -m "not slow"
 
 test-slow: $(TESTING)  ## the slow checks
@@ -97,7 +106,8 @@ mutants: $(TESTING)  ## set small faults into every room of the package, one at 
 	$(BIN)/python benchmarks/mutants.py --count $(MUTANTS) --minutes $(MINUTES) $(if $(ROOMS),--rooms $(ROOMS)) \
 		--out results/benchmarks/mutants.csv --survivors results/benchmarks/mutants_survivors.csv
 
-lint: $(TESTING)  ## ruff, snakefmt, mypy, snakemake --lint
+lint:  ## ruff, snakefmt, mypy, snakemake --lint
+	@$(MAKE) --no-print-directory -j 2 ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 import reference
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
+from lowalt.echo.scene import target
 
 
 def network(**changes) -> Network:
@@ -206,3 +207,10 @@ def test_other_bad_arguments_are_named():
             echo_signal(net, net.stations[0], good, **arguments)
     with pytest.raises(InputError, match="frequency_hz is -1"):
         echo_signal(net, Station("A", (0.0, 0.0, 25.0), 0.0, -1.0), good, 1.0, (9.0, 9.0, 9.0))
+
+
+def test_read_only_arrays_are_copied_so_that_no_kernel_is_compiled_for_them():
+    motion = cloud_in_motion(np.random.default_rng(1), 3, 1, (90.0, 40.0, 10.0))
+    for array in motion:
+        array.setflags(write=False)
+    assert all(array.flags.writeable for array in target(motion, 1.0))

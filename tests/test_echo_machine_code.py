@@ -8,40 +8,34 @@ from pathlib import Path
 import pytest
 
 import lowalt
+from forks import printed
 from lowalt.common.jit import _DigestCache, digest
 from lowalt.echo.fast.driver import run
 from lowalt.effects.response_loops import one_way
 
 PROGRAM = """
+import sys
+from pathlib import Path
+
+package, name, text, other = {!r}
+path = Path(package) / name
+kept = path.read_text()
+assert text in kept
+path.write_text(kept.replace(text, other))
+# Bytecode is not kept: two edits of equal length within a second would look alike.
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(Path(package).parent))
 from lowalt.common.jit import digest
 from lowalt.echo.fast.driver import run
 from lowalt.effects.response_loops import one_way
+path.write_text(kept)
 print(digest(run.py_func), digest(one_way.py_func))
 """
-
-
-def digests(package: Path) -> list[str]:
-    """Digests of the echo's main kernel and of one of the effects, from the sources in `package`."""
-    # Bytecode is not kept: two edits of equal length within a second would look alike.
-    call = [sys.executable, "-B", "-c", PROGRAM]
-    done = subprocess.run(call, env={"PYTHONPATH": str(package.parent)}, capture_output=True, text=True, check=True)
-    return done.stdout.split()
-
-
-@pytest.fixture(scope="module")
-def package(tmp_path_factory):
-    place = tmp_path_factory.mktemp("sources") / "lowalt"
-    shutil.copytree(Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__"))
-    return place
-
-
-@pytest.fixture(scope="module")
-def before(package):
-    return digests(package)
-
+"""Edits a source file of a copy of the package and prints the digests of the echo's main kernel and of an effect's."""
 
 # file, text, its replacement, and whether the keys of the echo's and of the effects' kernel change by it
 EDITS = {
+    "nothing": ("echo/api.py", "import numpy as np", "import numpy as np", [0, 0]),
     "a module without kernels": ("echo/api.py", "import numpy as np", "import numpy as np\nUNUSED = 1", [0, 0]),
     "a function that is not compiled": ("echo/fast/polynomials.py", "nodes = min(count, 32)", "nodes = 31", [0, 0]),
     "a comment in a kernel": ("echo/fast/vector_loops.py", "    k = degree", "    # Why.\n    k = degree",
@@ -54,17 +48,19 @@ EDITS = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def digests(tmp_path_factory):
+    """The two digests after each edit."""
+    place = tmp_path_factory.mktemp("sources") / "lowalt"
+    shutil.copytree(Path(lowalt.__file__).parent, place, ignore=shutil.ignore_patterns("__pycache__"))
+    programs = [PROGRAM.format((str(place), *edit[:3])) for edit in EDITS.values()]
+    return dict(zip(EDITS, map(str.split, printed(programs)), strict=True))
+
+
 @pytest.mark.parametrize("case", EDITS)
-def test_the_key_changes_with_what_is_compiled_alone(case, package, before):
-    name, text, other, changed = EDITS[case]
-    path = package / name
-    kept = path.read_text()
-    assert text in kept
-    path.write_text(kept.replace(text, other))
-    try:
-        assert [int(new != old) for new, old in zip(digests(package), before, strict=True)] == changed
-    finally:
-        path.write_text(kept)
+def test_the_key_changes_with_what_is_compiled_alone(case, digests):
+    before = digests["nothing"]
+    assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][-1]
 
 
 def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():

@@ -1,7 +1,5 @@
 """Effects as a whole: the chain against a slow truth, no effect that a scene does not name, streams of their own."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -158,25 +156,6 @@ def test_the_catalogue_names_every_effect_module_and_only_those():
         provided = [one for one in WORK[PLACES[entry.partition("/")[2]]] if isinstance(module, one)]
         assert len(provided) == 1
     assert len(set(ORDER)) == len(ORDER)
-
-
-@pytest.mark.parametrize("name", [None, *sorted(PLACES)])
-def test_what_no_scene_names_is_not_imported(name):
-    block = {} if name is None else {name: {}}
-    program = (
-        "import sys, lowalt.echo.__main__, lowalt.effects.__main__, lowalt.noise.__main__\n"
-        f"from lowalt.effects.catalogue import called; called({block!r})\n"
-        "names = [n for n in sys.modules if n.startswith('lowalt.effects.') and n.count('.') == 3]\n"
-        "print(*(n.rpartition('.')[2] for n in names))"
-    )
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert {other for other in run.stdout.split() if other in PLACES} == ({name} if name else set())
-
-
-def test_a_run_without_effects_imports_nothing_of_them():
-    program = "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "False"
 
 
 def test_idle_effects_leave_every_bit(rng):

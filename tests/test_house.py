@@ -3,14 +3,16 @@
 import ast
 import io
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from scipy import ndimage
 
+from forks import printed
 from lowalt.common.street import PACKAGE, STREET, modules, rooms_imported
+from lowalt.effects.catalogue import PLACES
 from lowalt.report.figures import house
 
 ROOT = Path(__file__).parent.parent
@@ -26,11 +28,36 @@ def test_a_stage_imports_only_what_stands_before_it(stage):
     assert not wrong
 
 
-@pytest.mark.parametrize("stage", [stage for stage in STAGES if stage not in ("spectra", "recognition")])
-def test_who_only_wants_data_never_imports_torch(stage):
-    program = f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)"
-    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "False"
+def test_who_only_wants_data_never_imports_torch():
+    stages = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
+    found = printed([f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)" for stage in stages])
+    assert dict(zip(stages, found, strict=True)) == dict.fromkeys(stages, "False\n")
+
+
+def test_what_no_scene_names_is_not_imported():
+    scenes = [{}, *({name: {}} for name in PLACES)]
+    program = (
+        "import os, sys, lowalt.echo.__main__, lowalt.effects.__main__, lowalt.noise.__main__\n"
+        "from lowalt.effects.catalogue import called\n"
+        f"for scene in {scenes!r}:\n"
+        "    if os.fork() == 0:\n"
+        "        called(scene)\n"
+        "        break\n"
+        "    os.wait()\n"
+        "else:\n"
+        "    sys.exit()\n"
+        "names = [n for n in sys.modules if n.startswith('lowalt.effects.') and n.count('.') == 3]\n"
+        "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
+        "os._exit(0)"
+    )
+    (text,) = printed([program])
+    found = [{other for other in line.split() if other in PLACES} for line in text.split("\n")[:-1]]
+    assert found == [set(scene) for scene in scenes]
+
+
+def test_a_run_without_effects_imports_nothing_of_them():
+    program = "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)"
+    assert printed([program]) == ["False\n"]
 
 
 def test_the_street_holds_every_room():
@@ -38,11 +65,17 @@ def test_the_street_holds_every_room():
 
 
 def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
-    rows, columns = house.imports()
-    assert ("measure", "recognition") in zip(rows, columns, strict=True)
-    assert not {(room, other) for room, other in zip(rows, columns, strict=True) if room == "common"}
-    picture = np.asarray(Image.open(io.BytesIO(house.draw())).convert("L"))
-    assert picture.min() < 100 < 250 < picture.max()
+    pairs = set(zip(*house.imports(), strict=True))
+    assert ("measure", "recognition") in pairs
+    assert not {(room, other) for room, other in pairs if room == "common"}
+    picture = np.asarray(Image.open(io.BytesIO(house.draw())).convert("RGB")).astype(int)
+    # Dots are the only thing in colour. The first column of dots is that of the room `common`.
+    dots, count = ndimage.label(picture[..., 2] - picture[..., 0] > 40)
+    centres = np.array(ndimage.center_of_mass(dots > 0, dots, range(1, count + 1)))
+    # The first room imports none, and none imports the last.
+    places = (centres - centres.min(axis=0)) / np.ptp(centres, axis=0) * (len(STREET) - 2)
+    found = [(STREET[row + 1], STREET[column]) for row, column in np.rint(places).astype(int).tolist()]
+    assert sorted(found) == sorted(pairs)
 
 
 def test_every_module_says_what_it_holds():

@@ -108,7 +108,8 @@ def test_bad_records_are_refused_by_key_and_value(path, value, names, quad):
     at[path[-1]] = value
     with pytest.raises(InputError, match=names) as error:
         made("DJI Mini 2", quad, **record)
-    assert "DJI Mini 2" in str(error.value) or "body.stl" in str(error.value)
+    place = quad / "body.stl" if path[-1] == "geometry" else "DJI Mini 2"
+    assert str(error.value).startswith(f"{place}: ")
 
 
 def test_regions_that_hold_nothing_or_everything_are_refused(quad):

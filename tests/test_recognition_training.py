@@ -122,8 +122,10 @@ def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
     groups = recipe.optimiser(model, {**TRAINING, "backbone_rate": 0.1}).param_groups
     members = [id(value) for group in groups for value in group["params"]]
     assert sorted(members) == sorted(id(value) for value in model.parameters())
-    for group in groups:
-        assert all(value.ndim > 1 for value in group["params"]) or group["weight_decay"] == 0
+    matrices = {id(value) for name, value in model.named_parameters() if value.ndim > 1 and "modality" not in name}
+    decays = {id(value): group["weight_decay"] for group in groups for value in group["params"]}
+    assert 0 < len(matrices) < len(decays)
+    assert decays == {member: TRAINING["weight_decay"] if member in matrices else 0.0 for member in members}
     slow = {id(value) for group in groups if group["factor"] == 0.1 for value in group["params"]}
     assert slow == {id(value) for value in model.backbone.parameters()}
 

@@ -78,7 +78,7 @@ def compute(
         return found, symbols, sample.method(None, exact, 0, 0, len(refs)), sample.lay
     chosen, error, cheap = exact, None, 0
     if tolerance is not None and len(refs) > PROBES and sample.saving(tolerance) > PROBE_COST:
-        probes = symbols[:: -(-len(refs) // PROBES)]
+        probes = np.arange(0, len(refs), -(-len(refs) // PROBES))
         sample.compute(probes, exact, True, found)
         share = abs(found.values[probes]).max() / (found.totals[probes].max() + sample.peaks(probes).max())
         error = 0.5 * tolerance * share

@@ -66,7 +66,8 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
     if not math.isfinite(array.sum()) and not np.isfinite(array).all():
         place = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(f"{sample}{name}[{', '.join(map(str, place))}] is {array[place]}, expected a finite number")
-    return array
+    # Kernels would be compiled once more for an array that is read-only.
+    return array if array.flags.writeable else array.copy()
 
 
 def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
