@@ -30,7 +30,7 @@ except InputError as error:
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)
 settings = Settings(RUN, calls)
-code = partial(code_of, spectra=tuple(config["spectra"]))
+code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.
 DATA = f"results/{RUN.data}"

@@ -1,13 +1,14 @@
 # Tiles: three spectra a station, nine images a sample, tiled 3 x 3 and encoded without loss.
-# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy
+# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants
 # OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written, and for every size of tiles.reduced
 #          results/{run}/reduced/{size}/{group}-{part}.npy
 
 
 rule tiles:
     input:
-        code=code("lowalt.tiles"),
+        code=code("lowalt.tiles", *options.tile_modules(config)),
         signals="results/{run}/noisy/{group}-{part}.npy",
+        motion=products.tile_motion,
     output:
         tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
         reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
@@ -20,6 +21,8 @@ rule tiles:
     params:
         settings=settings.images,
         reduced=options.reduced,
+        motion=options.motion,
     shell:
         "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced}"
+        " {params.motion}"
         " --out {output.tiles:q} 2> {log:q}"

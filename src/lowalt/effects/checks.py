@@ -55,6 +55,11 @@ def check(config: dict) -> CheckedScene:
             "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
             "effects.cell_noise or effects.canceller"
         )
+    regrid = scene.effects.get("slow_time", {"regrid": "zero"})["regrid"]
+    if config.get("spectra", {}).get("times") == "known" and regrid != "zero":
+        raise InputError(
+            f"effects.slow_time.regrid: {regrid!r} makes an even signal, and spectra.times is 'known', expected 'zero'"
+        )
     if "canceller" in scene.effects and not set(STILL) & set(scene.effects):
         raise InputError(
             f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"

@@ -124,7 +124,8 @@ class DatasetSamples:
         maker, found = self.dataset.maker, []
         for number in numbers:
             place, snr_db = self.chosen[number]
-            images = maker.renderer.some(maker.signal(self.rows[place], snr_db), self.columns)
+            row = self.rows[place]
+            images = maker.renderer.some(maker.signal(row, snr_db), self.columns, maker.late(row))
             found.append(images if images.shape[-1] == self.size else resize(images, self.size))
         return np.stack(found)
 

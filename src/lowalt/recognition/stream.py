@@ -102,9 +102,9 @@ class Stream:
         """Return the images of one sample; those of motion models that repeat are kept, as far as memory allows."""
         if place in self._made:
             return self._made[place]
-        maker = self.dataset.maker
-        signal = maker.signal(self.dataset.row(place), place.snr_db)
-        images = maker.renderer.some(signal, self.columns)
+        maker, row = self.dataset.maker, self.dataset.row(place)
+        signal = maker.signal(row, place.snr_db)
+        images = maker.renderer.some(signal, self.columns, maker.late(row))
         images = images if images.shape[-1] == self.size else resize(images, self.size)
         if self.models and (len(self._made) + 1) * images.nbytes < CLEAN_BYTES:
             self._made[place] = images

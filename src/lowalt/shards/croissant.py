@@ -5,6 +5,7 @@ Source: Croissant format specification 1.1 (MLCommons).
 
 from lowalt.common.classes import stated
 from lowalt.shards.table import EXTENSIONS
+from lowalt.spectra.catalogue import named
 
 CONTEXT = {
     "@language": "en",
@@ -97,7 +98,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
     mime, data_type, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
-    meaning = meaning.format(len(index["render"]["spectra"]) * size, stations * size)
+    meaning = meaning.format(len(named(index["render"]["spectra"])) * size, stations * size)
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
     sets = [
         _files(

@@ -164,7 +164,7 @@ class Dataset:
         Raises: InputError naming the sample that cannot be computed.
         """
         signal = self.made_signal(place)
-        return Sample(self.maker.renderer.tile(signal), signal, json.loads(self.made_record(place)))
+        return Sample(self.maker.tile(signal, self.row(place)), signal, json.loads(self.made_record(place)))
 
     def __getitem__(self, number: int) -> Sample:
         return self.made(self.place(number))
@@ -193,11 +193,11 @@ class Dataset:
         "recipe", which hold the same)."""
         place = self.place(number)
         signal = self.made_signal(place)
-        return self.made_record(place), self.maker.png(signal) if kind == "image" else npy(signal)
+        return self.made_record(place), self.maker.png(signal, self.row(place)) if kind == "image" else npy(signal)
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""
-        return self.maker.renderer.tile(self.signal(number))
+        return self.maker.tile(self.signal(number), self.row(self.place(number)))
 
 
 class Endless:

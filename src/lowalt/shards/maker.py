@@ -10,6 +10,7 @@ import numpy as np
 
 from lowalt.common.network import Network
 from lowalt.echo.chunk import clean_signals
+from lowalt.effects.lateness import lateness
 from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.noise.chunk import noisy_signals
 from lowalt.spectra import Spectra
@@ -94,6 +95,14 @@ class Maker:
         names = [station.name for station in self.network.stations]
         return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers, behind)[0, 0]
 
-    def png(self, signal: np.ndarray) -> bytes:
-        """Return the PNG file of the tile of one sample's signals."""
-        return encode(self.renderer.tile(signal), self.images.palette)
+    def late(self, row: dict) -> np.ndarray | None:
+        """Return how late the symbols of a motion model are, (stations, symbols); None where images do not ask."""
+        return lateness(self.render["spectra"], self.echo["effects"], self.network, self.seed, row)
+
+    def tile(self, signal: np.ndarray, row: dict) -> np.ndarray:
+        """Return the tile of one sample of the motion model `row` from its signals (stations, symbols)."""
+        return self.renderer.tile(signal, late=self.late(row))
+
+    def png(self, signal: np.ndarray, row: dict) -> bytes:
+        """Return the PNG file of the tile of one sample of the motion model `row`."""
+        return encode(self.tile(signal, row), self.images.palette)

@@ -18,9 +18,10 @@ from lowalt.common.files import existing, sha256
 from lowalt.common.network import station_names
 from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
+from lowalt.effects.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
-from lowalt.shards.record import npy
+from lowalt.shards.record import npy, row_of
 from lowalt.shards.table import map_samples, table_path
 from lowalt.spectra.catalogue import named
 from lowalt.tiles.png import decode
@@ -184,13 +185,21 @@ class ShardSet:
         stations = station_names(self.index["render"]["network"])
         return noisy(json.loads(self._bytes(number, "record")), stored, stations, self._snr_db(number))
 
+    def late(self, number: int) -> np.ndarray | None:
+        """Return how late the symbols of a sample are, (stations, symbols) intervals; None where images do not ask."""
+        render, effects = self.index["render"], (self.index.get("echo") or {}).get("effects", {})
+        if render["spectra"].get("times") != "known":
+            return None
+        entry = self.record(number)
+        return lateness(render["spectra"], effects, self.renderer.network, entry["seed"], row_of(entry)[0])
+
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8, decoded or rendered; all kinds of shards give the same pixels.
 
         Raises: InputError naming shard and sample where it is damaged.
         """
         if self.kind != "image":
-            return self.renderer.tile(self.signal(number))
+            return self.renderer.tile(self.signal(number), late=self.late(number))
         return decode(self.png(number))[0]
 
     def images(
@@ -208,7 +217,7 @@ class ShardSet:
         """
         numbers = self.columns(stations, views)
         if self.kind != "image":
-            images = self.renderer.some(self.signal(number), numbers)
+            images = self.renderer.some(self.signal(number), numbers, self.late(number))
         else:
             images = split(self.tile(number), len(self.spectra))[numbers]
         return images if size in (None, images.shape[-1]) else resize(images, size)

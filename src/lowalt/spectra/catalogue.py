@@ -13,7 +13,7 @@ from typing import Any
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.spectra.interface import Spectrum
+from lowalt.spectra.interface import KnowsTimes, Spectrum
 from lowalt.spectra.settings import windows
 
 LISTED = ("vrp", "trp", "vt")
@@ -21,6 +21,9 @@ LISTED = ("vrp", "trp", "vt")
 _FOUND = sorted(path.stem for path in (Path(__file__).parent / "kinds").glob("*.py") if path.stem != "__init__")
 NAMES = (*LISTED, *(name for name in _FOUND if name not in LISTED))
 """Names of all spectra."""
+TIMES = "times"
+"""The key of the block `spectra` that is no spectrum: whether spectra know the instants of received symbols."""
+INSTANTS = ("even", "known")
 
 
 @functools.cache
@@ -43,7 +46,8 @@ def named(block: Iterable[str]) -> tuple[str, ...]:
     Raises: InputError for an unknown name, or where there is none.
     """
     for name in block:
-        spectrum(name)
+        if name != TIMES:
+            spectrum(name)
     found = tuple(name for name in NAMES if name in set(block))
     if not found:
         raise InputError(f"spectra: none named, expected some of {list(NAMES)}")
@@ -58,13 +62,20 @@ def zero_index(name: str) -> int:
 class Spectra(Mapping[str, Any]):
     """The settings of a data set's spectra by name, in the order of the columns of its tiles."""
 
-    def __init__(self, **settings: Any) -> None:
+    def __init__(self, times: str = "even", **settings: Any) -> None:
         """settings: a `Settings` for each spectrum; without any, the paper's three with their defaults.
 
-        Raises: InputError for an unknown name.
+        times: "even", symbols are taken as evenly spaced; "known", lines are fitted at the received symbols' instants.
+        Raises: InputError for an unknown name, or one of a spectrum that knows no instants where they are to be known.
         """
+        if times not in INSTANTS:
+            raise InputError(f"spectra.times is {times!r}, expected one of {INSTANTS}")
+        self.times = times
         given = settings or {name: spectrum(name).DEFAULTS for name in LISTED}
         self._settings = {name: given[name] for name in named(given)}
+        blind = [name for name in self._settings if not isinstance(spectrum(name), KnowsTimes)]
+        if times == "known" and blind:
+            raise InputError(f"spectra.times is 'known', but {blind} know no instants, expected even")
 
     @classmethod
     def from_settings(cls, block: dict) -> "Spectra":
@@ -76,7 +87,7 @@ class Spectra(Mapping[str, Any]):
         for name in named(block):
             kind = spectrum(name).Settings
             found[name] = kind(*pick(block[name], *(entry.name for entry in fields(kind))))
-        return cls(**found)
+        return cls(block.get(TIMES, "even"), **found)
 
     def __getitem__(self, name: str) -> Any:
         """Settings of one spectrum."""

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Fourier
 from lowalt.spectra.sliding import fourier_magnitudes, turns
@@ -53,6 +54,16 @@ def tables(settings: Fourier, frequency_hz: float, symbol_interval_s: float) -> 
 def fill(re: np.ndarray, im: np.ndarray, settings: Fourier, tables: tuple, out: np.ndarray) -> None:
     """Fill out (points, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
     fourier_magnitudes(re, im, settings.window, settings.points, *tables, out)
+
+
+def fill_known(
+    signal: np.ndarray, times: np.ndarray, settings: Fourier, frequency_hz: float, symbol_interval_s: float,
+    out: np.ndarray,
+) -> None:  # fmt: skip
+    """Fill out (points, starts) as `fill`, with the lines that fit a signal (N,) received at `times` (N,) intervals."""
+    starts = out.shape[1]
+    sums = line_sums(signal, times, np.fft.fftfreq(settings.points), settings.window, starts)
+    out[:] = np.abs(sums) * (settings.window * shares(signal, settings.window, starts))
 
 
 def on_device(re: Any, im: Any, settings: Fourier, tables: list, starts: int) -> Any:

@@ -53,6 +53,18 @@ class Spectrum(Protocol):
 
 
 @runtime_checkable
+class KnowsTimes(Protocol):
+    """A spectrum that can use the instants at which symbols were received; needed with `times: known`."""
+
+    def fill_known(
+        self, signal: np.ndarray, times: np.ndarray, settings: Any, frequency_hz: float, symbol_interval_s: float,
+        out: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Fill out as `fill` for a signal (N,), zero where no symbol was received; times: (N,) in symbol intervals."""
+        ...
+
+
+@runtime_checkable
 class OnDevice(Protocol):
     """A spectrum that PyTorch can compute too; the others are computed on the processor."""
 

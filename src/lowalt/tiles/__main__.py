@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from lowalt.common.command import parser, run
+from lowalt.common.command import parser, pick, run
 from lowalt.common.progress import reported
 from lowalt.tiles import files, reduced
 from lowalt.tiles.png import encode
@@ -12,11 +12,17 @@ from lowalt.tiles.render import Renderer
 from lowalt.tiles.signals import load_signals
 
 
-def encoded(signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None]) -> Iterator[bytes]:
-    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile."""
+def encoded(
+    signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None],
+    late: Callable[[int], np.ndarray | None] = lambda model: None,
+) -> Iterator[bytes]:  # fmt: skip
+    """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile.
+
+    late: how late a model's symbols are, as in `Renderer.tile`.
+    """
     palette, models = tiles.images.palette, reported(signals, len(signals), "models")
-    for number, sample in enumerate(sample for model in models for sample in model):
-        tile = tiles.tile(sample)
+    for number, (place, sample) in enumerate((place, one) for place, model in enumerate(models) for one in model):
+        tile = tiles.tile(sample, late=late(place))
         seen(number, tile)
         yield encode(tile, palette)
 
@@ -33,12 +39,24 @@ def main(arguments: list[str]) -> None:
         metavar="SIZE=PATH",
         help="also write the images at SIZE pixels a side (.npy)",
     )
+    options.add_argument("--motion", help="the chunk's motion table, where spectra know the instants of late symbols")
     given = options.parse_args(arguments)
+    drawn = given.settings.pop("drawn", None)
     tiles = Renderer.from_settings(given.settings)
+    late = _late(given.settings["spectra"], drawn, tiles, given.motion) if drawn else lambda model: None
     signals = load_signals(given.signals, tiles.network)
     targets = [reduced.target(text) for text in given.reduced]
     with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
-        files.write(given.out, encoded(signals, tiles, seen))
+        files.write(given.out, encoded(signals, tiles, seen, late))
+
+
+def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
+    """How late the symbols of a chunk's models are; drawn: {seed, effects}, from which the scene draws it."""
+    from lowalt.effects.lateness import lateness
+    from lowalt.motion import read_table
+
+    rows, (seed, effects) = read_table(motion), pick(drawn, "seed", "effects")
+    return lambda model: lateness(spectra, effects, tiles.network, seed, rows[model])
 
 
 if __name__ == "__main__":

@@ -35,7 +35,12 @@ class DeviceRenderer:
     """Renders batches on a device with the tables of a `Renderer`."""
 
     def __init__(self, renderer: Renderer, device: str | torch.device = "cpu") -> None:
-        """Copy the tables of `renderer` to `device`."""
+        """Copy the tables of `renderer` to `device`.
+
+        Raises: InputError for spectra that know the instants of symbols, which are computed on the processor alone.
+        """
+        if renderer.spectra.times != "even":
+            raise InputError(f"spectra.times is {renderer.spectra.times!r}, expected even on a device")
         self.renderer, self.device = renderer, torch.device(device)
         self._plans = {name: [self._put(table) for table in renderer.plan(name)] for name in renderer.spectra}
         self._tables = {

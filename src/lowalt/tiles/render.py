@@ -15,6 +15,8 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.spectra import Spectra, spectrum, windows
+from lowalt.spectra.interface import KnowsTimes
+from lowalt.spectra.known_times import even
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
@@ -131,11 +133,24 @@ class Renderer:
         """Tables of one spectrum, a tuple of arrays a station."""
         return self._tables[name]
 
-    def values(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
-        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,)."""
-        re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
+    def values(
+        self, signal: np.ndarray, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None
+    ) -> None:
+        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,).
+
+        late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None for 0. Where
+        `spectra.times` is "known", symbols that are exactly zero were not received.
+        """
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
-        spectrum(name).fill(re, im, self.spectra[name], self._tables[name][station], values)
+        setting, kind = self.spectra[name], spectrum(name)
+        if self.spectra.times == "even" or even(signal, late):
+            re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
+            kind.fill(re, im, setting, self._tables[name][station], values)
+        else:
+            times = np.arange(len(signal)) + (0.0 if late is None else late)
+            frequency_hz = self.network.stations[station].frequency_hz
+            assert isinstance(kind, KnowsTimes)  # as `Spectra` has checked
+            kind.fill_known(signal, times, setting, frequency_hz, self.network.symbol_interval_s, values)
         if rows_first:
             across_rows(values, source, weights, between)
             along_rows(between, columns, shares, out)
@@ -154,14 +169,17 @@ class Renderer:
         if not np.isfinite(signals).all():
             raise InputError("tile: signals have a NaN or infinite value")
 
-    def image(self, signal: np.ndarray, station: int, name: str, out: np.ndarray) -> None:
-        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,)."""
-        self.values(signal, station, name, self._image)
+    def image(
+        self, signal: np.ndarray, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None
+    ) -> None:
+        """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as in `values`."""
+        self.values(signal, station, name, self._image, late)
         _index(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
 
-    def tile(self, signals: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    def tile(self, signals: np.ndarray, out: np.ndarray | None = None, late: np.ndarray | None = None) -> np.ndarray:
         """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S) uint8.
 
+        late: (stations, symbols), as in `values`, None for symbols on time.
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
@@ -171,10 +189,10 @@ class Renderer:
             signal = normalised(signals[station])
             for view, name in enumerate(self.spectra):
                 part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
-                self.image(signal, station, name, part)
+                self.image(signal, station, name, part, None if late is None else late[station])
         return out
 
-    def some(self, signals: np.ndarray, numbers: Sequence[int]) -> np.ndarray:
+    def some(self, signals: np.ndarray, numbers: Sequence[int], late: np.ndarray | None = None) -> np.ndarray:
         """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n, S, S) uint8.
 
         They are those of `tile`, and only these are computed.
@@ -185,7 +203,8 @@ class Renderer:
         names = list(self.spectra)
         for place, number in enumerate(numbers):
             station, view = divmod(int(number), len(names))
-            self.image(normalised(signals[station]), station, names[view], out[place])
+            own = None if late is None else late[station]
+            self.image(normalised(signals[station]), station, names[view], out[place], own)
         return out
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
+from lowalt.effects.lateness import timed
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -108,6 +109,10 @@ class DataProducts:
         """The powers of the targets' own echoes, to which SNRs refer in a scene with effects; none in other scenes."""
         stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
+
+    def tile_motion(self, wildcards: Any) -> list[str]:
+        """The motion table of a chunk, where spectra know the instants of late symbols; none in other runs."""
+        return [self.motion(wildcards)] if timed(self._config) else []
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal) or clean

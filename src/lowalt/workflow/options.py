@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.effects.catalogue import dotted
+from lowalt.effects.lateness import timed
 
 
 def occluders(wildcards: Any, input: Any) -> str:
@@ -19,9 +20,19 @@ def powers(wildcards: Any, input: Any) -> str:
     return f"--powers {input.powers}" if input.powers else ""
 
 
+def motion(wildcards: Any, input: Any) -> str:
+    """The motion table of a chunk, where the job has it."""
+    return f"--motion {input.motion}" if input.motion else ""
+
+
 def noise_modules(config: dict) -> list[str]:
     """The modules that the noise stage loads in a scene with a canceller."""
     return ["lowalt.effects.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
+
+
+def tile_modules(config: dict) -> list[str]:
+    """The modules that the tiles stage loads where spectra know the instants of late symbols."""
+    return ["lowalt.effects.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
 
 
 def content(wildcards: Any, input: Any) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 from lowalt.common.config import canonical
 from lowalt.common.network import as_far_as, masts_m
 from lowalt.common.plan import Chunk
+from lowalt.effects.lateness import timed
 from lowalt.effects.set_noise import in_all_cells
 from lowalt.motion.sample import masts_in_reach
 from lowalt.workflow.effect_calls import EffectCalls
@@ -90,8 +91,12 @@ class Settings:
         return self._text("noise", *snrs, **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
-        """Network, spectra and images."""
-        return self._text("images", **self._blocks("network", "spectra", "images"))
+        """Network, spectra and images; what late symbols are drawn from, where spectra know their instants."""
+        blocks = self._blocks("network", "spectra", "images")
+        if timed(self._config):
+            given = {"slow_time": self._config["effects"]["slow_time"]}
+            blocks["drawn"] = {"seed": self._config["seed"], "effects": given}
+        return self._text("images", **blocks)
 
     def index(self, wildcards: Any) -> str:
         """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""

@@ -1,7 +1,17 @@
 """VRP: the short-time Fourier spectrum whose long window prefers resolution in velocity."""
 
 # Both short-time Fourier spectra share everything that does not stand below.
-from lowalt.spectra.fourier import SIGNED, ZERO_FIRST, definition, fill, on_device, rows, speeds, tables  # noqa: F401
+from lowalt.spectra.fourier import (  # noqa: F401
+    SIGNED,
+    ZERO_FIRST,
+    definition,
+    fill,
+    fill_known,
+    on_device,
+    rows,
+    speeds,
+    tables,
+)  # fmt: skip
 from lowalt.spectra.settings import Fourier as Settings
 
 TITLE = "velocity preferred (VRP)"

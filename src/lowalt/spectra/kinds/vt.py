@@ -6,6 +6,7 @@ import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.common.portable import sine_cosine
+from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Transfer
 from lowalt.spectra.sliding import transfer
@@ -59,6 +60,20 @@ def tables(settings: Transfer, frequency_hz: float, symbol_interval_s: float) ->
 def fill(re: np.ndarray, im: np.ndarray, settings: Transfer, tables: tuple, out: np.ndarray) -> None:
     """Fill out (speeds, starts) float32 with the spectrum of the windows that start at symbols 0 .. starts - 1."""
     transfer(re, im, settings.window, *tables, out)
+
+
+def fill_known(
+    signal: np.ndarray, times: np.ndarray, settings: Transfer, frequency_hz: float, symbol_interval_s: float,
+    out: np.ndarray,
+) -> None:  # fmt: skip
+    """Fill out (speeds, starts) as `fill`, with the lines that fit a signal (N,) received at `times` (N,) intervals."""
+    starts, length = out.shape[1], settings.window
+    turns = -2 * frequency_hz * symbol_interval_s / SPEED_OF_LIGHT * settings.speeds_mps
+    short, longer = (
+        length * shares(signal, count, starts) * np.abs(line_sums(signal, times, turns, count, starts))
+        for count in (length, length + 1)
+    )
+    out[:] = longer**2 - short**2
 
 
 def on_device(re: Any, im: Any, settings: Transfer, tables: list, starts: int) -> Any:
