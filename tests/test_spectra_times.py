@@ -7,6 +7,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.spectra import Fourier, Spectra, Transfer, spectrum
 from lowalt.tiles import Images, Renderer, join
+from lowalt.tiles.render import normalised
 from pictures import NETWORK, echoes
 
 INTERVAL, CARRIER = 2.5e-3, 4.93192e9
@@ -94,6 +95,12 @@ def test_even_sampling_gives_todays_tiles_to_the_last_bit():
     tiles = [Renderer(network, Spectra(times=times), Images(size=32)) for times in ("even", "known")]
     plain, same = (one.tile(signals) for one in tiles)
     assert (plain == same).all()
+    values = np.empty((2, 32, 32), np.float32)
+    for name in SETTINGS:
+        for one, out in zip(tiles, values, strict=True):
+            one.values(normalised(signals[1]), 1, name, out, np.zeros(signals.shape[1]))
+        # Pixels round; the values before them tell the two ways apart.
+        assert (values[0] == values[1]).all()
     assert (tiles[1].tile(signals, late=np.zeros(signals.shape)) == plain).all()
     gaps = signals * (np.arange(signals.shape[1]) % 4 != 3)
     assert (tiles[0].tile(gaps) == tiles[0].tile(gaps, late=np.full(gaps.shape, 0.3))).all()
