@@ -68,13 +68,15 @@ BILLIONS = b"a: &a [1]\n" + b"".join(
         (BILLIONS, "anchors make more than 1000000 values"),
         (b"a: &a [*a]", "anchors make more than|undefined alias"),
         (b"a: " + b"[" * 5000, "too deeply|not YAML"),
+        (b"- " * 1_000_000, "too deeply"),
         (b"a: 2001-99-99", "not YAML"),
         (b"a: " + b"9" * 5000, "not YAML"),
         (b"a: 1\na: 2", "stands twice"),
         (b"\xff\xfea: 1", "in UTF-8 text"),
         (b"? [1]\n: 2", "not YAML"),
     ],
-    ids=["code", "billions", "endless", "deep", "month 99", "5000 digits", "twice", "encoding", "list as key"],
+    ids=["code", "billions", "endless", "deep", "a million deep", "month 99", "5000 digits", "twice", "encoding",
+         "list as key"],
 )  # fmt: skip
 def test_yaml_that_runs_code_grows_or_is_not_what_it_seems_is_refused(text, expected, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from lowalt.common import yaml_files
 from lowalt.common.config import canonical, check, load, load_yaml, merge
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
@@ -62,6 +63,11 @@ def test_a_broken_file_is_refused(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(InputError, match=words):
         load_yaml(path)
+
+
+def test_both_parsers_read_the_same(monkeypatch):
+    monkeypatch.setattr(yaml_files, "DEEPEST", -1)
+    assert repr(load_yaml(ROOT / "config/default.yaml")) == repr(DEFAULT)
 
 
 def test_canonical_text_is_one_per_meaning():
