@@ -50,13 +50,15 @@ class Arrays(NamedTuple):
 
 @LOOPS
 def directions(places, station, axes, out):
-    """Fill out (3, N, L) with direction cosines across and up, and inverse ranges (1/m), of places (N, L, 3)."""
+    """Fill out (3, N, L) with direction cosines across and up, and inverse ranges (1/m), of places (N, 3, L)."""
     sine, cosine = axes
+    s0, s1, s2 = station[0], station[1], station[2]
     for n in range(places.shape[0]):
-        for i in range(places.shape[1]):
-            x, y, z = places[n, i, 0] - station[0], places[n, i, 1] - station[1], places[n, i, 2] - station[2]
+        at, across, up, near = places[n], out[0, n], out[1, n], out[2, n]
+        for i in range(np.uint64(places.shape[2])):
+            x, y, z = at[0, i] - s0, at[1, i] - s1, at[2, i] - s2
             inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
-            out[0, n, i], out[1, n, i], out[2, n, i] = (cosine * y - sine * x) * inverse, z * inverse, inverse
+            across[i], up[i], near[i] = (cosine * y - sine * x) * inverse, z * inverse, inverse
 
 
 @LOOPS
@@ -130,7 +132,7 @@ def sums(
     directions stay inside, and new ones are made a little wider than needed and added.
     """
     at = np.empty((3, *places.shape[:2]))
-    directions(places, array.station, array.axes, at)
+    directions(np.ascontiguousarray(places.swapaxes(1, 2)), array.station, array.axes, at)
     for first in range(0, len(places), SYMBOLS):
         rows = slice(first, first + SYMBOLS)
         points = places[rows].shape[0] * places.shape[1]
@@ -170,7 +172,7 @@ def _box(
 
 def _every_point(places: np.ndarray, array: Arrays, out: np.ndarray) -> None:
     """Fill out (Q, N, L) with the sums at places (N, L, 3) m, element by element."""
-    response_loops.near_field(places, *array[:-1], out)
+    response_loops.near_field(np.ascontiguousarray(places), *array[:-1], out)
 
 
 def term_bounds(middle: np.ndarray, half: np.ndarray, array: Arrays) -> np.ndarray | None:

@@ -179,7 +179,7 @@ class _PathFactors:
 
     def __init__(self, network: Network, name: str, radio: Radar, refs, origin, aims, path: ImagePath):
         self.network, self.name, self.radio, self.refs, self.origin = network, name, radio, refs, origin
-        self.aims, self.places = aims, np.ascontiguousarray(path.places, np.float64)
+        self.aims, self.places = aims, np.asarray(path.places, np.float64)
         self.coefficient = np.atleast_2d(np.asarray(path.coefficient, np.complex128))
 
     def one_way(
@@ -208,8 +208,9 @@ class _PathFactors:
             )  # fmt: skip
             near_field.sums(self.places, array, error, gains, kept)
         fault = response_loops.one_way(
-            self.places, radio.station, axes, self.refs, self.origin, 0.5 * radio.turns, spacing, self.aims,
-            radio.kappa, kappas, squint, shape, self.coefficient, gains, out, excess,
+            np.ascontiguousarray(self.places.swapaxes(1, 2)), radio.station, axes, self.refs, self.origin,
+            0.5 * radio.turns, spacing, self.aims, radio.kappa, kappas, squint, shape, self.coefficient, gains, out,
+            excess,
         )  # fmt: skip
         if fault:
             raise InputError(

@@ -65,70 +65,105 @@ def beyond(across, up, side, z, r, spherical):
 
 
 @LOOPS
+def beyond_middle(side, z, r, inverse, across, up, spherical, out):
+    """Fill out (L,) with `beyond` for points at side, z (m) and range r; inverse: 1 / r."""
+    for i in range(np.uint64(len(out))):
+        out[i] = -(across * side[i] + up * z[i]) * inverse[i]
+    if spherical:
+        for i in range(np.uint64(len(out))):
+            step = across * (across - 2.0 * side[i]) + up * (up - 2.0 * z[i])
+            out[i] = step / (math.sqrt(r[i] * r[i] + step) + r[i])
+
+
+@LOOPS
+def geometry(x, y, z, station, axes, ref, origin, more, side, up, r, inverse):
+    """Fill (L,) arrays of points x, y, z (L,) m: excess range, coordinates along the array, range and 1 / range (m).
+
+    ref: a row of `precise.reference`; origin: (3,) m, its point. Returns how many points are in the station.
+    """
+    sine, cosine = axes
+    s0, s1, s2, o0, o1, o2 = station[0], station[1], station[2], origin[0], origin[1], origin[2]
+    rx, ry, rz, r_ref = ref[X], ref[Y], ref[Z], ref[RANGE]
+    zeros = 0
+    for i in range(np.uint64(len(x))):
+        across, along, high = x[i] - s0, y[i] - s1, z[i] - s2
+        a, b, d = x[i] - o0, y[i] - o1, z[i] - o2
+        far = math.sqrt(across * across + along * along + high * high)
+        # A count, unlike a branch or a least range, leaves this loop to vector instructions.
+        zeros += 1 if far == 0.0 else 0
+        # r^2 - r_ref^2 over r + r_ref: a difference of ranges without cancellation.
+        more[i] = (a * (2.0 * rx + a) + b * (2.0 * ry + b) + d * (2.0 * rz + d)) / (far + r_ref)
+        side[i], up[i], r[i], inverse[i] = cosine * along - sine * across, high, far, 1.0 / far
+    return zeros
+
+
+@LOOPS
+def scaled(own, weight, c, s, turn, real, imag):
+    """Fill real, imag (L,) with own weight (c + j s turn); own: complex, (1,) for all points or (L,)."""
+    if len(own) == 1:
+        a, b = own[0].real, own[0].imag
+        for i in range(np.uint64(len(real))):
+            x, y = weight[i] * c[i], weight[i] * (s[i] * turn[i])
+            real[i], imag[i] = a * x - b * y, a * y + b * x
+        return
+    for i in range(np.uint64(len(real))):
+        z = own[i] * complex(weight[i] * c[i], weight[i] * (s[i] * turn[i]))
+        real[i], imag[i] = z.real, z.imag
+
+
+@LOOPS
 def one_way(
     places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, squint, shape, coefficient, gains,
     out, excess,
 ):  # fmt: skip
     """Fill out (Q, N, L), one array's complex factors over one path at Q frequencies, and excess (N, L) (m).
 
-    places: (N, L, 3) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
+    places: (N, 3, L) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
     beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; shape: the array;
     coefficient: (N or 1, L or 1); gains: (Q, N, L) sums of `near_field` to use instead of the plane wave's, or empty.
     excess: range minus the reference's; with squint the range of the array's middle, else of its corner.
     Returns 0, or n L + l + 1 where r = 0.
     """
-    count = places.shape[1]
-    sine, cosine = axes
-    h, v, turn, weight = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    square, c, gain_h, gain_v, ct, st = (
-        np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count)
-    )  # fmt: skip
+    count = places.shape[2]
+    work = np.empty((15, count))
+    side, up, r, weight, middle = work[0], work[1], work[2], work[3], work[4]
+    turn, square, c, gain_h, gain_v = work[5], work[6], work[7], work[8], work[9]
+    ct, st, more, real, imag = work[10], work[11], work[12], work[13], work[14]
     spherical = gains.shape[0] > 0
     middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
     fixed = 0.5 * beam * (middle_h * aims[0] + middle_v * aims[1])
     wave = half_turns if squint else 0.5 * kappas[0] / spacing
-    each = min(1, coefficient.shape[1] - 1)
     for n in range(places.shape[0]):
-        rx, ry, rz, r_ref = refs[n, X], refs[n, Y], refs[n, Z], refs[n, RANGE]
-        ox, oy, oz = origin[n, 0], origin[n, 1], origin[n, 2]
-        least = np.inf
-        for i in range(count):
-            x, y, z = places[n, i, 0] - station[0], places[n, i, 1] - station[1], places[n, i, 2] - station[2]
-            a, b, d = places[n, i, 0] - ox, places[n, i, 1] - oy, places[n, i, 2] - oz
-            r = math.sqrt(x * x + y * y + z * z)
-            least = min(least, r)
-            inverse = 1.0 / r
-            # r^2 - r_ref^2 over r + r_ref: a difference of ranges without cancellation.
-            more = (a * (2.0 * rx + a) + b * (2.0 * ry + b) + d * (2.0 * rz + d)) / (r + r_ref)
-            side = cosine * y - sine * x
-            middle = beyond(middle_h * spacing, middle_v * spacing, side, z, r, spherical)
-            excess[n, i] = more + middle if squint else more
-            weight[i], h[i], v[i] = inverse, side * inverse, z * inverse
-            t = -half_turns * more - wave * middle - fixed
+        at, ahead = places[n], excess[n]
+        if geometry(at[0], at[1], at[2], station, axes, refs[n], origin[n], more, side, up, r, weight):
+            for i in range(count):
+                if r[i] == 0.0:
+                    return n * count + i + 1
+        beyond_middle(side, up, r, weight, middle_h * spacing, middle_v * spacing, spherical, middle)
+        for i in range(np.uint64(count)):
+            ahead[i] = more[i] + middle[i] if squint else more[i]
+            t = -half_turns * more[i] - wave * middle[i] - fixed
             turn[i] = t - np.rint(t)
             square[i] = turn[i] * turn[i]
-        if least == 0.0:
-            return n * count + 1
         horner(square, WAVE, COSINE, DEGREE, ct, count)
         horner(square, WAVE, SINE, DEGREE, st, count)
-        row = n % coefficient.shape[0]
-        for i in range(count):
-            own = coefficient[row, i * each]
-            out[0, n, i] = own * complex(weight[i] * ct[i], weight[i] * (st[i] * turn[i]))
-        # Go through the frequencies in reverse: entry 0 holds the factor that all others need.
-        for q in range(len(kappas) - 1, -1, -1):
+        scaled(coefficient[n % coefficient.shape[0]], weight, ct, st, turn, real, imag)
+        for q in range(len(kappas)):
+            own = out[q, n]
             if spherical:
-                for i in range(count):
-                    out[q, n, i] = out[0, n, i] * gains[q, n, i]
+                seen = gains[q, n]
+                for i in range(np.uint64(count)):
+                    own[i] = complex(real[i], imag[i]) * seen[i]
                 continue
-            for i in range(count):
-                turn[i] = 0.5 * (kappas[q] * h[i] - beam * aims[0])
+            for i in range(np.uint64(count)):
+                turn[i] = 0.5 * (kappas[q] * (side[i] * weight[i]) - beam * aims[0])
             array_sum(turn, shape[0], square, c, gain_h, count)
-            for i in range(count):
-                turn[i] = 0.5 * (kappas[q] * v[i] - beam * aims[1])
+            for i in range(np.uint64(count)):
+                turn[i] = 0.5 * (kappas[q] * (up[i] * weight[i]) - beam * aims[1])
             array_sum(turn, shape[1], square, c, gain_v, count)
-            for i in range(count):
-                out[q, n, i] = out[0, n, i] * (gain_h[i] * gain_v[i])
+            for i in range(np.uint64(count)):
+                gain = gain_h[i] * gain_v[i]
+                own[i] = complex(gain * real[i], gain * imag[i])
     return 0
 
 

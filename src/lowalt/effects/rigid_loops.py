@@ -8,27 +8,38 @@ LOOPS = kernel(error_model="numpy")
 
 
 @LOOPS
-def carried(rotation, translation, vectors, part, out):
-    """Fill out (N, L, 3) with rotation[n, part[l]] @ vectors[l] + translation[n, part[l]].
+def carried(rotation, translation, planes, part, out):
+    """Fill out (N, 3, L) with rotation[n, part[l]] @ planes[:, l] + translation[n, part[l]].
 
-    rotation: (N, P, 3, 3); translation: (N, P, 3); vectors: (L, 3); part: (L,).
+    rotation: (N, P, 3, 3); translation: (N, P, 3); planes: (3, L) coordinates; part: (L,). Points of a part that follow
+    each other pass through one loop, whose operations are done as written.
     """
+    count = len(part)
+    x, y, z = planes[0], planes[1], planes[2]
     for n in range(rotation.shape[0]):
-        for l in range(len(vectors)):  # noqa: E741
-            p = part[l]
-            x, y, z = vectors[l, 0], vectors[l, 1], vectors[l, 2]
+        first = 0
+        while first < count:
+            p, last = part[first], first
+            while last < count and part[last] == p:
+                last += 1
             for i in range(3):
-                turned = rotation[n, p, i, 0] * x + rotation[n, p, i, 1] * y + rotation[n, p, i, 2] * z
-                out[n, l, i] = turned + translation[n, p, i]
+                a, b, c, t = rotation[n, p, i, 0], rotation[n, p, i, 1], rotation[n, p, i, 2], translation[n, p, i]
+                row = out[n, i]
+                for l in range(np.uint64(first), np.uint64(last)):  # noqa: E741
+                    row[l] = a * x[l] + b * y[l] + c * z[l] + t
+            first = last
 
 
 def carry(rotation: np.ndarray, translation: np.ndarray | None, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Return rotation[n, part[l]] @ vectors[l] + translation[n, part[l]], (N, L, 3); no translation for directions."""
+    """Return rotation[n, part[l]] @ vectors[l] + translation[n, part[l]], (N, L, 3); no translation for directions.
+
+    In memory each coordinate of a symbol's points stands together, as the vector loops of `response_loops` take them.
+    """
     if translation is None:
         translation = np.zeros((*rotation.shape[:2], 3))
-    out = np.empty((len(rotation), len(vectors), 3))
+    out = np.empty((len(rotation), 3, len(vectors)))
     carried(
-        np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.ascontiguousarray(vectors),
+        np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.ascontiguousarray(vectors.T),
         np.asarray(part, np.int64), out,
     )  # fmt: skip
-    return out
+    return out.swapaxes(1, 2)

@@ -84,7 +84,7 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
     """Return the points' images (N, L, 3) m below the ground."""
-    mirrored = view.places.copy()
+    mirrored = view.places.copy(order="K")
     np.negative(mirrored[..., 2], out=mirrored[..., 2])
     return [mirrored]
 
