@@ -14,7 +14,7 @@ NODES = np.array([[0.0, 0, 0], [0.2, 0, 0.3], [-0.1, 0.2, 0.8]])
 
 def recorded(frames_hz: float, symbols: int = 4) -> tuple[Network, Cloud, dict]:
     """A recording of four frames that jump to and fro, and a radar with long symbols."""
-    radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=symbols, symbol_interval_s=1e-4)
+    radio = network(subcarrier_spacing_hz=15e3, subcarriers=64, symbols=symbols, symbol_interval_s=1e-4)
     _, row = target(NODES, x_m=60.0)
     rng = np.random.default_rng(5)
     empty = np.full((3, 3), np.nan)
@@ -45,3 +45,18 @@ def test_only_symbols_in_which_a_frame_begins_are_bent():
     assert 0 < symbol_motion.bent(view).sum() < 40
     still, plain = target(NODES, x_m=60.0)
     assert not symbol_motion.bent(observe(scene(radio, {}), radio.stations[0], still, plain)).any()
+
+
+def test_a_symbol_that_is_bent_once_needs_few_instants_before_and_after_its_bend():
+    radio, cloud, row = recorded(9e3)
+    view = observe(scene(radio, {}), radio.stations[0], cloud, row)
+    part = view.at(view.times_s[symbol_motion.bent(view)])
+    delays, weights = symbol_motion.pieces(part, 1e-13)
+    assert 4 < len(delays) < 50
+    # A ramp that changes its slope at the bend is followed at every sample.
+    frame = (row["start_s"] + part.times_s) * 9e3
+    bend = (np.ceil(frame) - frame) / 9e3
+    samples = np.arange(64) / 64 / 15e3
+    assert np.einsum("qnm,qn->nm", weights, abs(delays - bend)) == pytest.approx(
+        abs(samples - bend[:, None]), abs=1e-15
+    )

@@ -95,6 +95,9 @@ class Draws(np.random.Generator):
 
     def _below(self, width: int, count: int) -> np.ndarray:
         """`count` whole numbers below `width`, uint64; halves that Lemire's method rejects are skipped."""
+        if 2**32 % width == 0:
+            # Every half is accepted where the width is a power of two.
+            return (self._halves(count) * np.uint64(width)) >> np.uint64(32)
         parts, missing = [], count
         while missing:
             scaled = self._halves(missing) * np.uint64(width)

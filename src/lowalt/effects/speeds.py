@@ -63,9 +63,9 @@ class Speeds:
         A turn by a complex angle a + jb is cosh(b) times a turn plus j sinh(b) times another, so several in a row have
         an imaginary part of at most sinh of the sum of their |b|.
         """
-        angle = self.tilt_radps * imaginary_s + np.array(
-            [sum(self._imaginary_angle(moving, imaginary_s) for moving in chain) for chain in self._chains]
-        )
+        even, amplitudes, beats = self._turns
+        swung = amplitudes * np.sinh(np.minimum(beats * imaginary_s, 700.0))
+        angle = (self.tilt_radps + even) * imaginary_s + swung.sum(axis=1)
         return imaginary_s * (self.body_mps + self.node_mps) + self.reach_m * np.sinh(np.minimum(angle, 700.0))
 
     def _largest_rate(self, tables: list) -> float:
@@ -127,9 +127,19 @@ class Speeds:
             return amplitude * beat + self._added(part)
         return 2 * np.pi * abs(self.row["rate_hz"]) * self._factors[part] + self._added(part)
 
-    def _imaginary_angle(self, part: int, imaginary_s: float) -> float:
-        """Bound of the imaginary part of a part's angle at |Im t| <= `imaginary_s` (rad)."""
-        if self.cloud.kinds[part] == "wing":
-            amplitude, beat = self._beat(part)
-            return amplitude * np.sinh(min(beat * imaginary_s, 700.0)) + self._added(part) * imaginary_s
-        return self._rate(part) * imaginary_s
+    @cached_property
+    def _turns(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Each part's even angular rate, summed along its hinges (P,) (rad/s), and its wings' beats as in `_beat`.
+
+        Amplitudes and angular frequencies are (P, D), zero where a part hangs on fewer than D moving parts.
+        """
+        chains = self._chains
+        even, beats = np.zeros(len(chains)), np.zeros((2, len(chains), max(map(len, chains), default=0)))
+        for part, chain in enumerate(chains):
+            for order, moving in enumerate(chain):
+                if self.cloud.kinds[moving] == "wing":
+                    beats[:, part, order] = self._beat(moving)
+                    even[part] += self._added(moving)
+                else:
+                    even[part] += self._rate(moving)
+        return even, beats[0], beats[1]

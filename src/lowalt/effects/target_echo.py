@@ -101,7 +101,7 @@ class TargetEcho:
             part = view.at(view.times_s[bent])
             own = factor if np.ndim(factor) == 0 else _every_row(factor, len(samples))[..., bent, :]
             numbers = np.arange(len(self.view.times_s))[rows][bent]
-            samples[bent] = self._summed(part, on, own, numbers, moving.every_sample(part))
+            samples[bent] = self._summed(part, on, own, numbers, moving.pieces(part, self.error))
         return samples
 
     def _summed(
@@ -109,22 +109,24 @@ class TargetEcho:
     ) -> np.ndarray:
         """Time samples (N, M) of the target's echo from its response at instants of a symbol.
 
-        times: the instants (Q,) s and their interpolation weights (Q, M). Points are summed in groups that lose equally
-        many samples.
+        times: the instants (Q,) or (Q, N) s and their interpolation weights (Q, M) or (Q, N, M). Points are summed in
+        groups that lose equally many samples.
         """
         delays, weights = times
         groups: list[tuple[int, np.ndarray | float, np.ndarray | slice]] = [(0, factor, slice(None))]
         if "cyclic_prefix" in on:
             cut = self.by_need["cyclic_prefix"]
             first = cut.module.first_samples(cut.settings, view)
-            groups = [(int(count), factor * (first == count), _any_of(first == count)) for count in np.unique(first)]
+            chosen = [(count, first == count) for count in range(int(first.min()), int(first.max()) + 1)]
+            groups = [(count, factor * mine, _any_of(mine)) for count, mine in chosen if mine.any()]
             turned = cut.module.turn(cut.settings, view.network, waveform.baseband_hz(view.network))
         # Visibility and reflection coefficients stay during a symbol; only places move.
         held = self._paths if view is self.view else self._paths_of(view)
         samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
         now, before = self.sending.aired[rows], self.sending.aired_before[rows] if "cyclic_prefix" in on else None
         kept: dict = {}
-        seen = view.at_each(view.times_s + delays[:, None]) if "symbol_motion" in on else [view]
+        delays = delays if delays.ndim == 2 else delays[:, None]
+        seen = view.at_each(view.times_s + delays) if "symbol_motion" in on else [view]
         for later, weight in zip(seen, weights, strict=True):
             paths = held
             if held and later is not view:
@@ -137,7 +139,7 @@ class TargetEcho:
                 echo = waveform.transmit(spectrum, now[lit])
                 if count:
                     echo[:, :count] = waveform.transmit(spectrum * turned, before[lit])[:, :count]
-                echo *= weight
+                echo *= weight[lit] if weight.ndim == 2 else weight
                 samples[lit] += echo
         return samples
 

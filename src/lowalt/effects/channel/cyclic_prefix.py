@@ -6,8 +6,11 @@ its amplitude falls to 1 - e, and 1 - (1 - e)^2 of its power becomes interferenc
 point is cut at its direct delay, on the reflected paths too; other echoes are cut at the delay of their range cell.
 """
 
+import math
+
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.effects.prefix import length_s as length_s
 from lowalt.effects.prefix import turn as turn
@@ -42,13 +45,28 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     return np.where(2 * farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)
 
 
+@LEAN
+def _late(places, station, prefix_s, rate_hz, most, result):
+    """Fill result (N, L) as in `first_samples` for places (N, 3, L) m; rate_hz: samples a second; most: of a symbol."""
+    s0, s1, s2 = station[0], station[1], station[2]
+    for n in range(len(places)):
+        at, row = places[n], result[n]
+        for i in range(np.uint64(places.shape[2])):
+            x, y, z = at[0, i] - s0, at[1, i] - s1, at[2, i] - s2
+            delay = 2 * math.sqrt(x * x + y * y + z * z) / SPEED_OF_LIGHT
+            row[i] = np.int64(min(max(np.ceil((delay - prefix_s) * rate_hz), 0.0), most))
+
+
 def first_samples(settings: dict, view: View) -> np.ndarray:
     """Return the number (N, L) of each point's samples, at the window's start, that carry the previous symbol."""
     network = view.network
-    away = view.places - np.asarray(view.station.position_m)
-    delay = 2 * np.sqrt(np.einsum("nli,nli->nl", away, away)) / SPEED_OF_LIGHT
-    late = (delay - length_s(settings, network)) * network.subcarriers * network.subcarrier_spacing_hz
-    return np.clip(np.ceil(late), 0, network.subcarriers).astype(np.int64)
+    places, count = np.ascontiguousarray(view.places.swapaxes(1, 2)), network.subcarriers
+    result = np.empty((len(places), places.shape[2]), np.int64)
+    _late(
+        places, np.asarray(view.station.position_m, float), length_s(settings, network),
+        count * network.subcarrier_spacing_hz, count, result,
+    )  # fmt: skip
+    return result
 
 
 def convolved(
