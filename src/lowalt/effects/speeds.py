@@ -52,21 +52,22 @@ class Speeds:
         turning = np.zeros(len(self.cloud.kinds))
         for part, chain in enumerate(self._chains):
             for order, moving in enumerate(chain):
-                # Only the last hinge's distance is measured from the axis; earlier ones may turn it any way.
-                lever = self._arm(part) if moving == part else sum(self._lengths[part][order + 1 :])
-                turning[part] += self._rate(moving) * lever
+                turning[part] += self._rate(moving) * self._lever(part, order)
         return duration_s * (self.body_mps + self.node_mps + self.tilt_radps * self.reach_m + turning)
 
     def imaginary_m(self, imaginary_s: float) -> np.ndarray:
         """Return a bound (P,) of the imaginary part of positions at complex times, |Im t| <= `imaginary_s` (m).
 
         A turn by a complex angle a + jb is cosh(b) times a turn plus j sinh(b) times another, so several in a row have
-        an imaginary part of at most sinh of the sum of their |b|.
+        an imaginary part of at most sinh of the sum of their |b|, times what they turn: the attitude turns the whole
+        reach, the hinges only what lies beyond the first of them.
         """
         even, amplitudes, beats = self._turns
         swung = amplitudes * np.sinh(np.minimum(beats * imaginary_s, 700.0))
-        angle = (self.tilt_radps + even) * imaginary_s + swung.sum(axis=1)
-        return imaginary_s * (self.body_mps + self.node_mps) + self.reach_m * np.sinh(np.minimum(angle, 700.0))
+        tilt = np.full(len(even), min(self.tilt_radps * imaginary_s, 700.0))
+        angle = np.minimum(tilt + even * imaginary_s + swung.sum(axis=1), 700.0)
+        turned = self.reach_m * np.sinh(tilt) + self._hinged_m * np.sinh(angle)
+        return imaginary_s * (self.body_mps + self.node_mps) + turned
 
     def _largest_rate(self, tables: list) -> float:
         """Sum of the largest rates of tables (G, K) given at the motion effects' times."""
@@ -103,6 +104,22 @@ class Speeds:
             last = float(np.linalg.norm(mine - stops[-1], axis=1).max()) if len(mine) else 0.0
             result.append([*hops, last])
         return result
+
+    def _lever(self, part: int, order: int) -> float:
+        """Largest distance (m) that the turn about a hinge of a part's chain, the order-th, carries its points by."""
+        # Only the last hinge's distance is measured from the axis; earlier ones may turn it any way.
+        last = order == len(self._chains[part]) - 1
+        return self._arms[part] if last else sum(self._lengths[part][order + 1 :])
+
+    @cached_property
+    def _hinged_m(self) -> np.ndarray:
+        """Largest distance (P,) that the first hinge of each part's chain turns, zero without one (m)."""
+        return np.array([self._lever(part, 0) if chain else 0.0 for part, chain in enumerate(self._chains)])
+
+    @cached_property
+    def _arms(self) -> list[float]:
+        """Each part's `_arm`."""
+        return [self._arm(part) if chain else 0.0 for part, chain in enumerate(self._chains)]
 
     def _arm(self, part: int) -> float:
         """Largest distance of a part's points from its own axis (m)."""

@@ -13,7 +13,7 @@ from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects.channel.capsules import capsules
 from lowalt.effects.channel.shadow_rays import cast_rays
 from lowalt.effects.channel.shadows import GRID, balls_of, triangles
-from lowalt.effects.channel.surface_tree import tree
+from lowalt.effects.channel.surface_tree import whole_tree
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
@@ -84,13 +84,13 @@ def hidden(view: View, by: str = "all", known: np.ndarray | None = None) -> np.n
     offset = surfaces["offset_m"]
     start = cloud.points + np.where(has_normal[:, None], offset[:, None] * cloud.normals, 0.0)
     toward = np.where(has_normal, 0.0, offset / np.linalg.norm(view.aim_m - place))
+    motion = view.motion._replace(points=start)
+    # Rotors turn too far from symbol to symbol for lists of directions to pay.
+    if not cloud.parts_of("rotor") and by != "blades":
+        return cast_rays(place, motion, toward, surfaces["vertices"], whole_tree(surfaces)) | result
     owner = surfaces["vertex_part"]
     blade = np.isin(owner[surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
     faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
-    motion = view.motion._replace(points=start)
-    # Rotors turn too far from symbol to symbol for lists of directions to pay.
-    if not cloud.parts_of("rotor"):
-        return cast_rays(place, motion, toward, surfaces["vertices"], tree(surfaces, faces)) | result
     # Project only the corners of the surfaces that count.
     wanted = np.zeros(len(owner), np.bool_)
     wanted[faces] = True

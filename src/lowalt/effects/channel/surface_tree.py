@@ -5,6 +5,7 @@ next, up to one node a part. Nodes stand in depth-first order: a node's contents
 after them. Source: Morton, A Computer Oriented Geodetic Data Base, IBM 1966, for the curve.
 """
 
+import weakref
 from typing import NamedTuple
 
 import numpy as np
@@ -80,6 +81,21 @@ def fill(low, high, begin, end, node, centre, radius_m, skip, face):
             face[at] = begin + leaf if wide == 1 else -1
             wide *= FAN
     return start[leaves]
+
+
+_TREES: dict[tuple[int, ...], tuple[list[weakref.ref], Tree]] = {}
+"""Trees of all triangles of a target, with the arrays they are of, by these arrays' identities."""
+
+
+def whole_tree(surfaces: dict) -> Tree:
+    """Return the tree of all triangles of a target's surfaces, made once as long as their arrays live."""
+    arrays = [surfaces[name] for name in ("vertices", "vertex_part", "faces", "closed")]
+    key = tuple(map(id, arrays))
+    held, found = _TREES.get(key, ([], None))
+    if found is None or any(reference() is not array for reference, array in zip(held, arrays, strict=True)):
+        found = tree(surfaces, surfaces["faces"])
+        _TREES[key] = [weakref.ref(array, lambda _: _TREES.pop(key, None)) for array in arrays], found
+    return found
 
 
 def tree(surfaces: dict, faces: np.ndarray) -> Tree:

@@ -42,9 +42,8 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = Tru
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
     """Return the converter's range: a component's root mean square over the look, times the back-off."""
-    peak = float(np.abs(samples).max())
-    rms = peak * math.sqrt(np.mean(np.abs(samples / peak) ** 2) / 2) if peak > 0 else 0.0
-    return rms * 10 ** (backoff_db / 20)
+    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
+    return math.sqrt(float(np.mean(np.square(parts)))) * 10 ** (backoff_db / 20)
 
 
 def step(settings: dict, samples: np.ndarray) -> float:
