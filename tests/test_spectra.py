@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 import reference_spectra as reference
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.spectra import Fourier, Spectra, Transfer, magnitudes, trp, vrp, vt, windows
+from lowalt.spectra import NAMES, Fourier, Spectra, Transfer, magnitudes, spectrum, trp, vrp, vt, windows, zero_index
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 
 INTERVAL = 2.5e-3
@@ -60,7 +60,7 @@ def test_batches_are_single_signals():
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-@pytest.mark.parametrize(("window", "points"), [(256, 256), (8, 1024), (2, 2), (4, 64), (16, 16)])
+@pytest.mark.parametrize(("window", "points"), [(256, 256), (8, 1024), (2, 8), (4, 64), (16, 16)])
 def test_sliding_transform_is_the_definition(dtype, window, points):
     signal = noise(400, seed=4).astype(np.complex128 if dtype == np.float64 else np.complex64)
     expected = np.fft.ifftshift(magnitudes(signal, Fourier(window, 1, points)), axes=0)
@@ -108,6 +108,11 @@ def test_speed_of_a_receding_point_is_read_back(speed):
     transition = np.abs(vt(echo, CARRIER, INTERVAL)[:, 70])
     # A steady point gains nothing at its own speed: |9|^2 (8/9)^2 - |8|^2 = 0.
     assert transition[np.abs(speeds - speed).argmin()] < 1e-9 * transition.max()
+    # Figures print speeds along the rows, from that of the first row to that of the last.
+    first, last = spectrum("vrp").speeds(Spectra()["vrp"], CARRIER, INTERVAL)
+    assert first + (last - first) * vrp(echo)[:, 70].argmax() / 256 == pytest.approx(speed, abs=(first - last) / 512)
+    first, last = spectrum("vt").speeds(Spectra()["vt"], CARRIER, INTERVAL)
+    assert first + (last - first) * transition.argmin() / 122 == pytest.approx(speed, abs=1e-9)
 
 
 def test_laws_of_scale_and_delay():
@@ -129,16 +134,28 @@ def test_a_signal_no_longer_than_a_window_is_refused_by_name(symbols):
         vrp(noise(symbols))
     with pytest.raises(InputError, match="vrp"):
         Spectra().check(symbols)
-    with pytest.raises(InputError, match="vt"):
+    with pytest.raises(InputError, match="spectrum trp"):
+        trp(noise(8))
+    with pytest.raises(InputError, match="spectrum vt"):
         vt(noise(8), CARRIER, INTERVAL)
 
 
-def test_a_signal_that_is_not_finite_is_refused():
+def test_a_signal_needs_a_hop_more_than_the_window():
+    steps = Spectra(vrp=Fourier(256, 5, 256))
+    steps.check(261)
+    with pytest.raises(InputError, match="at least 261 symbols"):
+        steps.check(260)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_signal_that_is_not_finite_is_refused(value):
     signal = noise(400)
-    signal[3] = np.nan
+    signal[3] = value
     for function in (vrp, trp, lambda s: vt(s, CARRIER, INTERVAL)):
         with pytest.raises(InputError, match="NaN"):
             function(signal)
+    with pytest.raises(InputError, match="expected"):
+        trp(np.complex128(1))
 
 
 BLOCK = {
@@ -146,6 +163,18 @@ BLOCK = {
     "trp": {"window": 8, "hop": 1, "points": 1024},
     "vt": {"window": 8, "hop": 1, "speed_min_mps": -6.1, "speed_max_mps": 6.1, "speed_step_mps": 0.1},
 }
+
+
+def test_spectra_stand_in_the_catalogue_s_order_with_their_settings():
+    assert [zero_index(name) for name in NAMES] == [0, 0, 128]
+    short, long = Fourier(8, 3, 16), Fourier(64, 2, 128)
+    two = Spectra(trp=short, vrp=long)
+    assert list(two.items()) == [("vrp", long), ("trp", short)] and len(two) == 2
+    assert vrp(noise(400), two).shape == (128, 168) and trp(noise(400), two).shape == (16, 130)
+    with pytest.raises(InputError, match="none named"):
+        Spectra.from_settings({})
+    with pytest.raises(InputError, match="cwt"):
+        Spectra.from_settings({"cwt": {}})
 
 
 def test_settings_default_to_the_published_ones():
@@ -158,6 +187,12 @@ def test_settings_default_to_the_published_ones():
     [
         ("vrp", {"window": 255}, "255"),
         ("vrp", {"points": 128}, "128"),
+        ("trp", {"window": 1}, "window is 1"),
+        ("trp", {"hop": True}, "hop is True"),
+        ("vt", {"window": 0}, "window is 0"),
+        ("vt", {"hop": 0}, "hop is 0"),
+        ("vt", {"speed_step_mps": True}, "step_mps is True"),
+        ("vt", {"speed_min_mps": 6.1}, "min < max"),
         ("trp", {"hop": 0}, "hop"),
         ("trp", {"overlap": 3}, "overlap"),
         ("vt", {"speed_step_mps": 0}, "step"),

@@ -27,6 +27,8 @@ def test_accuracy_and_confusion_count_what_a_loop_counts():
         chosen = [a == b for a, b, g in zip(labels, guesses, groups, strict=True) if g == group]
         assert number == len(chosen)
         assert share == pytest.approx(sum(chosen) / len(chosen), abs=1e-15)
+    # Classes without a sample have their rows too.
+    assert statistics.confusion(np.array([1]), np.array([0]), 3).tolist() == [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
 
 
 def test_bootstrap_interval_covers_the_truth_of_clustered_samples_and_a_naive_one_would_not():
@@ -140,8 +142,27 @@ def test_calibration_of_a_perfectly_calibrated_and_of_an_overconfident_model():
     assert found["brier"] == pytest.approx(2 * (1 - right.mean()), abs=1e-12)
 
 
-def test_cross_entropy_of_a_uniform_guess_is_log_four():
+def test_bands_of_confidence_are_fifteen_of_equal_width():
+    """0.66 and 0.67 lie on two sides of 10/15; a certain guess belongs to the last band, with one of 0.95."""
+    top = np.array([0.66, 0.67, 1.0, 0.95])
+    probabilities, labels = np.stack([top, 1 - top], 1), np.array([1, 0, 1, 0])
+    bands = statistics.reliability(probabilities, labels)
+    assert bands == [(9 / 15, 10 / 15, 0.66, 0.0, 1), (10 / 15, 11 / 15, 0.67, 1.0, 1), (14 / 15, 1.0, 0.975, 0.5, 2)]
+    found = statistics.calibration(probabilities, labels)
+    assert found["calibration_error"] == pytest.approx((0.66 + 0.33 + 0.95) / 4)
+    assert found["brier"] == pytest.approx(2 * (0.66**2 + 0.33**2 + 1 + 0.05**2) / 4)
+
+
+def test_the_pareto_front_has_no_point_that_another_betters():
+    cost, value = np.array([1, 2, 2, 3, 3, np.nan, 1]), np.array([5, 7, 6, 7, 9, 9, np.nan])
+    assert statistics.pareto(cost, value).tolist() == [True, True, False, False, True, False, False]
+    # Equal points do not better each other.
+    assert statistics.pareto(np.ones(2), np.ones(2)).all()
+
+
+def test_cross_entropy_of_a_uniform_guess_is_log_four_and_of_an_impossible_label_finite():
     assert statistics.cross_entropy(np.full((7, 4), 0.25), np.arange(7) % 4) == pytest.approx(math.log(4))
+    assert statistics.cross_entropy(np.array([[1.0, 0.0]]), np.array([1])) == pytest.approx(1022 * math.log(2))
 
 
 @settings(deadline=None)
@@ -157,12 +178,27 @@ def test_threshold_is_the_largest_that_detects_enough(detection, uavs):
         assert (scores[labels == 0] >= higher[0]).mean() < detection
 
 
+@pytest.mark.parametrize("detection", [0.0, 0.07, 0.5, 0.9, 1.0])
+def test_a_weighted_threshold_is_that_of_scores_that_stand_as_often_as_their_weights(detection):
+    """0.07 times 100 is a little more than 7 in floating point: still seven samples are enough."""
+    assert statistics.threshold(np.arange(100.0), np.zeros(100, int), detection) == 100 - max(round(100 * detection), 1)
+    rng = stream(5, "weighted")
+    scores, weights = rng.permutation(40) / 40, rng.integers(0, 5, 40)
+    weights[0] += 100 - weights.sum()
+    repeated = np.repeat(scores, weights)
+    expected = statistics.threshold(repeated, np.zeros(100, int), detection)
+    if detection:
+        assert statistics._weighted_threshold(scores, weights.astype(float), detection) == expected
+
+
 def test_alarm_rates_are_shares_of_each_class():
     scores = np.array([0.9, 0.2, 0.8, 0.1, 0.7, 0.7, 0.0])
     labels = np.array([0, 0, 1, 1, 2, 2, 3])
     detected, alarms = statistics.alarm_rates(scores, labels, 0.7, 4)
     assert detected == 0.5
     assert alarms.tolist() == [0.5, 1.0, 0.0]
+    # No sample of the fifth class.
+    assert np.isnan(statistics.alarm_rates(scores, labels, 0.7, 5)[1]).tolist() == [False, False, False, True]
 
 
 def alarm_part(rng, models, name, samples=3):
@@ -195,6 +231,49 @@ def test_the_95_percent_interval_of_a_false_alarm_rate_is_196_standard_errors_wi
     test = statistics.AlarmPart(np.where(np.arange(800) % 2, 0.9, 0.1), label, names, label)
     _, (low, high) = statistics.alarm_intervals([validation], [test], 0.9, False, stream(3, "a"), 2, 2000)
     assert (high - low) / 2 == pytest.approx(1.96 * np.sqrt(0.25 / 400), rel=0.08)
+
+
+def two_subtypes(first, second):
+    """Forty UAVs of two subtypes with these scores and a bird of score 0, each a motion model of its own."""
+    score = np.repeat([first, second, 0.0], [20, 20, 1])
+    names = np.array([f"m{number}" for number in range(41)])
+    return statistics.AlarmPart(score, np.repeat([0, 1], [40, 1]), names, np.repeat([0, 1, 2], [20, 20, 1]))
+
+
+def test_alarm_intervals_draw_seeds_and_where_asked_subtypes_of_the_test_part():
+    good, bad, halves = two_subtypes(0.9, 0.9), two_subtypes(0.3, 0.3), two_subtypes(0.9, 0.3)
+
+    def bounds(validation, test, whole, classes=1, detection=0.9):
+        return statistics.alarm_intervals(validation, test, detection, whole, stream(1, "a"), classes, 300).tolist()
+
+    # Scores of 0.9 are set on, so those of 0.3 are missed. Half the models are found, and which half is up to chance.
+    ((low, high),) = bounds([good], [halves], False)
+    assert 0.3 < low < 0.5 < high < 0.7
+    # Whole subtypes are found or missed; so are whole seeds.
+    assert bounds([good], [halves], True) == [[0.0, 1.0]]
+    assert bounds([good, good], [good, bad], False) == [[0.0, 1.0]]
+    # Subtypes of the validation part are never drawn: a tenth of it stays below the threshold, so 0.5 is found.
+    assert bounds([two_subtypes(0.9, 0.3)], [two_subtypes(0.5, 0.5)], True) == [[1.0, 1.0]]
+    # Whether more than half of the drawn validation samples have the higher score is up to chance.
+    assert bounds([halves], [two_subtypes(0.5, 0.5)], False, detection=0.5) == [[0.0, 1.0]]
+    # A class without samples has no rates.
+    assert np.isnan(bounds([good], [halves], False, 3)).all()
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_a_difference_counts_each_motion_model_by_its_samples(whole):
+    """Fifty models of nine samples are right and fifty of one are wrong, each a subtype of its own."""
+    count, one = np.repeat([9, 1], 50), np.repeat([1.0, 0.0], 50)[None]
+    found = intervals.strict_difference(one, np.zeros_like(one), count, np.arange(100), whole, stream(1, "d"), 400)
+    assert found.value == pytest.approx(0.9)
+    assert 0.8 < found.low < 0.9 < found.high < 0.95
+
+
+def test_one_seed_and_one_subtype_leave_nothing_to_draw():
+    one = stream(1, "one").random((1, 30))
+    given = np.zeros_like(one), np.ones(30), np.zeros(30)
+    found = intervals.strict_difference(one, *given, True, stream(1, "d"), 50)
+    assert found == pytest.approx((one.mean(),) * 3)
 
 
 @pytest.mark.parametrize(("uavs", "detection", "expected"), [(100, 0.9, True), (99, 0.9, False), (300, 0.99, False)])
