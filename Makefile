@@ -103,7 +103,7 @@ fuzz: $(TESTING)  ## 2000 damaged files for every reader of files: results/bench
 MUTANTS ?= 25
 MINUTES ?= inf
 mutants: $(TESTING)  ## set small faults into every room of the package, one at a time, and count those that the tests notice: results/benchmarks/mutants.csv
-	$(BIN)/python benchmarks/mutants.py --count $(MUTANTS) --minutes $(MINUTES) $(if $(ROOMS),--rooms $(ROOMS)) \
+	$(BIN)/python benchmarks/mutants.py --count $(MUTANTS) --minutes $(MINUTES) $(if $(ROOMS),--rooms $(ROOMS) $(if $(NEAR),--near)) \
 		--out results/benchmarks/mutants.csv --survivors results/benchmarks/mutants_survivors.csv
 
 lint:  ## ruff, snakefmt, mypy, snakemake --lint

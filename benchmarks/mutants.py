@@ -5,10 +5,13 @@
 For each room of `src/lowalt` a number of faults is drawn by seed. Each is set into a copy of the tree, and the tests
 that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too long.
 Maps of tests and outcomes are kept in `--kept`; the same command goes on where the last one stopped. Rooms take turns,
-so that all of them have about as many outcomes when time is up.
+so that all of them have about as many outcomes when time is up. The list of survivors holds every fault that survived
+a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay.
 """
 
 import argparse
+import csv
+import math
 import os
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -19,14 +22,33 @@ from queue import Queue
 import numpy as np
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, measure, shown_tests
+from mutation.forked import load
 from mutation.kept import Kept
 from mutation.trials import Outcome, copy_of_tree, trial
 
 from lowalt.common.csv_tables import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
-COLUMNS = ("room", "places", "drawn", "tried", "killed", "by_time", "survived", "killed_percent")
-SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after")
+COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_time", "survived", "killed_percent",
+           "low_percent", "high_percent")  # fmt: skip
+"""`survived_first`: before tests were added; `low_percent`, `high_percent`: 95 % interval of `killed_percent`."""
+SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
+_COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "plan", "portable", "splits", "turns")
+_TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
+NEAR = {
+    "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
+    "spectra": ("spectra", "tiles_device"),
+    "shards": ("shards", "dataset"),
+    "targets": _TARGETS,
+    "common": _COMMON,
+}
+"""How the names of files of tests of a room begin, where not by the room's name alone."""
+
+
+def near(root: Path, asked: list[str]) -> list[str]:
+    """Files of tests that are named after one of these rooms."""
+    begins = tuple(f"test_{name}" for room in asked for name in NEAR.get(room, (room,)))
+    return sorted(path.name for path in (root / "tests").glob("test_*.py") if path.name.startswith(begins))
 
 
 def rooms(root: Path) -> dict[str, list[Mutant]]:
@@ -41,12 +63,13 @@ def rooms(root: Path) -> dict[str, list[Mutant]]:
     return found
 
 
-def run(root: Path, found: Coverage, drawn: list[Mutant], asked: argparse.Namespace, until: float) -> list[Outcome]:
+def run(
+    root: Path, found: Coverage, drawn: list[Mutant], asked: argparse.Namespace, until: float, kept: Kept
+) -> list[Outcome]:
     """Try faults in `asked.jobs` copies of the tree at a time, in the order given, until time is up."""
     trees: Queue = Queue()
     for job in range(asked.jobs):
         trees.put(copy_of_tree(root, asked.kept.resolve() / f"tree-{job}"))
-    kept = Kept(asked.kept / "outcomes.jsonl", root)
 
     def one(mutant: Mutant) -> Outcome | None:
         """Try one fault in a tree that is free."""
@@ -67,25 +90,44 @@ def run(root: Path, found: Coverage, drawn: list[Mutant], asked: argparse.Namesp
         return [outcome for outcome in pool.map(one, drawn) if outcome]
 
 
-def survivor_row(root: Path, outcome: Outcome) -> dict:
-    """A line of the table of survivors: where the fault stood, and the line before and after."""
+def wilson(part: int, whole: int) -> tuple[float, float]:
+    """Return the 95 % interval of a share. Source: Wilson, J. Am. Stat. Assoc. 22, 1927."""
+    share, z = part / whole, 1.959964
+    middle = (share + z**2 / (2 * whole)) / (1 + z**2 / whole)
+    half = z / (1 + z**2 / whole) * math.sqrt(share * (1 - share) / whole + z**2 / (4 * whole**2))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def survivor_row(root: Path, outcome: Outcome, verdicts: dict[tuple, str]) -> dict:
+    """A line of the table of survivors: where the fault stood, the line before and after, and what became of it."""
     source = (root / outcome.mutant.file).read_text(encoding="utf-8")
     before, after = source.splitlines(), mutated(source, outcome.mutant).splitlines()
     changed = next(i for i in range(len(before)) if i >= len(after) or before[i] != after[i])
-    return {**outcome.mutant._asdict(), "tests": outcome.tests, "before": before[changed].strip(),
-            "after": after[changed].strip() if changed < len(after) else ""}  # fmt: skip
+    lines = before[changed].strip(), after[changed].strip() if changed < len(after) else ""
+    verdict = "test added" if outcome.killed else verdicts.get((outcome.mutant.file, *lines), "open")
+    return {**outcome.mutant._asdict(), "tests": outcome.tests, "before": lines[0], "after": lines[1],
+            "now": "killed" if outcome.killed else "survives", "verdict": verdict}  # fmt: skip
 
 
-def room_rows(places: dict[str, list], drawn: dict[str, list], outcomes: list[Outcome]) -> list[dict]:
+def kept_verdicts(path: Path) -> dict[tuple, str]:
+    """Verdicts on survivors in a kept table, by (file, line before, line after)."""
+    if not path.exists():
+        return {}
+    with path.open(encoding="utf-8", newline="") as file:
+        return {(row["file"], row["before"], row["after"]): row["verdict"] for row in csv.DictReader(file)}
+
+
+def room_rows(places: dict[str, list], drawn: dict[str, list], outcomes: list[Outcome], kept: Kept) -> list[dict]:
     """Lines of the table by room: places for faults, faults drawn and tried, and how the tried ones ended."""
     rows = []
     for room, chosen in drawn.items():
         mine = [outcome for outcome in outcomes if outcome.mutant in set(chosen)]
         killed = sum(outcome.killed for outcome in mine)
-        share = f"{100 * killed / len(mine):.1f}" if mine else ""
-        values = (room, len(places[room]), len(chosen), len(mine), killed, sum(outcome.late for outcome in mine),
-                  len(mine) - killed, share)  # fmt: skip
-        rows.append(dict(zip(COLUMNS, values, strict=True)))
+        first = sum(kept.survived_once(outcome.mutant) for outcome in mine)
+        shares = (killed / len(mine), *wilson(killed, len(mine))) if mine else ()
+        values = (room, len(places[room]), len(chosen), len(mine), first, killed, sum(each.late for each in mine),
+                  len(mine) - killed, *(f"{100 * share:.1f}" for share in shares))  # fmt: skip
+        rows.append(dict(zip_longest(COLUMNS, values, fillvalue="")))
     return rows
 
 
@@ -97,26 +139,34 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--kept", type=Path, default=Path("results/mutants"), help="folder of maps and outcomes")
     parser.add_argument("--count", type=int, default=25, help="faults a room")
     parser.add_argument("--rooms", nargs="*", help="these rooms only")
+    parser.add_argument("--near", action="store_true", help="only files of tests named after these rooms, see NEAR")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--limit", type=float, default=40, help="seconds of tests shown to a fault")
+    parser.add_argument("--nice", type=int, default=19, help="added to the priority number of the process")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin nothing new after this time")
     asked = parser.parse_args(argv)
-    os.nice(19)
+    os.nice(asked.nice)
+    load()
     until = time.monotonic() + 60 * asked.minutes
-    found = measure(ROOT, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)
+    names = near(ROOT, asked.rooms) if asked.near else sorted(path.name for path in (ROOT / "tests").glob("test_*.py"))
+    found = measure(ROOT, names, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)
     if found is None:
         print(f"time is up; the map of tests goes on with the next call ({asked.kept})")
         return
-    places = {room: mutants for room, mutants in rooms(ROOT).items() if not asked.rooms or room in asked.rooms}
+    every = rooms(ROOT)
+    places = {room: every[room] for room in asked.rooms or every}
     drawn = {
         room: draw(mutants, asked.count, np.random.default_rng([asked.seed, *room.encode()]))
         for room, mutants in places.items()
     }
     in_turn = [mutant for mutant in chain(*zip_longest(*drawn.values())) if mutant]
-    outcomes = run(ROOT, found, in_turn, asked, until)
-    write_csv(asked.out, COLUMNS, room_rows(places, drawn, outcomes))
-    write_csv(asked.survivors, SURVIVORS, [survivor_row(ROOT, each) for each in outcomes if not each.killed])
+    kept = Kept(asked.kept / "outcomes.jsonl", ROOT)
+    outcomes = run(ROOT, found, in_turn, asked, until, kept)
+    write_csv(asked.out, COLUMNS, room_rows(places, drawn, outcomes, kept))
+    verdicts = kept_verdicts(asked.survivors)
+    once = [survivor_row(ROOT, each, verdicts) for each in outcomes if kept.survived_once(each.mutant)]
+    write_csv(asked.survivors, SURVIVORS, once)
     print(f"{len(outcomes)} of {len(in_turn)} faults tried, {sum(each.killed for each in outcomes)} killed")
 
 

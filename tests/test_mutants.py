@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
+from mutants import wilson
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, shown_tests
 from mutation.kept import Kept
@@ -142,6 +143,17 @@ def test_outcomes_are_kept_until_the_source_or_a_survivor_s_tests_change(tree):
     (tree / "src/lowalt/reach.py").write_text(SOURCE + "# edited\n")
     tried(one, True), tried(two, False)
     assert calls == [one, two, two, one, two]
+    # A survivor that a new test kills is still known as one.
+    tests.append("tests/test_reach.py::test_more")
+    tried(two, True)
+    kept = Kept(tree / "kept.jsonl", tree)
+    assert [kept.survived_once(each) for each in (one, two)] == [False, True]
+
+
+def test_rates_have_wilson_s_interval():
+    """A known case of the formula: 8 of 10 lie between 49.0 and 94.3 percent."""
+    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=5e-4)
+    assert wilson(5, 5) == pytest.approx((0.566, 1.0), abs=5e-4) and wilson(0, 5)[0] == pytest.approx(0)
 
 
 def test_a_copy_of_the_tree_follows_the_checkout_and_keeps_machine_code(tmp_path):

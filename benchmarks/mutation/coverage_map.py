@@ -28,13 +28,13 @@ class Coverage(NamedTuple):
     seconds: dict[str, float]
 
 
-def measure(root: Path, folder: Path, jobs: int, go_on: Callable[[], bool]) -> Coverage | None:
-    """Run each file of tests once under coverage unless its map is kept in `folder`; None where time was up before.
+def measure(root: Path, files: list[str], folder: Path, jobs: int, go_on: Callable[[], bool]) -> Coverage | None:
+    """Run each of the `files` of tests once under coverage unless its map is kept in `folder`; None where time was up.
 
     A test that fails without a fault cannot judge one: it is named and left out.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    names = [f"tests/{path.name}" for path in sorted((root / "tests").glob("test_*.py"))]
+    names = [f"tests/{name}" for name in files]
 
     def one(name: str) -> Coverage | None:
         """The map of a file of tests, from `folder` where it is kept."""

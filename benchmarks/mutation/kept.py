@@ -25,10 +25,13 @@ class Kept:
         """path: made where it is missing; root: of the repository whose sources the faults are set into."""
         self.path, self.root = path, root
         self.rows: dict[str, dict] = {}
+        self.once: set[str] = set()
         if path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 row = json.loads(line)
                 self.rows[row["fault"]] = row
+                if not row["killed"]:
+                    self.once.add(row["fault"])
 
     def _fault(self, mutant: Mutant) -> str:
         """The name of a fault in the source as it stands now."""
@@ -38,6 +41,10 @@ class Kept:
         """The name of tests with the files they stand in."""
         files = sorted({test.partition("::")[0] for test in tests})
         return _digest(*tests, *((self.root / file).read_text(encoding="utf-8") for file in files))
+
+    def survived_once(self, mutant: Mutant) -> bool:
+        """Whether the fault survived a trial, be it killed now by a test that was added."""
+        return self._fault(mutant) in self.once
 
     def outcome(self, mutant: Mutant, tests: list[str]) -> Outcome | None:
         """The kept outcome, None where the fault is not known."""
@@ -53,6 +60,8 @@ class Kept:
             found = try_it()
             row = {"fault": self._fault(mutant), "shown": self._tests(tests), **found._asdict()}
             self.rows[row["fault"]] = row
+            if not found.killed:
+                self.once.add(row["fault"])
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
         return found

@@ -1,9 +1,9 @@
 """A fault set into a copy of the tree, and the tests shown to it. Copies stay, so that their machine code is kept."""
 
+import hashlib
 import os
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mutation.candidates import Mutant, mutated
+from mutation.forked import run_tests
 
 
 class Outcome(NamedTuple):
@@ -25,10 +26,13 @@ class Outcome(NamedTuple):
 def copy_of_tree(root: Path, folder: Path) -> Path:
     """A copy of the checkout's files, with its environment linked, in which faults can be set.
 
-    A copy that is there already gets the files that changed, and keeps its machine code.
+    A copy that is there already gets the files that changed, and keeps its machine code. A new one gets the
+    checkout's machine code.
     """
     files = subprocess.run(["git", "ls-files", "-z"], cwd=root, check=True, capture_output=True, text=True).stdout
     names = {name for name in files.split("\0") if name and (root / name).is_file()}
+    compiled = [*(root / "src").rglob("*.nbi"), *(root / "src").rglob("*.nbc")] if not folder.exists() else []
+    names |= {str(path.relative_to(root)) for path in compiled}
     for path in [*folder.glob("src/**/*.py"), *folder.glob("tests/**/*.py")]:
         if str(path.relative_to(folder)) not in names:
             path.unlink()
@@ -59,7 +63,10 @@ def _fault(path: Path, text: str) -> Iterator[None]:
         finally:
             path.write_text(source, encoding="utf-8")
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
-            for entry in (path.parent / "__pycache__").glob(lists):
+            for entry in [
+                *(path.parent / "__pycache__").glob(lists),
+                *path.parent.glob(f"__pycache__/{path.stem}.*.pyc"),
+            ]:
                 entry.unlink()
             for entry in Path(aside).iterdir():
                 shutil.copy2(entry, path.parent / "__pycache__")
@@ -74,18 +81,10 @@ def trial(tree: Path, mutant: Mutant, tests: list[str], seconds: float) -> Outco
     if not tests:
         return Outcome(mutant, False, 0)
     path = tree / mutant.file
-    environment = os.environ | {"PYTHONPATH": f"{tree}/src", "PYTHONDONTWRITEBYTECODE": "1"}
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
-    late = False
+    good = hashlib.sha256(path.read_bytes()).digest()
     with _fault(path, mutated(path.read_text(encoding="utf-8"), mutant)):
-        run = subprocess.Popen(command, cwd=tree, env=environment, stdout=subprocess.DEVNULL,
-                               stderr=subprocess.DEVNULL, start_new_session=True)  # fmt: skip
-        try:
-            ended = run.wait(180 + 5 * seconds)
-        except subprocess.TimeoutExpired:
-            late, ended = True, 1
-            os.killpg(run.pid, 9)
-            run.wait()
+        ended = run_tests(tree, tests, 180 + 5 * seconds, path, good)
+    late = ended is None
     # 1: a test failed; 2 to 4: its file cannot be imported; 5: all tests named were left out, which is no judgement.
     if ended == 5:
         raise RuntimeError(f"{mutant.file}:{mutant.line}: pytest ran none of {tests}")
