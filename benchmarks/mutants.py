@@ -114,7 +114,7 @@ def kept_verdicts(path: Path) -> dict[tuple, str]:
     if not path.exists():
         return {}
     with path.open(encoding="utf-8", newline="") as file:
-        return {(row["file"], row["before"], row["after"]): row["verdict"] for row in csv.DictReader(file)}
+        return {(row["file"], row["before"], row["after"]): row.get("verdict", "open") for row in csv.DictReader(file)}
 
 
 def room_rows(places: dict[str, list], drawn: dict[str, list], outcomes: list[Outcome], kept: Kept) -> list[dict]:

@@ -65,6 +65,31 @@ def test_bad_input_is_refused(signal, snr_db):
         add_noise(np.array(signal), snr_db, np.random.default_rng(1))
 
 
+def test_a_power_that_is_given_stands_for_the_signal_s_own():
+    signal = 3 * np.exp(1j * np.arange(50))
+    given = add_noise(np.zeros(50), 3.0, np.random.default_rng(1), 9.0)
+    np.testing.assert_allclose(given, add_noise(signal, 3.0, np.random.default_rng(1)) - signal, atol=1e-14)
+    assert np.array_equal(add_noise(signal, 3.0, np.random.default_rng(1), 0.0), signal)
+    for power in (-1.0, math.inf, math.nan):
+        with pytest.raises(InputError, match="noise: power"):
+            add_noise(signal, 3.0, np.random.default_rng(1), power)
+
+
+def test_each_echo_has_noise_of_its_own_power_as_the_canceller_leaves_it():
+    rows = [{"subtype": "crow", "model": 4}, {"subtype": "owl", "model": 9}]
+    echoes, powers = np.exp(1j * np.arange(3 * 2 * 40)).reshape(3, 2, 40), np.arange(1.0, 7.0).reshape(3, 2)
+    plain = noisy_signals(echoes, rows, ["A", "B", "C"], [3.0, math.inf], 1, powers)
+    unit = noisy_signals(0 * echoes, rows, ["A", "B", "C"], [3.0], 1, np.ones((3, 2)))[:, 0]
+    expected = echoes.swapaxes(0, 1) + np.sqrt(powers.T)[..., None] * unit
+    np.testing.assert_allclose(plain[:, 0], expected, atol=1e-6)
+    turned = noisy_signals(echoes, rows, ["A", "B", "C"], [3.0, math.inf], 1, powers, lambda noise: -2 * noise)
+    np.testing.assert_allclose(turned[:, 0] - plain[:, 0], -3 * (plain[:, 0] - plain[:, 1]), atol=2e-5)
+    assert np.array_equal(turned[:, 1], plain[:, 1])
+    # Echoes that hold the noise of each SNR are only put in order.
+    held = np.arange(3 * 2 * 4 * 5).reshape(3, 2, 4, 5)
+    assert (noisy_signals(held, rows, ["A", "B", "C"], [1, 2, 3, 4], 1)[1, 2, 0] == held[0, 1, 2]).all()
+
+
 def test_noise_without_a_generator_is_refused():
     with pytest.raises(InputError, match=r"no generator for an SNR of 3 dB"):
         add_noise(np.ones(4), 3, None)

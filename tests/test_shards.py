@@ -192,6 +192,9 @@ def test_chunks_are_sized_for_their_shards(images, signals, tmp_path, capsys):
         promised = sample_bytes(kind, 3, 400)
         found = map_samples(folder / "seen-train-00000.npz")["size"].mean()
         assert found <= 1.3 * promised and promised <= 1.3 * found
+    # Two headers, a record, and 128 bytes before three stations' 401 numbers of 8 bytes, filled up to whole blocks.
+    assert sample_bytes("signal", 3, 401) == 2 * 512 + 2048 + 20 * 512
+    assert sample_bytes("recipe", 3, 401, 4) == sample_bytes("signal", 3, 401) // 4
     split = {"by": "motion", "train": 8, "val": 1, "test": 1}
     models = models_per_chunk(1e9, 300_000, subtypes=20, snrs=6, split=split)
     assert models % 10 == 0 and abs(models * 0.8 * 20 * 6 * 300_000 - 1e9) <= 0.5 * 8 * 20 * 6 * 300_000

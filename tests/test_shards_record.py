@@ -1,7 +1,9 @@
 """Records of samples: motion, geometry and versions, one type a field, and keys."""
 
+import io
 import json
 import math
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +11,7 @@ from dataset import SEED, motion_rows
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.shards.record import geometry, record, row_of, sample_key, snr_label
+from lowalt.shards.tar import Writer
 from pictures import NETWORK
 
 
@@ -60,7 +63,33 @@ def test_geometry_above_a_station_is_finite():
     }  # fmt: skip
 
 
+def test_a_link_sees_the_mean_range_and_speed_of_both_stations_and_its_receiver_s_direction():
+    """From 40 m above and 30 m before a station, seen by another one 90 m further off at the same height."""
+    seen = {"position_m": (0.0, 0.0, 0.0), "horizontal": (1.0, 0.0, 0.0), "transmitter": None, "name": "A"}
+    sender = SimpleNamespace(**seen | {"position_m": (30.0, 0.0, -50.0)})
+    receiver = SimpleNamespace(**seen | {"transmitter": sender})
+    row = dict(x_m=30.0, y_m=0.0, z_m=40.0, vx_mps=0.0, vy_mps=0.0, vz_mps=5.0)
+    found = geometry(row, SimpleNamespace(stations=[receiver]))["A"]
+    assert found == pytest.approx({"range_m": (50 + 90) / 2, "psi": 0.6, "omega": 0.8, "radial_mps": (4 + 5) / 2})
+
+
+def test_a_target_of_unknown_place_has_nulls_where_numbers_would_stand():
+    row = {**motion_rows("seen")[0], "x_m": math.nan}
+    entry = json.loads(record(row, 3, "val", SEED, Network.from_settings(NETWORK)))
+    assert entry["motion"]["x_m"] is None and entry["motion"]["phase_0_rad"] is None
+    assert set(entry["geometry"]["B"].values()) == {None}
+
+
+def test_a_tar_header_holds_names_of_a_hundred_bytes_and_no_more():
+    writer = Writer(io.BytesIO())
+    writer.add("k" * 95, b"", "png", b"")
+    for key, named in [("k" * 96, "100 bytes"), ("a/b", "no slash"), ("a.b", "no dot")]:
+        with pytest.raises(InputError, match=named):
+            writer.add(key, b"", "png", b"")
+
+
 def test_keys_are_unique_and_without_dots():
+    assert sample_key("EH216-S", 7, 3.5) == "eh216-s-000007-snr003p5"
     snrs = [3, 3.5, -60, 200, 0.25, math.inf, 13, -3.5]
     keys = {sample_key("EH216-S", 7, snr) for snr in snrs}
     assert len(keys) == len(snrs)
