@@ -12,7 +12,8 @@ from lowalt.common.network import Network, Station
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import interference
 from lowalt.effects.checks import check
-from lowalt.effects.explain import explain_scene
+from lowalt.effects.explain import scene_facts
+from lowalt.effects.explain_text import text as explanation
 from lowalt.effects.levels import levels
 from lowalt.effects.listening import Listening
 from lowalt.effects.received import Scene, observe, received_signal
@@ -239,6 +240,6 @@ def test_the_scene_of_one_sub_band_has_one_and_explains_who_is_heard(monkeypatch
     config = load(paths, SCHEMA)
     check(config)
     assert {one.frequency_hz for one in Network.from_settings(config["network"]).stations} == {4.9e9}
-    text = explain_scene(paths, SCHEMA, None, [("DJI Mavic 3 Pro", 0)], "A", False)
+    text = explanation(scene_facts(config, None, [("DJI Mavic 3 Pro", 0)], "A", False))
     assert "station B directly, one subcarrier" in text and "station C by the target, one subcarrier" in text
     assert "expected echo over other stations, in a range cell" in text
