@@ -27,6 +27,11 @@ all: default
 # modules without it, a short job 1 s.
 unexport PYTHONDONTWRITEBYTECODE
 
+# Snakemake and pip keep caches in HOME; the user of a service often has none that can be written.
+ifneq ($(shell test -w "$$HOME" || echo no),)
+export XDG_CACHE_HOME ?= $(CURDIR)/.venv/cache
+endif
+
 # uv installs the same pinned packages in less time than pip; pip does it where uv cannot (an index that only pip knows).
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt $(1) || $(PIP) -c envs/constraints.txt $(1)

@@ -59,8 +59,7 @@ rule signals:
 
 rule data:
     input:
-        f"results/{RUN.name}/shards/index.json",
-        f"results/{RUN.name}/shards/README.md",
+        products.data,
     localrule: True
 
 

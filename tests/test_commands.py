@@ -67,7 +67,7 @@ def given(**changes):
     from types import SimpleNamespace
 
     return SimpleNamespace(
-        **{"overlay": [], "configfile": [], "target": [], "cores": "all", "dry_run": False, "profile": None} | changes
+        **{"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "profile": None} | changes
     )
 
 

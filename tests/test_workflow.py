@@ -116,6 +116,13 @@ def following(first: str) -> set[str]:
     return set(DOWNSTREAM[DOWNSTREAM.index(first) :])
 
 
+def test_a_shard_that_is_deleted_by_hand_is_made_again(finished):
+    shard = min((finished / "results/test/shards").glob("*.tar"))
+    away = shard.rename(shard.with_suffix(".away"))
+    rules, _ = planned(finished, "--", "data"), away.rename(shard)
+    assert rules - {"data"} == following("tiles")
+
+
 # Here jobs have really run; tests/test_workflow_reruns.py changes each setting and the code of each stage.
 def test_a_changed_setting_re_runs_its_stage_and_what_follows(finished, tmp_path):
     path = tmp_path / "change.yaml"
@@ -215,9 +222,8 @@ def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, 
         path = tmp_path / "results/test" / name
         if path.exists():
             assert path.read_bytes() == (finished / "results/test" / name).read_bytes(), name
-    assert (
-        int((tmp_path / "size.txt").read_text()) == (finished / "results/test/motion/unseen-00001.csv").stat().st_size
-    )
+    size = (finished / "results/test/motion/unseen-00001.csv").stat().st_size
+    assert int((tmp_path / "size.txt").read_text()) == size
     assert not (tmp_path / "config").exists()
 
 

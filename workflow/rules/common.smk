@@ -2,6 +2,7 @@
 # RUN: names, plan and schemes; products: the files a rule reads; settings: what a stage reads of the configuration;
 # options: parts of a command line that not every job has; code: the source files that a command runs.
 from functools import partial
+from pathlib import Path
 
 from snakemake.exceptions import WorkflowError
 
@@ -9,7 +10,7 @@ from lowalt.common.environment import prepare
 from lowalt.common.errors import InputError
 from lowalt.common.plan import PART
 from lowalt.effects.catalogue import dotted
-from lowalt.workflow import locks, options, polling, scheduling, space_check
+from lowalt.workflow import interrupts, locks, options, polling, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
@@ -17,12 +18,14 @@ from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
+interrupts.install()
 locks.install()
 scheduling.install()
 polling.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
 try:
+    space_check.writable(Path.cwd())
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
 except InputError as error:
     raise WorkflowError(str(error)) from None

@@ -30,7 +30,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         "--configfile", type=shipped, nargs="+", default=[], help="more overlays, as snakemake names them"
     )
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
-    line.add_argument("--cores", default="all", help="cores to use (default: all)")
+    line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
     json_option(line)
@@ -53,7 +53,8 @@ def command(given: argparse.Namespace) -> list[str]:
             raise InputError(f"configuration: no file at {path}")
         load_yaml(path)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
-    line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), "--cores", given.cores]
+    cores = given.cores or (None if given.profile else "all")
+    line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), *(["--cores", cores] if cores else [])]
     profile = given.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
     line += ["--workflow-profile", str(profile)] if profile else []
     line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []

@@ -15,6 +15,8 @@ def prepare(source: Path, inputs: str | None) -> str | None:
     """
     environment = os.environ
     environment["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), environment.get("PATH", "")])
+    # Files of the project are UTF-8 whatever the locale says.
+    environment["PYTHONUTF8"] = "1"
     known = environment.get("PYTHONPATH")
     environment["PYTHONPATH"] = os.pathsep.join([*([known] if known else []), str(source)])
     folder = inputs or environment.get(INPUTS) or None

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 from lowalt.common.errors import InputError
 from lowalt.workflow.owner import TOKEN, Owner
@@ -90,6 +91,16 @@ def end(owner: Owner) -> list[int]:
     return ended
 
 
+def living(locks: Path) -> list[str]:
+    """Return who holds the locks of a folder and is seen to live, a sentence each."""
+    owners = [Owner.read(_owner_path(locks, number)) for number in numbers(locks)]
+    return [
+        f"process {owner.pid} of {owner.host} is running; wait for it or end it"
+        for owner in owners
+        if owner and owner.here and owner.alive
+    ]
+
+
 def holders(locks: Path) -> str:
     """Return who holds the locks of a folder, a line each, and what a person can do about it."""
     lines = []
@@ -121,6 +132,20 @@ def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> int:
     return number
 
 
+def cleanup_locks(self: Any) -> None:
+    """Remove all locks of a persistence of Snakemake's, as `--unlock` asks.
+
+    Raises: WorkflowError naming a holder that is seen to live.
+    """
+    from snakemake.exceptions import WorkflowError
+
+    with guarded(Path(self.path)):
+        alive = living(Path(self._lockdir))
+        if alive:
+            raise WorkflowError("not unlocked: " + "; ".join(alive))
+        self.unlock()
+
+
 def install() -> None:
     """Put locks with owners in the place of those of Snakemake's file backend."""
     from snakemake.exceptions import WorkflowError
@@ -138,6 +163,8 @@ def install() -> None:
                     raise WorkflowError(holders(locks))
                 keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
                 number = take(locks, owner, {kind: [str(key) for key in found] for kind, found in keys.items()})
+        except OSError as error:
+            raise WorkflowError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
         except InputError as error:
             raise WorkflowError(str(error)) from None
         os.environ[TOKEN] = owner.token
@@ -154,3 +181,4 @@ def install() -> None:
         yield
 
     FilePersistence.lock, FilePersistence.lock_warn_only = lock, lock_warn_only
+    FilePersistence.cleanup_locks = cleanup_locks

@@ -86,6 +86,11 @@ class Products(DataProducts):
             )
         return views
 
+    def data(self, wildcards: Any) -> list[str]:
+        """Files of the run's data set: shards, their tables, index and data card."""
+        shards = [f"{shard}.{ending}" for shard in self._run.plan.shards for ending in ("tar", "npz")]
+        return [f"results/{self._run.name}/shards/{name}" for name in ("index.json", "README.md", *shards)]
+
     def own_views(self, wildcards: Any) -> list[str]:
         """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
         sizes, shards = self._run.image_sizes, self._run.plan.shards

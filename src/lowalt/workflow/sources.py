@@ -42,7 +42,7 @@ def _imports(path: Path) -> tuple[str, ...]:
     Imports inside the functions of a command belong to the subcommand asked for; the caller names those. Imports inside
     the functions of the package's own `__init__` are for users who ask for a name there, which no stage does.
     """
-    tree = ast.parse(path.read_text(), str(path))
+    tree = ast.parse(path.read_bytes(), str(path))
     found = []
     deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
     for node in tree.body if deferred else _statements(tree.body):

@@ -1,9 +1,10 @@
 """The check of disk and memory at the edge: what Snakemake plans and what the machine has go into `space.py`.
 
-The Snakefile calls `before` when a run starts and `after` when it has failed.
+The Snakefile calls `writable` when it is read, `before` when a run starts and `after` when it has failed.
 """
 
 import os
+import tempfile
 from pathlib import Path
 
 from lowalt.common.errors import InputError, SpaceError
@@ -15,6 +16,7 @@ TABLE = "results/reference/space.csv"
 VARIABLE = "LOWALT_SPACE"
 CHOICES = ("refuse", "warn", "off")
 FULL_BYTES = 1 << 20
+TRIAL_BYTES = 1 << 16
 ALIKE = {"echo_in_scene": "echo"}
 """Rules whose jobs write and hold as much as those of another rule, which was measured."""
 
@@ -39,6 +41,22 @@ def check(
     if stop and choice == "refuse":
         raise SpaceError(f"{'; '.join(stop)} (start anyway: {VARIABLE}=warn)")
     return [*stop, *warn]
+
+
+def writable(folder: Path) -> None:
+    """Write a nameless file of TRIAL_BYTES in the working directory: Snakemake meets a full one with tracebacks.
+
+    Raises: InputError with the reason and what is free where that fails, and where `results` is a link to nothing.
+    """
+    results = folder / "results"
+    if results.is_symlink() and not results.exists():
+        raise InputError(f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)")
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(TRIAL_BYTES))
+    except OSError as error:
+        facts = f"{error.strerror}, {free_bytes(folder) / 1e6:.1f} MB free"
+        raise InputError(f"{folder.resolve()}: cannot write to the working directory ({facts})") from None
 
 
 def before(workflow: object, plan: Plan, config: dict) -> None:
