@@ -9,6 +9,7 @@ from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
 from lowalt.common.normals import circular
 from lowalt.noise import add_noise
+from lowalt.noise.__main__ import load_echoes, load_powers
 from lowalt.noise.chunk import noisy_signals
 
 
@@ -117,3 +118,16 @@ def test_the_compiled_normals_are_those_of_the_draws(count):
     expected = 0.3 * plain.standard_normal(2 * count)
     found = circular(raw.words(2 * count), 0.3)
     assert np.array_equal(found, expected.reshape(-1, 2).T)
+
+
+def test_an_echo_file_that_was_cut_is_named(tmp_path):
+    path = tmp_path / "A.npy"
+    np.save(path, np.ones((2, 40), complex))
+    assert load_echoes([str(path)], ["A"], 2)[0].shape == (2, 40)
+    for size in (100, 300):
+        with path.open("r+b") as file:
+            file.truncate(size)
+        for load in (load_echoes, load_powers):
+            with pytest.raises(InputError, match=r"A\.npy: not a whole (echo|power) file"):
+                load([str(path)], ["A"], 2)
+        np.save(path, np.ones((2, 40), complex))

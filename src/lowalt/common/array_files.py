@@ -6,6 +6,8 @@ import zipfile
 import zlib
 from pathlib import Path
 
+import numpy as np
+
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 
@@ -19,6 +21,18 @@ FREE_BYTES = 64 << 20
 """Up to this size a member of an archive may expand as it likes."""
 MOST_EXPANSION = 16
 """Larger members may be this many times their compressed size; the project's own files are not compressed."""
+
+
+def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
+    """Return the array of a .npy file, or a read-only memory map of it.
+
+    Raises: InputError naming the file where it is missing, cut or no array file.
+    """
+    path = existing(path, what)
+    try:
+        return np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+    except UNREADABLE as error:
+        raise InputError(f"{path}: not a whole {what} file ({error})") from error
 
 
 def checked_archive(path: str | Path, what: str) -> Path:

@@ -5,9 +5,10 @@ import sys
 
 import numpy as np
 
+from lowalt.common.array_files import array_of
 from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing
 from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
 
@@ -21,7 +22,7 @@ def load_echoes(paths: list[str], stations: list[str], models: int, snrs: int | 
     """
     if len(paths) != len(stations):
         raise InputError(f"--echoes: {len(paths)} files, expected one for each station of {stations}")
-    echoes = [np.load(existing(path, "echo"), mmap_mode="r") for path in paths]
+    echoes = [array_of(path, "echo", mapped=True) for path in paths]
     for path, echo in zip(paths, echoes, strict=True):
         fits = echo.ndim == 2 or (echo.ndim == 3 and echo.shape[1] == snrs)
         if not fits or len(echo) != models or echo.shape != echoes[0].shape:
@@ -36,7 +37,7 @@ def load_powers(paths: list[str], stations: list[str], models: int) -> np.ndarra
     """
     if len(paths) != len(stations):
         raise InputError(f"--powers: {len(paths)} files, expected one for each station of {stations}")
-    powers = np.stack([np.load(existing(path, "power")) for path in paths])
+    powers = np.stack([array_of(path, "power") for path in paths])
     if powers.shape != (len(stations), models):
         raise InputError(f"--powers: shape {powers.shape}, expected ({len(stations)}, {models})")
     return powers
