@@ -198,6 +198,9 @@ class Chain:
     @property
     def _offset_cells(self) -> float:
         """How far the echoes of everything but the target stand beyond the centres of their range cells."""
+        for effect in providing(self.channel, AddsEchoes):
+            if hasattr(effect.module, "offset_cells") and self.view.station.transmitter is not None:
+                return effect.module.offset_cells(self.view)
         offsets = [getattr(effect.module, "OFFSET_CELLS", 0.0) for effect in providing(self.channel, AddsEchoes)]
         return offsets[0] if offsets else 0.0
 

@@ -132,6 +132,12 @@ class View:
         other.__dict__.update(known)
         return other
 
+    def ends(self) -> list["View"]:
+        """Return the target as the sender and as the receiver of a link see it alone; a station's own view is both."""
+        if self.station.transmitter is None:
+            return [self]
+        return [self.of(self.station.transmitter), self.of(replace(self.station, transmitter=None, receiver=None))]
+
     @cached_property
     def centres(self) -> np.ndarray:
         """Middle (P, 3) of each part's points, in the part's own frame (m)."""

@@ -19,7 +19,8 @@ from lowalt.targets.cloud import Cloud
 SOURCE = (
     "diffuse: Phong-type cosine lobes, Lafortune & Willems 1994; flat circular plate in physical optics, "
     "sigma = 4 pi A^2 / lambda^2 (cos 2 J1(x) / x)^2, x = 2 k a sin: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd "
-    "ed. 1993, chapter 6; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
+    "ed. 1993, chapter 6; on links: R. E. Kell, On the derivation of bistatic RCS from monostatic measurements, Proc. "
+    "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"strength": 1.0, "power": 1.0, "blades": "facet"}
 
@@ -56,6 +57,23 @@ def facet(cosine: np.ndarray, size: float) -> np.ndarray:
     return _plate(cosine, size) / _plate_mean(size)
 
 
+def bistatic_facet(view: View, mine: np.ndarray, cosines: list[np.ndarray], size: float) -> np.ndarray:
+    """Return a facet's lobe on a link for the points `mine`, (N, points), dark where it faces away from either end.
+
+    cosines: toward both ends; size: as in `facet`. The plate's pattern follows the sum q of the unit vectors toward the
+    ends: x = k a |q across the facet|, amplitude by q along its normal. Source: Kell 1965; Crispin and Siegel 1968.
+    """
+    ends = [np.asarray(end.station.position_m) for end in view.ends()]
+    toward = [place - view.places[:, mine] for place in ends]
+    q = sum(way / np.linalg.norm(way, axis=2, keepdims=True) for way in toward)
+    half = 0.5 * np.linalg.norm(q, axis=2)
+    along = 0.5 * (cosines[0] + cosines[1])
+    x = 2.0 * size * np.sqrt(np.maximum(half**2 - along**2, 0.0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        disc = np.where(x < 1e-6, 1.0, 2.0 * j1(x) / x)
+    return np.where((cosines[0] > 0) & (cosines[1] > 0), (along * disc) ** 2, 0.0) / _plate_mean(size)
+
+
 def facet_radius_m(points: np.ndarray) -> float:
     """Return the radius (m) of one point's share of a surface sampled by `points` (L, 3), L > 1.
 
@@ -79,15 +97,23 @@ def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
-    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect."""
+    """Return the factor (N, L) on every point's amplitude: the root of its relative cross section at this aspect.
+
+    On a link a diffuse point's lobe is the geometric mean of those toward both ends, exact for a Lambert surface (power
+    2). A facet's is that at the bisector, at the frequency times cos(beta / 2), beta the angle of both ways.
+    """
     known = np.isfinite(view.cloud.normals).all(axis=1)
     if not known.any():
         return np.ones(view.places.shape[:2])
-    cosine = aspect_cosine(view)
-    lobe = diffuse(cosine, settings["power"])
+    cosines = [aspect_cosine(end) for end in view.ends()]
+    lobes = [diffuse(cosine, settings["power"]) for cosine in cosines]
+    lobe = lobes[0] if len(lobes) == 1 else np.sqrt(lobes[0] * lobes[1])
     if settings["blades"] == "facet":
         wave = 2 * np.pi * radar(view.network, view.station).centre_hz / SPEED_OF_LIGHT
         for mine, radius in _blades(view.cloud):
-            lobe[:, mine] = facet(cosine[:, mine], wave * radius)
+            if len(cosines) == 1:
+                lobe[:, mine] = facet(cosines[0][:, mine], wave * radius)
+            else:
+                lobe[:, mine] = bistatic_facet(view, mine, [cosine[:, mine] for cosine in cosines], wave * radius)
     strength = settings["strength"]
     return np.where(known, np.sqrt(1.0 - strength + strength * lobe), 1.0)

@@ -41,8 +41,9 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     """
     if {"clutter", "background_channel"} & others:
         return np.full((1, 1), np.inf)
-    farthest = np.linalg.norm(view.middles - np.asarray(view.station.position_m), axis=2) + view.radii
-    return np.where(2 * farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)
+    ends = [view.station.transmitter or view.station, view.station]
+    farthest = sum(np.linalg.norm(view.middles - np.asarray(end.position_m), axis=2) + view.radii for end in ends)
+    return np.where(farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)
 
 
 @LEAN
@@ -60,6 +61,11 @@ def _late(places, station, prefix_s, rate_hz, most, result):
 def first_samples(settings: dict, view: View) -> np.ndarray:
     """Return the number (N, L) of each point's samples, at the window's start, that carry the previous symbol."""
     network = view.network
+    if view.station.transmitter is not None:
+        ways = [view.places - np.asarray(end.station.position_m) for end in view.ends()]
+        delay = sum(np.sqrt(np.einsum("nli,nli->nl", away, away)) for away in ways) / SPEED_OF_LIGHT
+        late = (delay - length_s(settings, network)) * network.subcarriers * network.subcarrier_spacing_hz
+        return np.clip(np.ceil(late), 0, network.subcarriers).astype(np.int64)
     places, count = np.ascontiguousarray(view.places.swapaxes(1, 2)), network.subcarriers
     result = np.empty((len(places), places.shape[2]), np.int64)
     _late(

@@ -19,8 +19,7 @@ SOURCE = (
 DEFAULTS = {"loss_db": 0.0}
 
 MONOSTATIC = (
-    "cross_sections", "occlusion", "ground_reflection", "walls", "clutter", "background_channel", "cyclic_prefix",
-    "line_of_sight", "pointing_error", "transmit_leakage",
+    "ground_reflection", "walls", "clutter", "background_channel", "pointing_error", "transmit_leakage",
 )  # fmt: skip
 """Effects that are modelled for a station that hears itself only."""
 
@@ -39,6 +38,16 @@ def check(settings: dict, scene: CheckedScene) -> None:
         refused.append("fluctuation with pattern: true")
     if refused:
         raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
+
+
+def offset_cells(view: View) -> float:
+    """Return how far a link's direct path stands beyond the centre of a range cell, -1/2 to 1/2; 0 for a station."""
+    sends = view.station.transmitter
+    if sends is None:
+        return 0.0
+    away = np.linalg.norm(np.asarray(view.station.position_m) - np.asarray(sends.position_m))
+    cells = float(away) / (2 * view.network.cell_m)
+    return cells - round(cells)
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:

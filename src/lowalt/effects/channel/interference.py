@@ -32,8 +32,6 @@ DEFAULTS = {
     "sigma_ppm": 0.017, "sigma_s": 2e-8,
 }  # fmt: skip
 
-ALONE = ("cross_sections", "occlusion", "line_of_sight")
-"""Effects on the points that are modelled for a station that hears itself only."""
 OFFSETS = ("sigma_ppm", "sigma_s")
 
 
@@ -56,12 +54,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
     """Raise InputError for a single station, or settings that another effect contradicts."""
     if len(stations(scene.network)) < 2:
         raise InputError("effects.interference: the network has one station, expected at least two")
-    refused = sorted(set(ALONE) & set(scene.effects))
-    if settings["by_target"] and refused:
-        raise InputError(
-            f"effects.interference: {refused} are not modelled between two stations, expected none of them or "
-            "by_target: false"
-        )
     for other, keys in (("link_offset", OFFSETS), ("cyclic_prefix", ("prefix_s",))):
         theirs = scene.effects.get(other, settings)
         for key in keys:

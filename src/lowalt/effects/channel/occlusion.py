@@ -120,9 +120,14 @@ def _surfaces(view: View) -> dict:
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
 
-    Behind bent blades it is the share that goes around them instead.
+    Behind bent blades it is the share that goes around them instead. On a link each way has the root of the factor that
+    a station at its end has: a point hidden from either end by opaque surfaces does not echo.
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
+    ends = view.ends()
+    if len(ends) == 2:
+        out, back = (visible(settings, end) for end in ends)
+        return np.sqrt(out * back)
     if settings["blades"] == "opaque" or view.nodes or not view.cloud.parts_of("rotor"):
         return 1.0 - settings["strength"] * hidden(view)
     if settings["blades"] == "bent":
