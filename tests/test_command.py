@@ -1,11 +1,13 @@
 """What the stages' command lines share: settings as JSON or a file, clear words, exit status 2."""
 
+import errno
 import json
+import sys
 
 import pytest
 
 from forks import ended
-from lowalt.common.command import pick, settings
+from lowalt.common.command import pick, refusal, run, settings
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
 
@@ -37,6 +39,20 @@ def test_a_stage_says_in_one_line_what_is_wrong():
     for status, said, complained in ended([call.format(f"lowalt.{stage}") for stage in stages]):
         assert (status, said) == (2, "")
         assert "no file at nowhere.json" in complained and "Traceback" not in complained
+
+
+def test_a_path_that_the_system_refuses_is_named_in_one_line(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "file"
+    file.write_text("")
+    monkeypatch.setattr(sys, "argv", ["stage"])
+    with pytest.raises(SystemExit) as stopped:
+        run(lambda arguments: (file / "below").write_text("x"))
+    said = capsys.readouterr().err
+    assert (
+        stopped.value.code == 2 and said.startswith(f"error: {file}/below: Not a directory") and said.count("\n") == 1
+    )
+    with pytest.raises(OSError, match="space"):
+        refusal(OSError(errno.ENOSPC, "no space", "file"))
 
 
 def test_a_failed_write_leaves_nothing_and_keeps_what_was(tmp_path):

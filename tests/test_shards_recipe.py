@@ -6,9 +6,13 @@ import tarfile
 import pytest
 import yaml
 
+from dataset import build, publish
+from lowalt.__main__ import main as lowalt
+from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.shards import recipe
 from lowalt.shards.build import write_run
+from lowalt.shards.dataset import Dataset
 from test_dataset import configuration, dataset  # noqa: F401
 
 
@@ -61,3 +65,20 @@ def test_other_versions_and_damage_are_refused_and_other_samples_told(finished, 
         for name in ("config.yaml", *(f"clouds/{path.name}" for path in finished.glob("clouds/*"))):
             (tmp_path / "empty" / name).write_bytes((finished / name).read_bytes())
         recipe.pack(tmp_path / "empty", tmp_path / "empty.tar")
+
+
+def test_a_run_s_data_set_opens_in_a_folder_without_its_tables(tmp_path, monkeypatch):
+    config = load(["config/default.yaml", "config/tiny.yaml"], "workflow/schemas/config.schema.yaml")
+    assert config["targets"]["table"] == "config/targets.csv"
+    here = Dataset(config, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    there = Dataset(config, tmp_path)
+    assert there.config == config and there.published == here.published and len(there) == len(here) == 160
+
+
+def test_an_index_behind_a_link_is_checked_where_its_shards_are(tmp_path, capsys):
+    folder = tmp_path / "größe und maß"
+    publish(build(tmp_path / "made", "signal"), folder)
+    (tmp_path / "link.json").symlink_to(folder / "index.json")
+    assert lowalt(["verify", str(tmp_path / "link.json")]) == 0
+    assert "every byte is as it was written" in capsys.readouterr().out

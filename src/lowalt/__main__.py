@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
+from lowalt.common.command import refusal
 from lowalt.common.errors import InputError
 
 CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
@@ -40,6 +41,9 @@ def main(arguments: list[str] | None = None) -> int:
         text = actions[given.command](given)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 2
+    except OSError as error:
+        print(f"error: {refusal(error)}", file=sys.stderr)
         return 2
     if text:
         print(text)

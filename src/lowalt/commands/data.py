@@ -17,13 +17,13 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
         help="check every byte of a data set",
         epilog="example: lowalt verify results/default/shards/index.json",
     )
-    verify.add_argument("index", type=Path, help="index.json of the data set")
+    verify.add_argument("index", type=_index, help="index.json of the data set")
     verify.add_argument("--remake", type=int, default=0, metavar="N", help="also make N random samples again")
     remake = commands.add_parser(
         "remake", help="make stored samples again from their records and compare every byte",
         epilog="example: lowalt remake results/default/shards/index.json crow-000003-snr013",
     )  # fmt: skip
-    remake.add_argument("index", type=Path, help="index.json of the data set")
+    remake.add_argument("index", type=_index, help="index.json of the data set")
     remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
     for line in (verify, remake):
         json_option(line)
@@ -48,6 +48,11 @@ def _ended(lines: list[str], good: str, machine: bool) -> str:
         print(text)
         raise SystemExit(1)
     return text
+
+
+def _index(text: str) -> Path:
+    """The index that a command line names; behind a link to it alone, the one whose shards stand next to it."""
+    return Path(text).resolve() if Path(text).is_symlink() else Path(text)
 
 
 def verify(given: argparse.Namespace) -> str:

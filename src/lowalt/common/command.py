@@ -5,6 +5,7 @@ The workflow passes the object itself, so that Snakemake sees every change in it
 """
 
 import argparse
+import errno
 import json
 import resource
 import sys
@@ -72,9 +73,23 @@ def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], a
     commands[arguments[0]](arguments[1:])
 
 
+REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+"""Errors of the operating system that a path given by the user causes, such as a folder that may only be read."""
+
+
+def refusal(error: OSError) -> str:
+    """Return the sentence on a path that the operating system refuses. Raises: the error itself for any other one."""
+    if error.errno not in REFUSED or error.filename is None:
+        raise error
+    return f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+
+
 def run(main: Callable[[list[str]], None]) -> None:
-    """Run a stage's `main` on the process's arguments; an InputError becomes one line and exit status 2, an
-    InputWarning one line."""
+    """Run a stage's `main` on the process's arguments.
+
+    An InputError or a path that the operating system refuses becomes one line and exit status 2, an InputWarning one
+    line.
+    """
     keep_freed_memory()
     usual = warnings.formatwarning
     warnings.formatwarning = lambda message, category, *place, **more: (
@@ -84,6 +99,9 @@ def run(main: Callable[[list[str]], None]) -> None:
         main(sys.argv[1:])
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
+        raise SystemExit(2) from None
+    except OSError as error:
+        print(f"error: {refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
     # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

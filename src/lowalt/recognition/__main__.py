@@ -204,13 +204,13 @@ def _score(arguments: list[str]) -> None:
 
 
 def _export(arguments: list[str]) -> None:
-    """Write a trained model as a torch.export program (.pt2) or ONNX (.onnx). Settings: none ({})."""
+    """Write a trained model as safetensors with a card, as a torch.export program or as ONNX. Settings: none ({})."""
     from lowalt.recognition.export import export
     from lowalt.recognition.runs import load
 
     line = parser("lowalt.recognition export", _export.__doc__)
     line.add_argument("--model", required=True, help="model.pt of a training run")
-    line.add_argument("--out", required=True, help="file to write, .pt2 or .onnx")
+    line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md), .pt2 or .onnx")
     given = line.parse_args(arguments)
     pick(given.settings)
     export(load(given.model), given.out)

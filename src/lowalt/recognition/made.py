@@ -21,6 +21,7 @@ from lowalt.recognition.schemes import columns_in
 from lowalt.recognition.views import geometry
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
+from lowalt.shards.maker import Maker
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.write import select
 from lowalt.spectra.catalogue import named
@@ -49,6 +50,12 @@ def cloud_sha256(cloud: Cloud) -> str:
         value for value in (getattr(cloud, field.name) for field in fields(cloud)) if isinstance(value, np.ndarray)
     ]
     return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
+
+
+def views_of(maker: Maker, row: dict, snr_db: float, columns: list[int], size: int) -> np.ndarray:
+    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB)."""
+    images = maker.renderer.some(maker.signal(row, snr_db), columns, maker.late(row))
+    return images if images.shape[-1] == size else resize(images, size)
 
 
 class DatasetSamples:
@@ -124,9 +131,7 @@ class DatasetSamples:
         maker, found = self.dataset.maker, []
         for number in numbers:
             place, snr_db = self.chosen[number]
-            row = self.rows[place]
-            images = maker.renderer.some(maker.signal(row, snr_db), self.columns, maker.late(row))
-            found.append(images if images.shape[-1] == self.size else resize(images, self.size))
+            found.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size))
         return np.stack(found)
 
     def sha256(self) -> str:

@@ -8,7 +8,6 @@ A cache file (.npz) holds, for the samples of one shard in its order,
 """
 
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,44 +16,28 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
-from lowalt.motion import read_table
 from lowalt.recognition.features import NAMES, features
 from lowalt.recognition.samples import FACTS, Facts, cached, fingerprint, joined
-from lowalt.recognition.views import facts_of, located
+from lowalt.recognition.views import ChunkFile, facts_of, located
 from lowalt.shards import ShardSet
 from lowalt.tiles.signals import load_signals
 
 KINDS = ("signals", "features")
 
 
-@dataclass(frozen=True)
-class Noisy:
-    """Noisy signals of a whole chunk, from the noise stage, and the data that locate each sample in them.
-
-    path: (models, SNRs, stations, symbols) complex64 (.npy); motion: the chunk's motion table; snrs_db: the noise
-    levels of every motion model, in the order of the chunk's signals.
-    """
-
-    path: Path
-    motion: Path
-    snrs_db: tuple[float, ...]
+class Noisy(ChunkFile):
+    """Noisy signals of a whole chunk from the noise stage, (models, SNRs, stations, symbols) complex64 (.npy)."""
 
     def signals(self, facts: Facts, network: Network) -> np.ndarray:
         """Return the signals (len(facts), stations, symbols) complex64 of these samples.
 
         Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit the network.
         """
-        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
-        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
+        models, snrs, shape = self.places(facts)
         found = load_signals(self.path, network)
-        if found.shape[:2] != (len(rows), len(levels)):
-            raise InputError(f"{self.path}: {found.shape[:2]} models and SNRs, expected {(len(rows), len(levels))}")
-        try:
-            models = [rows[pair] for pair in zip(facts.subtype.tolist(), facts.model.tolist(), strict=True)]
-            places = [levels[snr] for snr in facts.snr_db.tolist()]
-        except KeyError as error:
-            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
-        return found[models, places]
+        if found.shape[:2] != shape:
+            raise InputError(f"{self.path}: {found.shape[:2]} models and SNRs, expected {shape}")
+        return found[models, snrs]
 
 
 def of_stations(signals: np.ndarray, network: Network) -> np.ndarray:

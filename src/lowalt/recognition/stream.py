@@ -18,12 +18,11 @@ from lowalt.common.classes import label
 from lowalt.common.errors import InputError
 from lowalt.common.splits import fold
 from lowalt.common.streams import stream
-from lowalt.recognition.made import CLEAN_BYTES, cloud_sha256, opened
+from lowalt.recognition.made import CLEAN_BYTES, cloud_sha256, opened, views_of
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import columns_in
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.spectra.catalogue import named
-from lowalt.tiles.resample import resize
 
 STRIDE = 2**31
 """Distance of the motion models that one place may take: the first of them that lies in the fold that trains."""
@@ -102,10 +101,7 @@ class Stream:
         """Return the images of one sample; those of motion models that repeat are kept, as far as memory allows."""
         if place in self._made:
             return self._made[place]
-        maker, row = self.dataset.maker, self.dataset.row(place)
-        signal = maker.signal(row, place.snr_db)
-        images = maker.renderer.some(signal, self.columns, maker.late(row))
-        images = images if images.shape[-1] == self.size else resize(images, self.size)
+        images = views_of(self.dataset.maker, self.dataset.row(place), place.snr_db, self.columns, self.size)
         if self.models and (len(self._made) + 1) * images.nbytes < CLEAN_BYTES:
             self._made[place] = images
         return images

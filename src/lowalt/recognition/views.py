@@ -87,31 +87,42 @@ def facts_of(shards: ShardSet, numbers: np.ndarray, placed: bool = True) -> Fact
 
 
 @dataclass(frozen=True)
-class Reduced:
-    """Images of a whole chunk that the tiles stage has already reduced, and the data that locate each sample in them.
+class ChunkFile:
+    """A file with a value of every sample of a chunk, and the data that locate each sample in it.
 
-    path: file of `lowalt.tiles.reduced`; motion: the chunk's motion table; snrs_db: the noise levels of every motion
-    model, in the order of the chunk's signals.
+    path: the file; motion: the chunk's motion table; snrs_db: the noise levels of every motion model, in the order of
+    the chunk's signals.
     """
 
     path: Path
     motion: Path
     snrs_db: tuple[float, ...]
 
+    def places(self, facts: Facts) -> tuple[np.ndarray, np.ndarray, tuple[int, int]]:
+        """Return the number of each sample's motion model and of its SNR, and how many of both the chunk has.
+
+        Raises: InputError where the chunk has no such motion model or SNR.
+        """
+        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
+        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
+        try:
+            models = [rows[pair] for pair in zip(facts.subtype.tolist(), facts.model.tolist(), strict=True)]
+            snrs = [levels[snr] for snr in facts.snr_db.tolist()]
+        except KeyError as error:
+            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
+        return np.array(models, np.int64), np.array(snrs, np.int64), (len(rows), len(levels))
+
+
+class Reduced(ChunkFile):
+    """Images of a whole chunk that the tiles stage has already reduced, a file of `lowalt.tiles.reduced`."""
+
     def images(self, facts: Facts, size: int) -> np.ndarray:
         """Return the images (len(facts), views, size, size) uint8 of these samples.
 
         Raises: InputError where the chunk has no such motion model or SNR, or the file does not fit them.
         """
-        rows = {(row["subtype"], row["model"]): number for number, row in enumerate(read_table(self.motion))}
-        levels = {snr: number for number, snr in enumerate(self.snrs_db)}
-        images = reduced.read(self.path, size, len(rows) * len(levels))
-        samples_of = zip(facts.subtype.tolist(), facts.model.tolist(), facts.snr_db.tolist(), strict=True)
-        try:
-            places = [rows[subtype, model] * len(levels) + levels[snr] for subtype, model, snr in samples_of]
-        except KeyError as error:
-            raise InputError(f"{self.motion}: no motion model or SNR {error}, expected those of {self.path}") from None
-        return images[places]
+        models, snrs, (rows, levels) = self.places(facts)
+        return reduced.read(self.path, size, rows * levels)[models * levels + snrs]
 
 
 def located(index: str | Path, name: str) -> tuple[ShardSet, np.ndarray]:

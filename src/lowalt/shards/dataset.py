@@ -17,6 +17,7 @@ from lowalt.common.classes import classes_of, label
 from lowalt.common.errors import InputError
 from lowalt.common.network import masts_m
 from lowalt.common.plan import GROUPS, Plan
+from lowalt.common.shipped import located
 from lowalt.common.splits import FOLDS, fold
 from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
@@ -81,7 +82,8 @@ class Dataset:
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:
-            records = records_of(config["targets"], inputs)
+            # A run's configuration names tables and records as seen from the checkout it was made in.
+            records = records_of(located(config)["targets"], inputs)
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)
