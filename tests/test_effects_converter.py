@@ -43,6 +43,12 @@ def test_branches_are_i_and_a_skewed_q():
     np.testing.assert_allclose(out.imag, q, atol=1e-15)
 
 
+def test_a_sample_of_the_worst_phase_grows_by_what_amplifies_says():
+    setting, phases = {"gain_db": 3.0, "phase_deg": 20.0}, np.exp(2j * np.pi * np.arange(3600) / 3600)
+    largest = abs(iq_imbalance.receive(setting, phases, None, None)).max()
+    assert iq_imbalance.amplifies(setting) == pytest.approx(largest, rel=1e-6)
+
+
 # Converter
 
 
@@ -80,4 +86,6 @@ def test_clipping_of_gaussian_samples(backoff_db):
 def test_one_bit_keeps_signs_and_zeros_stay():
     r = np.array([[0.3 - 0.7j, -5 + 0.01j]])
     np.testing.assert_allclose(adc.quantise(r, 1, 1.0)[0], [[0.5 - 0.5j, -0.5 + 0.5j]])
+    levels = np.unique(adc.receive({**adc.DEFAULTS, "bits": 1}, r, None, None).real)
+    assert adc.step({**adc.DEFAULTS, "bits": 1}, r) == pytest.approx(levels[1] - levels[0])
     assert not adc.receive(adc.DEFAULTS, np.zeros((2, 4), complex), None, None).any()
