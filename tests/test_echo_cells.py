@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
@@ -94,3 +95,15 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     places = nodes[:, part] + np.einsum("nlij,lj->nli", turned[:, part], points)
     truth = echo_signal(net, net.stations[0], places, 1.0, nodes[0, 0], paths=[Path()])
     assert relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3
+
+
+def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():
+    """Both neighbours hold equal amplitudes there; a hundredth of a cell away they differ by more than a percent."""
+    station = Station("A", (0.0, 0.0, 0.0), 0.0, 4.9e9)
+    net = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (1, 1), (1, 1), 1.0, (station,))
+    cell_m = SPEED_OF_LIGHT / (2 * 256 * 120e3)
+    for offset, ties in ((0.5, 3), (0.51, 0)):
+        place = np.full((3, 1, 3), (0.0, (20 + offset) * cell_m, 0.0))
+        found = echo_signal(net, station, place, 1.0, place[0, 0])
+        assert found.near_ties == ties
+        assert set(found.cell) <= ({20, 21} if ties else {21})

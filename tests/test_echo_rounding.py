@@ -191,3 +191,11 @@ def test_sums_in_double_decide_most_and_never_another_value():
         real, imag = sums.cell_value(scene, lay, radio, n, found.cells[n], work)
         stored = complex(to_odd(*real, bits), to_odd(*imag, bits))
         assert np.complex64(found.values[n]) == np.complex64(stored)
+
+
+def test_a_sum_that_is_a_double_and_one_whose_last_bit_is_one_stay():
+    bits = np.zeros(1, np.int64)
+    assert nearest.to_odd(2.0, 0.0, bits) == 2.0 and nearest.to_odd(0.0, 1e-300, bits) == 0.0
+    assert nearest.to_odd(2.0, 1e-30, bits) == np.nextafter(2.0, 3) and nearest.to_odd(2.0, -1e-30, bits) < 2.0
+    odd = np.nextafter(2.0, 3)
+    assert nearest.to_odd(odd, 1e-30, bits) == odd == nearest.to_odd(odd, -1e-30, bits)
