@@ -113,11 +113,12 @@ rule train:
         source=options.samples,
         extra=options.extra,
         stream=options.stream,
+        start=options.start,
         events="--tensorboard" if config["recognition"]["tensorboard"] else "",
         stations=RUN.stations,
     shell:
         "python -m {params.launcher} lowalt.recognition train --settings {params.settings:q} {params.source} {params.extra}"
-        " {params.stream} --frozen {input.frozen:q}"
+        " {params.stream} {params.start} --frozen {input.frozen:q}"
         " --schemes {input.schemes:q} --stations {params.stations} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
         " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"
 

@@ -71,17 +71,39 @@ def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
     return of_size(ViewSamples(given.views, scheme.columns, pairs), scheme, size)
 
 
+def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
+    """Return the sources "train" and "validation" of a scheme in a protocol that the command line of `train` names."""
+    from lowalt.recognition.samples import ViewSamples, first_models, with_extra
+
+    samples = {
+        part: _open(given, folds(protocol, part), scheme, settings["size"], placed=False)
+        for part in ("train", "validation")
+    }
+    if scheme.share < 1:
+        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
+    if given.extra:
+        more = ViewSamples(given.extra, scheme.columns, folds(protocol, "train"))
+        samples["train"] = with_extra(samples["train"], more)
+    if given.stream:
+        from lowalt.recognition.stream import streamed
+
+        models = settings["training"].get("stream_models", 0)
+        samples["train"] = streamed(samples["train"], given.stream, scheme.columns, protocol, models)
+    return samples
+
+
 def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
     classes."""
+    from lowalt.recognition import start
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
-    from lowalt.recognition.samples import ViewSamples, first_models, with_extra
 
     line = parser("lowalt.recognition train", _train.__doc__)
     name_sources(line)
     line.add_argument("--extra", nargs="+", help="caches of views of other runs that are trained on too")
     line.add_argument("--stream", help="config.yaml of a run with clouds, of which fresh motion models are trained on")
+    line.add_argument("--start", help="model.pt of a finished training on these samples, whose weights it starts from")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
@@ -94,21 +116,14 @@ def _train(arguments: list[str]) -> None:
     scheme = named(given.schemes, given.scheme, given.stations)
     pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     settings = scheme.settled(given.settings)
-    samples = {
-        part: _open(given, folds(given.protocol, part), scheme, settings["size"], placed=False)
-        for part in ("train", "validation")
-    }
-    if scheme.share < 1:
-        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    if given.extra:
-        more = ViewSamples(given.extra, scheme.columns, folds(given.protocol, "train"))
-        samples["train"] = with_extra(samples["train"], more)
-    if given.stream:
-        from lowalt.recognition.stream import streamed
-
-        models = settings["training"].get("stream_models", 0)
-        samples["train"] = streamed(samples["train"], given.stream, scheme.columns, given.protocol, models)
-    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
+    samples, begun = _parts(given, given.protocol, scheme, settings), None
+    if given.start:
+        # A started training has steps of its own; those of the scheme's row are of a training from fresh weights.
+        settings["training"]["steps"] = given.settings["training"]["steps"]
+        begun = start.opened(given.start)
+        start.check_settings(begun, scheme, settings)
+        start.check_samples(begun, _parts(given, begun.state["protocol"], begun.scheme, settings), samples)
+    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard, begun)
 
 
 def _evaluate(arguments: list[str]) -> None:

@@ -37,8 +37,9 @@ from lowalt.recognition.classical_models import of_arrays
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.methods import built
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import Scheme, columns_in
+from lowalt.recognition.schemes import Scheme, columns_in, of_record
 from lowalt.recognition.slow_time import SlowTimeSamples, of_stations
+from lowalt.recognition.start import Start, carry
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
 from lowalt.spectra.catalogue import named
@@ -48,13 +49,14 @@ Samples = ViewSamples | ShardSamples | SlowTimeSamples
 
 
 def train(
-    samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False
-) -> None:
+    samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
+    start: Start | None = None,
+) -> None:  # fmt: skip
     """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
 
     samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training,
     augmentation, classes}, the classes by label; events: whether to write the metrics for TensorBoard too,
-    into `events/` of the folder.
+    into `events/` of the folder; start: the finished training whose weights it starts from, its samples checked.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -62,6 +64,8 @@ def train(
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
     if scheme.sees == "features":
+        if start:
+            raise InputError(f"--start: scheme {scheme.name!r} is no network, expected one")
         _record(folder / "run.json", classical_runs.train(samples, scheme, protocol, settings, folder))
         return
     augment.check(settings["augmentation"])
@@ -70,29 +74,28 @@ def train(
             f"training: stream is {block['stream']}, expected a share above 0 together with --stream, or neither"
         )
     machine = Machine.here(block["precision"])
-    own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
-    # Leave out settings that change no weight, and name the precision that this machine computes with.
-    kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
-    name = checkpoint.identity(
-        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
-        samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
-        **({"own": sha256(own)} if own and own.is_file() else {}),
-    )  # fmt: skip
+    begun = {"start": start.about} if start else {}
+    name = _identity(samples, scheme, protocol, settings, machine, begun)
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
     model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
+    if start:
+        fresh = carry(start, scheme, model)
+        print(f"{folder}: starts from {start.name}, fresh weights: {fresh or 'none'}", file=sys.stderr)
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
+    # Weights that come from another training are a candidate as they are.
+    trainer.validates_first = start is not None
     resumed = trainer.resume()
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
     if events and machine.rank == 0:
         trainer.metrics = metrics.tensorboard(folder / "events", trainer.at.steps)
-    start, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
+    began, busy, steps = time.monotonic(), time.process_time(), trainer.at.steps
     at = trainer.fit()
-    seconds, busy = time.monotonic() - start, time.process_time() - busy
+    seconds, busy = time.monotonic() - began, time.process_time() - busy
     trainer.finish({
         "scheme": asdict(scheme), "protocol": protocol, "network": settings["network"], "size": settings["size"],
-        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes),
+        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes), **begun,
     })  # fmt: skip
     if machine.rank == 0:
         _record(folder / "run.json", {
@@ -105,8 +108,20 @@ def train(
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
             "precision": machine.precision,
             "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
-            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes),
+            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes), **begun,
         })  # fmt: skip
+
+
+def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine, begun: dict) -> str:
+    """Return the JSON text of all that determines a training's weights."""
+    own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
+    # Leave out settings that change no weight, and name the precision that this machine computes with.
+    kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
+    return checkpoint.identity(
+        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
+        samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
+        **({"own": sha256(own)} if own and own.is_file() else {}), **begun,
+    )  # fmt: skip
 
 
 def _record(path: Path, content: dict) -> None:
@@ -143,7 +158,7 @@ def of_state(state: dict, path: str | Path) -> Trained:
     """
     try:
         block = {**state["network"], "weights": "none"}
-        scheme = Scheme(**{key: tuple(v) if isinstance(v, list) else v for key, v in state["scheme"].items()})
+        scheme = of_record(state["scheme"])
         if scheme.sees == "features":
             model = of_arrays(state["weights"])
         else:
@@ -152,15 +167,6 @@ def of_state(state: dict, path: str | Path) -> Trained:
         return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
     except (KeyError, TypeError, RuntimeError) as error:
         raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
-
-
-def check_size(samples: Samples, size: int) -> None:
-    """Refuse samples of another size than `size` (pixels a side).
-
-    Raises: InputError naming both.
-    """
-    if samples.size != size:
-        raise InputError(f"--views: images of {samples.size} pixels, settings say {size}")
 
 
 def evaluate(

@@ -86,6 +86,11 @@ class Scheme:
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
 
 
+def of_record(record: dict) -> Scheme:
+    """Return the scheme of a record in a trained model, `dataclasses.asdict` of it with or without JSON's lists."""
+    return Scheme(**{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()})
+
+
 def columns_in(columns: Sequence[int], spectra: Sequence[str], stations: int, where: str) -> list[int]:
     """Return the places of views (`Scheme.columns`) among the images of a data set.
 

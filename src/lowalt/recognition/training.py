@@ -81,7 +81,7 @@ class Trainer:
             ReadAhead(read, workers, pin=gpu) for read in (reader, Unchanged(self.validation))
         )
         self.best_weights: dict = {}
-        self.waited_s = 0.0
+        self.waited_s, self.validates_first = 0.0, False
         self.metrics: Metrics | None = None
         self.at = TrainingState()
 
@@ -175,14 +175,13 @@ class Trainer:
     def _validate(self) -> None:
         """Validate the averaged weights, keep the best, and decide whether to stop early."""
         self._finite_weights()
-        facts = self.validation.facts
-        everything = np.arange(len(facts))
-        batch, ahead = self.block["batch"], self.read_validation
-        found = probabilities(self.ema.module, self.validation, everything, self.machine, batch, False, ahead)
+        facts, batch, ahead = self.validation.facts, self.block["batch"], self.read_validation
+        numbers, loss = np.arange(len(facts)), self.at.loss_sum / (self.at.loss_steps or math.nan)
+        found = probabilities(self.ema.module, self.validation, numbers, self.machine, batch, False, ahead)
         accuracy = float(np.mean(found.argmax(1) == facts.label))
         rate = self.block["rate"] * schedule(self.at.steps / self.block["steps"], self.block["warmup"])
         row = (self.at.steps, self.at.epoch, self.at.steps * self.block["batch"], rate,
-               self.at.loss_sum / self.at.loss_steps, float(cross_entropy(found, facts.label)), accuracy)  # fmt: skip
+               loss, float(cross_entropy(found, facts.label)), accuracy)  # fmt: skip
         self.at.history.append(row)
         if accuracy >= self.at.best:
             self.at.since_best = 0 if accuracy > self.at.best else self.at.since_best + 1
@@ -197,8 +196,9 @@ class Trainer:
     def fit(self) -> TrainingState:
         """Train to the last step or until validation stops improving; goes on from where the run stands."""
         start, last, first = time.monotonic(), time.monotonic(), self.at.steps
-        steps = self.block["steps"]
-        report = Reporter(steps, "steps")
+        report = Reporter(steps := self.block["steps"], "steps")
+        if self.validates_first and not self.at.history:
+            self._validate()
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
             rest = parts[self.at.batch : self.at.batch + steps - self.at.steps]

@@ -9,6 +9,7 @@ from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
 from lowalt.recognition.samples import ViewSamples, joined_views, with_extra
 from lowalt.recognition.schemes import TABLE, Scheme, named
+from lowalt.recognition.sources import of_size
 
 BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
 """Keys of the block `recognition` that a candidate may change."""
@@ -41,7 +42,7 @@ def trial(
     name = choices.named(candidate)
     block = choose.settled({key: settings[key] for key in BLOCKS}, choices.changes(name))
     source = ViewSamples(views, scheme.columns, choose.PAIRS)
-    runs.check_size(source, block["size"])
+    of_size(source, scheme, block["size"])
     parts = {part: part_of(source, rows) for part, rows in choose.parts(source.facts, fold, choices.folds).items()}
     held = sorted(set(parts["held"].facts.subtype.tolist()))
     if extra:

@@ -77,6 +77,11 @@ def stream(wildcards: Any, input: Any) -> str:
     return f"--stream {input.stream}" if input.get("stream") else ""
 
 
+def start(wildcards: Any, input: Any) -> str:
+    """The trained model whose weights a training starts from."""
+    return f"--start {input.start}" if input.get("start") else ""
+
+
 def samples(wildcards: Any, input: Any) -> str:
     """Option that names the signals, the shrunk images, the index of the shards, or the configuration to make samples
     from."""

@@ -9,6 +9,7 @@ from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import Scheme
 from lowalt.shards.clean import refuse
 from lowalt.targets.records import missing_inputs, records_of
@@ -47,6 +48,29 @@ def refuse_signals(config: dict, scheme: Scheme) -> None:
         )
     if scheme.sees == "signals" and scheme.size != symbols:
         raise InputError(f"scheme {scheme.name!r}: size {scheme.size}, expected the {symbols} symbols of a signal")
+
+
+def refuse_starts(starts: dict[str, dict], trained: set[str]) -> None:
+    """Refuse a start that this run does not train, that has met samples which are tested, or that goes in a circle.
+
+    starts: of each training, {"from": ...}; trained: all trainings of the run, as PROTOCOL/SCHEME.
+    """
+    for name, entry in starts.items():
+        origin = entry["from"]
+        if origin not in trained:
+            raise InputError(f"recognition.start: {name} from {origin!r}, expected one of {sorted(trained)}")
+        own, theirs = name.split("/")[0], origin.split("/")[0]
+        parts = ("train", "validation")
+        if not all(folds(theirs, part) <= folds(own, part) for part in parts):
+            raise InputError(
+                f"recognition.start: {name} from {origin!r}, which trains on samples that {own!r} tests; expected a "
+                "training in a protocol whose samples are all among its own"
+            )
+        passed = [name]
+        while passed[-1] in starts:
+            passed.append(starts[passed[-1]]["from"])
+            if passed[-1] in passed[:-1]:
+                raise InputError(f"recognition.start: {' from '.join(passed)} is a circle")
 
 
 def refuse_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:

@@ -28,6 +28,7 @@ from lowalt.workflow.refusals import (
     refuse_no_files,
     refuse_signals,
     refuse_sizes,
+    refuse_starts,
 )
 
 
@@ -87,7 +88,12 @@ class Run:
             raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
         for name in block.get("extra", []):
             refuse_extra(config, name, classes)
-        return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
+        run = cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
+        for name in block.get("start", {}):
+            # An overlay may train less; a name that no table has is a slip.
+            named(block["table"], name.partition("/")[2], run.stations)
+        refuse_starts(run.starts, run.pairs)
+        return run
 
     @property
     def sources(self) -> str:
@@ -143,6 +149,25 @@ class Run:
             if protocol in scheme.protocols
             for seed in block["seeds"]
         ]
+
+    @cached_property
+    def pairs(self) -> set[str]:
+        """PROTOCOL/SCHEME of every training, by the scheme's name."""
+        protocols = self.config["recognition"]["protocols"]
+        return {f"{one}/{scheme.name}" for scheme in self.trained for one in protocols if one in scheme.protocols}
+
+    @cached_property
+    def starts(self) -> dict[str, dict]:
+        """Entries of `recognition.start` for the trainings of this run, by PROTOCOL/SCHEME."""
+        given = self.config["recognition"].get("start", {})
+        return {name: entry for name, entry in given.items() if name in self.pairs}
+
+    def start_of(self, wildcards: Any) -> dict | None:
+        """The entry of `recognition.start` for a job, None where its training starts from fresh weights."""
+        if not self.starts:
+            return None
+        scheme = self.schemes_by_slug[wildcards.scheme]
+        return self.starts.get(f"{wildcards.get('protocol', '')}/{scheme.name}")
 
     @property
     def processes(self) -> int:

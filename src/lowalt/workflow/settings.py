@@ -135,13 +135,18 @@ class Settings:
         return self._text("slow_time", *snrs, snr_db=snrs)
 
     def training(self, wildcards: Any) -> str:
-        """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
+        """How a network is trained: from its own seed, or from the run's where a job names no training seed; with its
+        own steps where it starts from another training."""
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
+        entry = self._run.start_of(wildcards) or {}
+        own = {key: value for key, value in entry.items() if key != "from"}
+        kept["training"] = {**kept["training"], **own}
         return self._text(
             "training",
             seed,
+            *sorted(own.items()),
             seed=seed,
             colour_map=self._config["images"]["colour_map"],
             classes=self._run.classes,
