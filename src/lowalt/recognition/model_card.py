@@ -99,6 +99,7 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         ("network", f"{method}, fusion {scheme['fusion']}"),
         ("sees", f"{spectra}, {state['size']} x {state['size']} pixels each" if spectra else "the slow-time signals"),
         ("seed", state["seed"]),
+        *([("started from the weights of", state["start"]["training"])] if "start" in state else []),
         *((words, _shown(content.run[key])) for key, words in RUN.items() if key in content.run),
         *((f"SHA-256 of the {part} samples", f"`{digest}`")
           for part, digest in sorted(content.identity.get("samples", {}).items())),
