@@ -56,7 +56,7 @@ def train(
 
     samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training,
     augmentation, classes}, the classes by label; events: whether to write the metrics for TensorBoard too,
-    into `events/` of the folder; start: the finished training whose weights it starts from, its samples checked.
+    into `events/` of the folder; start: the finished training whose weights it starts from, checked by `start`.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
@@ -64,8 +64,6 @@ def train(
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
     if scheme.sees == "features":
-        if start:
-            raise InputError(f"--start: scheme {scheme.name!r} is no network, expected one")
         _record(folder / "run.json", classical_runs.train(samples, scheme, protocol, settings, folder))
         return
     augment.check(settings["augmentation"])
@@ -80,8 +78,7 @@ def train(
     recipe.seeded(settings["seed"], keys, block["threads"])
     model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
     if start:
-        fresh = carry(start, scheme, model)
-        print(f"{folder}: starts from {start.name}, fresh weights: {fresh or 'none'}", file=sys.stderr)
+        carry(start, scheme, model)
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
     # Weights that come from another training are a candidate as they are.
     trainer.validates_first = start is not None

@@ -6,6 +6,7 @@ not train on, and may have been chosen by none that does not validate it; both a
 """
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,7 +96,7 @@ def check_samples(start: Start, theirs: dict[str, Any], own: dict[str, Any]) -> 
 
 
 def carry(start: Start, scheme: Scheme, model: nn.Module) -> list[str]:
-    """Copy the start's weights into a network, in place; return the names of the weights that stay fresh.
+    """Copy the start's weights into a network, in place; return, and print, the names of those that stay fresh.
 
     scheme: what the network sees. Raises: InputError where nothing carries over.
     """
@@ -115,4 +116,5 @@ def carry(start: Start, scheme: Scheme, model: nn.Module) -> list[str]:
             fresh.append(name)
     if len(fresh) == len(state):
         raise InputError(f"--start: {start.name} has no weights that fit this network")
+    print(f"training: starts from {start.name}, fresh weights: {fresh or 'none'}", file=sys.stderr)
     return fresh
