@@ -63,16 +63,7 @@ class Products(DataProducts):
         if self._config["recognition"]["training"].get("stream", 0) and sees == "images":
             made = self._made()
             found |= {"stream": made.pop("dataset"), **made}
-        return {**found, **self._start(wildcards)}
-
-    def _start(self, wildcards: Any) -> dict[str, str]:
-        """The trained model whose weights a training starts from, of the same training seed; none for most."""
-        entry = self._run.start_of(wildcards)
-        if not entry:
-            return {}
-        protocol, _, name = entry["from"].partition("/")
-        scheme = self._run.schemes[name].slug
-        return {"start": f"results/{wildcards.run}/models/{protocol}/{scheme}/{wildcards.train_seed}/model.pt"}
+        return {**found, **self._run.start_model(wildcards)}
 
     def _own_backbone(self, wildcards: Any) -> dict[str, str]:
         """The user's file that a scheme's backbone is made in, none for a library's backbone."""

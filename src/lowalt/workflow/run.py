@@ -169,6 +169,15 @@ class Run:
         scheme = self.schemes_by_slug[wildcards.scheme]
         return self.starts.get(f"{wildcards.get('protocol', '')}/{scheme.name}")
 
+    def start_model(self, wildcards: Any) -> dict[str, str]:
+        """The trained model whose weights a job's training starts from, of the same training seed; none for most."""
+        entry = self.start_of(wildcards)
+        if not entry:
+            return {}
+        protocol, _, name = entry["from"].partition("/")
+        folder = f"results/{wildcards.run}/models/{protocol}/{self.schemes[name].slug}"
+        return {"start": f"{folder}/{wildcards.train_seed}/model.pt"}
+
     @property
     def processes(self) -> int:
         """Processes that share one training."""
