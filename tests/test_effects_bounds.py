@@ -162,6 +162,22 @@ def used(place, name, others):
     return change / (chain.bounds(frozenset(BY_NEED))[name] + 10 * chain.interpolation())
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_part_without_amplitude_adds_nothing_to_a_bound_even_an_infinite_one(monkeypatch):
+    radio = network()
+    cloud, row = target([[0.0, 0.0, 0.0]], x_m=100.0)
+    asked = scene(radio, {"squint": {}}, tolerance=1e-3)
+    view = observe(asked, radio.stations[0], cloud, row)
+    chain = Chain(list(asked.effects), view, lambda name: asked.stream(name, row, "A"), 1.0)
+    body, rotor = chain.peaks[0]
+    assert body > 0 and rotor == 0
+    monkeypatch.setattr(squint, "bound", lambda settings, view, others: np.array([[0.25, np.inf]]))
+    assert chain.bounds(frozenset({"squint"})) == {"squint": 0.25 * chain.peaks[:, 0].max()}
+    chain.__dict__["peaks"] = np.zeros_like(chain.peaks)
+    chain.limit(1e-3)
+    assert chain.interpolation() == 0 and chain.bounds(frozenset({"squint"})) == {"squint": 0.0}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("alone", [True, False])
 @pytest.mark.parametrize("name", BY_NEED)

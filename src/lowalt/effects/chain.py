@@ -92,20 +92,26 @@ class Chain:
     def limit(self, allowed: float) -> None:
         """Set the error of interpolation so that no range cell errs by more than `allowed` (units of the signal).
 
-        Where `allowed` is below rounding, the error is that of rounding.
+        Where `allowed` is below rounding, the error is that of rounding. Of a target that no ray reaches, nothing errs.
         """
         self.error = EXACT
-        self.error = min(max(EXACT, EXACT * allowed / self.interpolation()), COARSEST)
+        reached = self.interpolation()
+        self.error = min(max(EXACT, EXACT * allowed / reached), COARSEST) if reached > 0.0 else COARSEST
 
     def bounds(self, names: frozenset[str]) -> dict[str, float]:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
         return {
-            name: float(
-                (effect.module.bound(effect.settings, self.view, self.names - {name}) * self.peaks).sum(axis=1).max()
-            )
+            name: self._largest(effect.module.bound(effect.settings, self.view, self.names - {name}))
             for name, effect in self.target.by_need.items()
             if name in names
         }
+
+    def _largest(self, shares: np.ndarray) -> float:
+        """Return the largest change of a range cell, from each part's bound relative to its peak.
+
+        A part without amplitude changes nothing, even where its bound is infinite.
+        """
+        return float((np.where(self.peaks > 0.0, shares, 0.0) * self.peaks).sum(axis=1).max())
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
