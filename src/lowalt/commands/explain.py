@@ -1,4 +1,4 @@
-"""The command `lowalt explain`: what a scene simulates, what it leaves out and why, and what it costs."""
+"""The command `lowalt explain` lists the effects that a scene simulates and those left out, with reason and cost."""
 
 import argparse
 import os
@@ -19,7 +19,7 @@ def _sample(text: str) -> tuple[str, int]:
 def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
     """Add `explain` to a parser's commands; base: the configuration by default; schema: its schema."""
     line = commands.add_parser(
-        "explain", help="what a scene simulates, what it leaves out and why, and what it costs",
+        "explain", help="list the effects that a scene simulates and those left out, with reason and cost",
         epilog="example: lowalt explain config/scenes/urban.yaml --sample Crow:3",
     )  # fmt: skip
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the base; more may follow it")
