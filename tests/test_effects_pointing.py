@@ -99,8 +99,8 @@ def test_a_beam_turned_to_where_it_points_changes_no_bit():
     called_for = {"ground_reflection": {}}
     view = observe(scene(called_for), station, cloud, row)
     aims = np.repeat(view.aim_m[None], 3, axis=0)
-    again = replace(view, beams=Beams(np.array([0.0, 0.02, 0.06]), aims))
-    assert [len(rows) for _, rows in again.beam_rows()] == [8, 16, 16]
+    again = replace(view, beams={station.name: Beams(np.array([0.0, 0.02, 0.06]), aims)})
+    assert [len(rows) for _, _, rows in again.beam_rows()] == [8, 16, 16]
     paths = [one for effect in called(called_for) for one in effect.module.paths(effect.settings, view)]
     factor = np.random.default_rng(1).random((40, 9))
     # Fewer symbols at once may give another order of the interpolating polynomial.

@@ -186,7 +186,7 @@ def case(numbers: np.ndarray) -> Case:
         "playback": 1.0, "start_s": place[10],
     }  # fmt: skip
     given = strengths(dict(zip(NAMES, strong, strict=True))) | {name: {} for name in BY_NEED}
-    absent = set(MONOSTATIC) | {"reflected_aspect", "walls"} if linked else set(LINKS)
+    absent = set(MONOSTATIC) if linked else set(LINKS)
     absent |= {"occlusion", "companions", "gusts", "rotor_spread"} if recorded else set()
     if linked:
         given["fluctuation"]["pattern"] = False

@@ -12,8 +12,8 @@ from lowalt.effects.view import View
 def crossing(view: View, sends: Station, hears: Station) -> tuple[np.ndarray, float]:
     """Return the free-space response (M,) from mast to mast on the subcarriers of `hears`, and its delay (s).
 
-    Both beams point as in `view`; sends: with the frequency of `hears`. The response is in the units of the echo: the
-    amplitude is sqrt(P / elements) lambda / (4 pi d) times both array sums. Source: Friis 1946.
+    Each station's beam points as in `view`; sends: with the frequency of `hears`. The response is in the units of the
+    echo: the amplitude is sqrt(P / elements) lambda / (4 pi d) times both array sums. Source: Friis 1946.
     """
     network = view.network
     distance = float(np.linalg.norm(np.asarray(hears.position_m) - np.asarray(sends.position_m)))
@@ -34,7 +34,7 @@ def _array(view: View, station: Station, counts: tuple[int, int], other: Station
     radio = radar(view.network, station)
     axes = radio.station, radio.sine, radio.cosine
     toward = aim_cosines(np.asarray(other.position_m, np.float64), *axes)
-    steered = aim_cosines(np.asarray(view.aim_m, np.float64), *axes)
+    steered = aim_cosines(np.asarray(view.aim_of(station), np.float64), *axes)
     total = 1.0 + 0.0j
     for count, seen, aimed in zip(counts, toward, steered, strict=True):
         total *= np.exp(1j * np.pi * radio.kappa * np.arange(count) * (seen - aimed)).sum()

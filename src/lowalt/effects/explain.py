@@ -182,7 +182,7 @@ def sample_facts(scene: Scene, sample: ExplainedSample, station_name: str) -> Sa
 def link_geometry(view: View) -> LinkGeometry:
     """Return the distances and the bistatic angle of a target that a link between two stations observes."""
     station = view.station
-    ends = [np.asarray(one.position_m) - view.aim_m for one in (station.transmitter, station)]
+    ends = [np.asarray(one.position_m) - view.origin_m for one in (station.transmitter, station)]
     out, back = (float(np.linalg.norm(one)) for one in ends)
     return LinkGeometry(out, back, math.acos(float(np.clip(ends[0] @ ends[1] / (out * back), -1.0, 1.0))))
 

@@ -39,7 +39,7 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     """
     network, station = view.network, view.station
     sender = station.transmitter or station
-    out, back = (float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in (sender, station))
+    out, back = (float(np.linalg.norm(view.origin_m - np.asarray(end.position_m))) for end in (sender, station))
     range_m, sent = 0.5 * (out + back), dbm(network.power)
     arrays = [10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive)]
     section = 10 * math.log10(float(view.cloud.rcs_m2.sum()))
@@ -98,9 +98,9 @@ def expected_dbm(view: View) -> float:
 
 
 def path_db(view: View) -> float:
-    """Return the loss (dB, negative) of an echo of 1 m2 at the aim, from the sender to the target and on."""
+    """Return the loss (dB, negative) of an echo of 1 m2 at the target's origin, from the sender to it and on."""
     ends = view.station.transmitter or view.station, view.station
-    out, back = (float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in ends)
+    out, back = (float(np.linalg.norm(view.origin_m - np.asarray(end.position_m))) for end in ends)
     wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
     return 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * out**2 * back**2))
 
@@ -134,7 +134,7 @@ def _elements(view: View) -> list[Level]:
         ends = {"of the sender": view.station.transmitter, "of the receiver": view.station}
     result = []
     for name, end in ends.items():
-        gain = 1.0 if view.element is None else float(antenna.gain(view.element, end, view.aim_m))
+        gain = 1.0 if view.element is None else float(antenna.gain(view.element, end, view.origin_m))
         result.append(Level(f"element {name}", 10 * math.log10(gain), "dBi"))
     return result
 

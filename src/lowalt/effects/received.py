@@ -32,7 +32,7 @@ from lowalt.effects.interface import (
 from lowalt.effects.need import Decision
 from lowalt.effects.steps import error_before, steps_alone
 from lowalt.effects.target_echo import TargetEcho
-from lowalt.effects.view import Beams, View
+from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
 BEYOND_MOTION = "transmitter", "channel", "receiver", "detection"
@@ -164,7 +164,7 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
             # A companion of the target's own subtype has its cross sections already.
             own = given if given is cloud else with_cross_sections(scene, given)
             seen = observe(scene, view.station, own, at, view.occluders if given is cloud else None)
-            beams = view.beams or Beams(np.zeros(1), view.aim_m[None])
+            beams = {end.name: view.beams_of(end) for end in _ends(scene.network, view.station)}
             seen = replace(seen, times_s=view.times_s, sampling=view.sampling, beams=beams)
             draws = partial(_drawn, scene, at, view.station.name)
             result.append(TargetEcho(mine, seen, draws, chain.sending))
@@ -202,9 +202,19 @@ def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: 
         scene.network, station, cloud, row, times_s, grid_s, moved, occluders, element, reflected, sampling=sampling
     )  # fmt: skip
     for effect in providing(scene.effects, PointsBeams):
-        draws = scene.stream(effect.name, row, station.name)
-        view = replace(view, beams=effect.module.beams(effect.settings, view, draws))
+        beams = {
+            end.name: effect.module.beams(effect.settings, view.of(end), scene.stream(effect.name, row, end.name))
+            for end in _ends(scene.network, station)
+        }
+        view = replace(view, beams=beams)
     return view
+
+
+def _ends(network: Network, station: Station) -> list[Station]:
+    """All stations of the network that are not links, and those of `station`."""
+    own = [station] if station.transmitter is None else [station.transmitter, station.receiver]
+    others = [one for one in network.stations if one.transmitter is None]
+    return list({one.name: one for one in [*others, *own]}.values())
 
 
 def settle(chain: Chain, asked: list[str], share: float, trial: Outcome) -> tuple[Outcome, list[Decision]]:

@@ -23,12 +23,14 @@ class ImagePath(NamedTuple):
     """A one-way propagation path between a station and every point, given by the points' images.
 
     places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's complex factor in
-    addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image, where the points see the station.
+    addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image, where the points see the station;
+    sender: on a link, the path of the same kind between the sender and the points, None where both are alike.
     """
 
     places: np.ndarray
     coefficient: np.ndarray | complex = 1.0
     station_m: np.ndarray | None = None
+    sender: "ImagePath | None" = None
 
 
 def response(
@@ -38,6 +40,7 @@ def response(
     rcs_m2: np.ndarray,
     aim_m: np.ndarray,
     *,
+    sender_aim_m: np.ndarray | None = None,
     paths: Sequence[ImagePath] = (),
     factor: np.ndarray | float = 1.0,
     squint: bool = False,
@@ -46,16 +49,18 @@ def response(
 ) -> np.ndarray:
     """Return the subcarriers Y (N, M) complex128 of points at `places` (N, L, 3) m, the known symbol removed.
 
-    rcs_m2: (L,) m2; aim_m: (3,) m, where both beams point; paths: all but the direct one; waves go out by any path
-    and come back by any; factor: real factor on every point's two-way amplitude, (N, L), or (R, N, L) for each of the R
-    routes there and back by one path, the direct one first; squint: the arrays' phases
+    rcs_m2: (L,) m2; aim_m: (3,) m, where both beams point, on a link the receiver's; sender_aim_m: where the sender's
+    points, None for the same; paths: all but the direct one; waves go out by any path and come back by any; factor:
+    real factor on every point's two-way amplitude, (N, L), or (R, N, L) for each of the R routes there and back by one
+    path, the direct one first, or (R, R, N, L) by the way out and the way back; squint: the arrays' phases
     follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves; error:
     largest error of interpolation and truncation together, relative to the sum of peak amplitudes.
-    A link goes out by its transmitter's array and comes back by its receiver's; it has no other paths.
-    Raises: InputError for a point in the station, or a link with other paths. Source: paper Eqs. 4, 7 and 24;
+    A link goes out by its transmitter's array and paths, and comes back by its receiver's.
+    Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24;
     Jacobi-Anger expansion; Willis, Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
-    rays = OneWayFactors(network, station, places, aim_m, paths, squint=squint, wavefront=wavefront, error=error)
+    asked = {"squint": squint, "wavefront": wavefront, "error": error}
+    rays = OneWayFactors(network, station, places, aim_m, paths, sender_aim_m=sender_aim_m, **asked)
     return rays.summed(np.sqrt(rcs_m2) * factor)
 
 
@@ -69,15 +74,15 @@ class OneWayFactors:
     def __init__(
         self, network: Network, station: Station, places: np.ndarray, aim_m: np.ndarray,
         paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float, kept: dict | None = None,
+        sender_aim_m: np.ndarray | None = None,
     ):  # fmt: skip
         self.radio = radio = radar(network, station)
-        if station.transmitter is not None and paths:
-            raise InputError(f"station {station.name}: {len(paths)} further paths, expected none on a link between two")
         seen = [ImagePath(places), *paths]
         chosen, self.refs = _end(network, station, seen, aim_m)
         sending = chosen
         if station.transmitter is not None:
-            sending, _ = _end(network, station.transmitter, seen, aim_m)
+            out = [path.sender or path for path in seen]
+            sending, _ = _end(network, station.transmitter, out, aim_m if sender_aim_m is None else sender_aim_m)
             if station.transmitter.position_m != station.position_m:
                 self.refs = _range_sum(network, station, places[:, 0])
         # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
@@ -100,12 +105,11 @@ class OneWayFactors:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
 
         strength: also (R, N, L), factors of their own for each path there and back; for a way
-        out by path a and back by path b, the factor is the geometric mean of those of a and b. Symbols without any
-        strength are zero.
+        out by path a and back by path b, the factor is the geometric mean of those of a and b; or (R, R, N, L), the
+        factors of every way out and way back. Symbols without any strength are zero.
         """
         radio, refs = self.radio, self.refs
         strength = radio.scale * np.atleast_2d(strength)
-        own_routes = strength.ndim == 3
         own, whole = np.exp(-2j * np.pi * refs[:, TURN]), refs[:, CELL].astype(np.int64)
         result = np.zeros((len(refs), radio.subcarriers), np.complex128)
         for a, b, times in self.pairs:
@@ -116,7 +120,9 @@ class OneWayFactors:
             bessel = tables.table(reach, radio.subcarriers, self.rest)
             orders = np.empty((len(refs), 2, len(self.nodes), len(bessel)))
             paired = strength
-            if own_routes:
+            if strength.ndim == 4:
+                paired = strength[a, b]
+            elif strength.ndim == 3:
                 paired = strength[a] if a == b else np.sqrt(strength[a] * strength[b])
             moment_loops.moments(
                 paired, there.factors, home.factors, times, there.excess, home.excess, middle, 0.5 * radio.cells,

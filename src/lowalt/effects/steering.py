@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lowalt.common.network import Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
 from lowalt.effects.response import ImagePath, OneWayFactors
@@ -27,17 +28,20 @@ class Steered:
     ):  # fmt: skip
         """Prepare the factors; kept: as in `response.OneWayFactors`, for every beam."""
         self.view, asked = view, {"squint": squint, "wavefront": wavefront, "error": error}
-        given = view.network, view.station
-        if view.beams is None or len(view.beams.starts_s) == 1:
-            self.beams = [(slice(None), 1.0, OneWayFactors(*given, view.places, view.aim_m, paths, kept=kept, **asked))]
+        given, self.steady = (view.network, view.station), not view.turning
+        if self.steady:
+            out, back = view.aims_m
+            rays = OneWayFactors(*given, view.places, back, paths, sender_aim_m=out, kept=kept, **asked)
+            self.beams = [(slice(None), 1.0, rays)]
             return
         self.beams = []
-        for number, rows in view.beam_rows():
-            some = [ImagePath(path.places[rows], _rows_of(path.coefficient, rows)) for path in paths]
-            aim = view.beams.aims_m[number]
+        for number, aims, rows in view.beam_rows():
+            some = [_at_rows(path, rows) for path in paths]
             own = None if kept is None else kept.setdefault(number, {})
-            rays = OneWayFactors(*given, view.places[rows], aim, some, kept=own, **asked)
-            self.beams.append((rows, _kept_phase(view, aim), rays))
+            rays = OneWayFactors(
+                *given, view.places[rows], aims[1], some, sender_aim_m=aims[0], kept=own, **asked
+            )  # fmt: skip
+            self.beams.append((rows, _kept_phase(view, aims), rays))
 
     def echo(self, factor: np.ndarray | float = 1.0) -> np.ndarray:
         """Return the subcarriers (N, M) with `factor` on every point's amplitude as in `response`.
@@ -45,7 +49,7 @@ class Steered:
         Symbols in which the factor is zero for all points are zero.
         """
         view, roots = self.view, np.sqrt(self.view.cloud.rcs_m2)
-        if view.beams is None or len(view.beams.starts_s) == 1:
+        if self.steady:
             return self.beams[0][2].summed(roots * factor)
         result = np.empty((len(view.times_s), view.network.subcarriers), np.complex128)
         for rows, phase, rays in self.beams:
@@ -58,12 +62,33 @@ def _rows_of(values: np.ndarray | complex, rows: np.ndarray) -> np.ndarray | com
     return values[..., rows, :] if np.ndim(values) > 1 and values.shape[-2] > 1 else values
 
 
-def _kept_phase(view: View, aim_m: np.ndarray) -> complex:
-    """Phase factor that cancels the phase change of both arrays' middles from the first beam to the beam at `aim_m`."""
-    radio = radar(view.network, view.station)
-    (h0, v0), (h1, v1) = (
-        aim_cosines(np.asarray(aim, np.float64), radio.station, radio.sine, radio.cosine) for aim in (view.aim_m, aim_m)
-    )
-    exact = constants(radio.exact)
-    turns = exact.phase_h[0] * (h1 - h0) + exact.phase_v[0] * (v1 - v0)
+def _at_rows(path: ImagePath, rows: np.ndarray) -> ImagePath:
+    """A path at some symbols alone."""
+    sender = None if path.sender is None else _at_rows(path.sender, rows)
+    return ImagePath(path.places[rows], _rows_of(path.coefficient, rows), path.station_m, sender)
+
+
+def _kept_phase(view: View, aims_m: np.ndarray) -> complex:
+    """Phase factor that cancels the phase change of both arrays' middles from the first beams to those at `aims_m`.
+
+    aims_m: (2, 3) m, the sender's and the receiver's.
+    """
+    station, network = view.station, view.network
+    if station.transmitter is None:
+        exact, (across, up) = constants(radar(network, station).exact), _turned(view, station, view.aim_m, aims_m[1])
+        return np.exp(2j * np.pi * (exact.phase_h[0] * across + exact.phase_v[0] * up))
+    turns = 0.0
+    ends = (station.transmitter, network.transmit), (station, network.receive)
+    for (end, counts), first, later in zip(ends, view.aims_m, aims_m, strict=True):
+        across, up = _turned(view, end, first, later)
+        turns += 0.25 * radar(network, station).kappa * ((counts[0] - 1) * across + (counts[1] - 1) * up)
     return np.exp(2j * np.pi * turns)
+
+
+def _turned(view: View, station: Station, first_m: np.ndarray, later_m: np.ndarray) -> tuple[float, float]:
+    """Change of a beam's direction cosines along a station's axes."""
+    radio = radar(view.network, station)
+    (h0, v0), (h1, v1) = (
+        aim_cosines(np.asarray(aim, np.float64), radio.station, radio.sine, radio.cosine) for aim in (first_m, later_m)
+    )
+    return h1 - h0, v1 - v0

@@ -48,12 +48,13 @@ class TargetEcho:
     @cached_property
     def strengths(self) -> np.ndarray:
         """Largest sum of amplitudes (N, P) that each part can have in a range cell before the receiver."""
-        amplitudes = 1.0 + sum(float(np.max(abs(path.coefficient))) for path in self._paths)
-        return need.part_amplitudes(self.view) * amplitudes**2 * float(np.max(self.routes))
+        back = _amplitude(self._paths)
+        out = _amplitude([path.sender or path for path in self._paths])
+        return need.part_amplitudes(self.view) * (out * back) * float(np.max(self.routes))
 
     @cached_property
     def routes(self) -> np.ndarray | float:
-        """Factor on the points' amplitudes: `factor`, or (R, N, L) of each route where the scene tells them apart."""
+        """Factor on the points' amplitudes: `factor`, or that of each route where the scene tells them apart."""
         told = providing(self.channel, WeighsRoutes)
         if not told or not self._paths:
             return self.factor
@@ -130,7 +131,7 @@ class TargetEcho:
         for later, weight in zip(seen, weights, strict=True):
             paths = held
             if held and later is not view:
-                paths = [ImagePath(new, old.coefficient) for new, old in zip(self._images_of(later), held, strict=True)]
+                paths = self._moved(later, held)
             rays = Steered(
                 later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error, kept=kept
             )
@@ -144,10 +145,21 @@ class TargetEcho:
         return samples
 
     def _paths_of(self, view: View) -> list[ImagePath]:
-        """All paths except the direct one."""
-        return [
-            path for effect in providing(self.channel, AddsPaths) for path in effect.module.paths(effect.settings, view)
+        """All paths except the direct one; on a link those of its receiver, each with its sender's."""
+        ends = [
+            [path for one in providing(self.channel, AddsPaths) for path in one.module.paths(one.settings, end)]
+            for end in view.ends()
         ]
+        return ends[0] if len(ends) == 1 else _paired(*ends)
+
+    def _moved(self, view: View, held: list[ImagePath]) -> list[ImagePath]:
+        """The paths `held`, with the images at the instants of `view`."""
+        senders = [path.sender or path for path in held]
+        ends = [
+            [ImagePath(new, old.coefficient) for new, old in zip(self._images_of(end), olds, strict=True)]
+            for end, olds in zip(view.ends(), (senders, held), strict=False)
+        ]
+        return ends[0] if len(ends) == 1 else _paired(*ends)
 
     def _images_of(self, view: View) -> list[np.ndarray]:
         """The points' images (N, L, 3) m of all paths except the direct one."""
@@ -172,6 +184,16 @@ class TargetEcho:
         if view is self.view:
             self._seen[effect.name] = found
         return found
+
+
+def _paired(out: list[ImagePath], back: list[ImagePath]) -> list[ImagePath]:
+    """The paths of a link's receiver, each with its sender's."""
+    return [there._replace(sender=here) for here, there in zip(out, back, strict=True)]
+
+
+def _amplitude(paths: list[ImagePath]) -> float:
+    """Largest sum of the amplitudes of one way over the direct path and all others."""
+    return 1.0 + sum(float(np.max(abs(path.coefficient))) for path in paths)
 
 
 def _every_row(factor: np.ndarray, count: int) -> np.ndarray:

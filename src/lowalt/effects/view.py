@@ -1,6 +1,6 @@
 """One moving target as one station sees it: poses, places and normals, each computed when first needed."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -23,7 +23,7 @@ TOGETHER = 16
 
 
 class Beams(NamedTuple):
-    """Where both beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from 0."""
+    """Where a station's beams point: at aims_m (K, 3) m, each from starts_s (K,) s on, rising from 0."""
 
     starts_s: np.ndarray
     aims_m: np.ndarray
@@ -49,8 +49,8 @@ class View:
     """The antenna elements' pattern, None for isotropic ones."""
     reflected: bool = False
     """Whether the station also sees images of the points; their directions are then not bounded by the target's."""
-    beams: Beams | None = None
-    """Where both beams point, None for the target's origin at the first symbol."""
+    beams: Mapping[str, Beams] | None = None
+    """Where each station's beams point, by its name; None for the target's origin at the first symbol."""
     sampling: "Sampling | None" = None
     """Instants of all symbols and which are received, None for all at n T_r."""
 
@@ -80,17 +80,54 @@ class View:
         return "node" in self.cloud.kinds
 
     @property
-    def aim_m(self) -> np.ndarray:
-        """Where both beams point at first, (3,) m: without pointing errors the target's origin at the first symbol."""
-        if self.beams is not None:
-            return self.beams.aims_m[0]
+    def origin_m(self) -> np.ndarray:
+        """The target's origin at the first symbol, (3,) m."""
         return np.array([self.row["x_m"], self.row["y_m"], self.row["z_m"]])
 
-    def beam_rows(self) -> list[tuple[int, np.ndarray]]:
-        """Return the number of every beam in use and the symbols it lights, as indices."""
+    def beams_of(self, station: Station) -> Beams:
+        """Return where a station's beams point; of a link, where its receiver's do."""
+        if self.beams is None:
+            return Beams(np.zeros(1), self.origin_m[None])
+        return self.beams[(station.receiver or station).name]
+
+    def aim_of(self, station: Station) -> np.ndarray:
+        """Return where a station's beams point at first, (3,) m."""
+        return self.beams_of(station).aims_m[0]
+
+    @property
+    def aim_m(self) -> np.ndarray:
+        """Where the receiver's beams point at first, (3,) m: without pointing errors the target's origin."""
+        return self.aim_of(self.station)
+
+    @property
+    def aims_m(self) -> np.ndarray:
+        """Where the sender's and the receiver's beams point at first, (2, 3) m."""
+        return np.stack([self.aim_of(self.station.transmitter or self.station), self.aim_m])
+
+    @property
+    def turning(self) -> bool:
+        """Whether beams are turned during the look."""
+        if self.beams is None:
+            return False
+        ends = self.station.transmitter or self.station, self.station
+        return any(len(self.beams_of(end).starts_s) > 1 for end in ends)
+
+    def beam_rows(self) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """Return every pair of beams in use: its number, where it points (2, 3) m, and the symbols it lights (indices).
+
+        The sender's beam comes first, then the receiver's.
+        """
+        out, back = (self.beams_of(end) for end in (self.station.transmitter or self.station, self.station))
         # An instant that is a multiple of the update must not fall before it by rounding.
-        number = np.searchsorted(self.beams.starts_s, self.times_s + 1e-9, side="right") - 1
-        return [(int(one), np.flatnonzero(number == one)) for one in np.unique(number)]
+        sent, heard = (
+            np.searchsorted(one.starts_s, self.times_s + 1e-9, side="right") - 1 for one in (out, back)
+        )  # fmt: skip
+        pairs = sent * len(back.starts_s) + heard
+        return [
+            (int(pair), np.stack([out.aims_m[pair // len(back.starts_s)], back.aims_m[pair % len(back.starts_s)]]),
+             np.flatnonzero(pairs == pair))
+            for pair in np.unique(pairs)
+        ]  # fmt: skip
 
     @cached_property
     def element_gain(self) -> np.ndarray:
@@ -119,10 +156,16 @@ class View:
                 )
                 yield later
 
-    def seen_from(self, place_m: np.ndarray) -> "View":
-        """Return the same target, at the same instants and under the same beams, seen from another place (3,) m."""
-        place = tuple(float(value) for value in place_m)
-        return self.of(replace(self.station, position_m=place))
+    def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
+        """Return the same target, at the same instants and under the same beams, seen from another place (3,) m.
+
+        sender_m: (3,) m, on a link where its sender stands then, None for where it stands.
+        """
+        station = replace(self.station, position_m=tuple(float(value) for value in place_m))
+        if sender_m is not None:
+            sender = replace(station.transmitter, position_m=tuple(float(value) for value in sender_m))
+            station = replace(station, transmitter=sender)
+        return self.of(station)
 
     def of(self, station: Station) -> "View":
         """Return the same target, at the same instants and under the same beams, as another station hears it."""
@@ -134,9 +177,11 @@ class View:
 
     def ends(self) -> list["View"]:
         """Return the target as the sender and as the receiver of a link see it alone; a station's own view is both."""
-        if self.station.transmitter is None:
+        own = self.station
+        if own.transmitter is None:
             return [self]
-        return [self.of(self.station.transmitter), self.of(replace(self.station, transmitter=None, receiver=None))]
+        hears = replace(own, name=own.receiver.name, transmitter=None, receiver=None)
+        return [self.of(own.transmitter), self.of(hears)]
 
     @cached_property
     def centres(self) -> np.ndarray:

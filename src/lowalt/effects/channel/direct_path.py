@@ -18,9 +18,7 @@ SOURCE = (
 )
 DEFAULTS = {"loss_db": 0.0}
 
-MONOSTATIC = (
-    "ground_reflection", "walls", "clutter", "background_channel", "pointing_error", "transmit_leakage",
-)  # fmt: skip
+MONOSTATIC = "clutter", "background_channel", "transmit_leakage"
 """Effects that are modelled for a station that hears itself only."""
 
 

@@ -111,7 +111,7 @@ def arrivals(
         on = {name: name in names for name in ("squint", "wavefront")}
         response = steering.echo(seen, factor=weight(seen), **on)
         ends = seen.station.transmitter or seen.station, seen.station
-        ways_m = sum(float(np.linalg.norm(view.aim_m - np.asarray(end.position_m))) for end in ends)
+        ways_m = sum(float(np.linalg.norm(view.origin_m - np.asarray(end.position_m))) for end in ends)
         found.append(Arrival(sends.name, "by the target", response, ways_m / SPEED_OF_LIGHT))
     return found
 

@@ -2,7 +2,8 @@
 
 Both beams point where the tracker last saw the target, off by the error. Without updates they keep pointing at the
 target's place at the first symbol, as the paper's do. An update turns the beams about the arrays' middles, so a target
-in mid-beam keeps its phase. The land keeps the first beam.
+in mid-beam keeps its phase. The land keeps the first beam. Every station has one error, in its own look and as either
+end of its links.
 """
 
 import numpy as np

@@ -49,7 +49,12 @@ def routes(
     settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
     visible: Callable[[NamedEffect, View], np.ndarray],
 ) -> np.ndarray:  # fmt: skip
-    """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`."""
+    """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`.
+
+    Of a link (R, R, N, L), by the path of its sender and that of its receiver.
+    """
+    if view.station.transmitter is not None:
+        return between(settings, view, paths, weighing, visible)
     shape = view.places.shape[:2]
     own = {effect.name: visible(effect, view) for effect in weighing}
     result = np.ones((1 + len(paths), *shape))
@@ -58,4 +63,36 @@ def routes(
         for effect in weighing:
             follows = mirrored is not None and effect.name in settings["follow"]
             result[number] *= visible(effect, mirrored) if follows else own[effect.name]
+    return result
+
+
+def between(
+    settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
+    visible: Callable[[NamedEffect, View], np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """Return the factors (R, R, N, L) on a link's amplitudes, by the path of its sender and that of its receiver.
+
+    Both ends by the same kind of path are the link between their images. For other pairs each way counts with the root
+    of the two-way factor of a station at its end's image, as at a station.
+    """
+    result = np.ones((1 + len(paths), 1 + len(paths), *view.places.shape[:2]))
+    senders = [path.sender or path for path in paths]
+    for effect in weighing:
+        own = visible(effect, view)
+        if effect.name not in settings["follow"]:
+            result *= own
+            continue
+        out, back = (
+            [visible(effect, end if place is None else end.seen_from(place)) for place in (None, *images)]
+            for end, images in zip(
+                view.ends(), ([path.station_m for path in some] for some in (senders, paths)), strict=True
+            )
+        )
+        for a, b in np.ndindex(result.shape[:2]):
+            if a != b:
+                result[a, b] *= np.sqrt(out[a] * back[b])
+            elif a == 0 or paths[a - 1].station_m is None:
+                result[a, b] *= own
+            else:
+                result[a, b] *= visible(effect, view.seen_from(paths[a - 1].station_m, senders[a - 1].station_m))
     return result
