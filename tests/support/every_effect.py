@@ -188,8 +188,6 @@ def case(numbers: np.ndarray) -> Case:
     given = strengths(dict(zip(NAMES, strong, strict=True))) | {name: {} for name in BY_NEED}
     absent = set(MONOSTATIC) if linked else set(LINKS)
     absent |= {"occlusion", "companions", "gusts", "rotor_spread"} if recorded else set()
-    if linked:
-        given["fluctuation"]["pattern"] = False
     share = {name: SUDDEN.get(name, 0.65 if name in BY_NEED else 0.35) for name in NAMES}
     drawn = {name for name, one in zip(NAMES, switch, strict=True) if one < share[name]}
     named = {name: given[name] for name in NAMES if name in drawn - absent}

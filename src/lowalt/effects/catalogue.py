@@ -82,6 +82,8 @@ ONE_OSCILLATOR = ("clock_offset", "carrier_offset")
 
 LOOK_WIDE = ("link_offset",)
 """Effects past the motion whose draws are the same for all stations of a look."""
+PAIR_WIDE = ("fluctuation",)
+"""Effects whose draws are the same for both directions of a link."""
 
 
 class NamedEffect(NamedTuple):

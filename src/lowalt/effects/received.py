@@ -17,7 +17,7 @@ from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need
-from lowalt.effects.catalogue import BY_NEED, LOOK_WIDE, NamedEffect, placed, providing
+from lowalt.effects.catalogue import BY_NEED, LOOK_WIDE, PAIR_WIDE, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain, Outcome
 from lowalt.effects.interface import (
     AddsEchoes,
@@ -100,7 +100,7 @@ def received_signal(
     if not beyond and not link:
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
         return Received(own.signal, own.cell, arriving(own.signal), [])
-    chain = Chain(beyond, view, partial(_drawn, scene, row, station.name))
+    chain = Chain(beyond, view, partial(_drawn, scene, row, station))
     # Bounds and the engine are those of a station that receives its own signal.
     exact = share is None or math.isinf(chain.amplification) or link
     weighed = bool(providing(beyond, WeighsPoints)) or view.beams is not None
@@ -166,14 +166,21 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
             seen = observe(scene, view.station, own, at, view.occluders if given is cloud else None)
             beams = {end.name: view.beams_of(end) for end in _ends(scene.network, view.station)}
             seen = replace(seen, times_s=view.times_s, sampling=view.sampling, beams=beams)
-            draws = partial(_drawn, scene, at, view.station.name)
+            draws = partial(_drawn, scene, at, view.station)
             result.append(TargetEcho(mine, seen, draws, chain.sending))
     return result
 
 
-def _drawn(scene: Scene, row: dict, station: str, name: str) -> np.random.Generator:
-    """Return an effect's stream: one for all stations if its draws belong to the whole look, else one a station."""
-    return scene.stream(name, row) if name in LOOK_WIDE else scene.stream(name, row, station)
+def _drawn(scene: Scene, row: dict, station: Station, name: str) -> np.random.Generator:
+    """Return an effect's stream: one for all stations if its draws belong to the whole look, else one a station.
+
+    Both directions of a link share the stream of an effect whose draws belong to the pair.
+    """
+    if name in LOOK_WIDE:
+        return scene.stream(name, row)
+    if name in PAIR_WIDE and station.transmitter is not None:
+        return scene.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
+    return scene.stream(name, row, station.name)
 
 
 def largest_of(outcome: Outcome) -> float:

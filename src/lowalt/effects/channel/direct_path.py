@@ -32,8 +32,6 @@ def check(settings: dict, scene: CheckedScene) -> None:
     if all(station.transmitter is None for station in scene.network.stations):
         raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
     refused = sorted(set(MONOSTATIC) & set(scene.effects))
-    if scene.effects.get("fluctuation", {}).get("pattern"):
-        refused.append("fluctuation with pattern: true")
     if refused:
         raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
 

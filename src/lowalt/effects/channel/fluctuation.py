@@ -1,7 +1,9 @@
 """Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on its mean (A).
 
-Both act on all points alike. The log-normal factor is drawn once a look and station. The pattern follows the direction
-of the station in the body's frame; TR 38.901 gives none to small UAVs, people and birds.
+Both act on all points alike. The log-normal factor is drawn once a look and station; both directions of a link share
+one draw. The pattern follows the direction of the station in the body's frame; TR 38.901 gives none to small UAVs,
+people and birds. On a link it is that at the bisector of both ends, less a loss by the bistatic angle, which all
+classes have.
 """
 
 from typing import NamedTuple
@@ -21,8 +23,9 @@ from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
-    "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 and 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are sigma_M, sigma_D, "
-    "sigma_S there); birds take the small UAV's spread: estimate"
+    "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 to 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are sigma_M, sigma_D, "
+    "sigma_S there); on links, no forward scattering (sigma_FS of minus infinity) and one draw for both directions "
+    "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
 )
 DEFAULTS = {"pattern": True, "spread_db": None}
 
@@ -53,6 +56,10 @@ VEHICLE = (
     Lobe(None, 1.0, 0, 18.13, 21.26, 14.19),
 )  # fmt: skip
 """Front, left, back, right, roof: Table 7.9.2.1-4."""
+BISTATIC = {LARGE_UAV: (6.05, 1.33), VEHICLE: (6.0, 1.65)}
+"""k1 (dB) and k2 of Eq. 7.9.2-3."""
+BISTATIC_DB = 3.0
+"""Loss of a target without a pattern where both ends stand on opposite sides (Eq. 7.9.2-2)."""
 
 
 def idle(settings: dict) -> bool:
@@ -81,8 +88,12 @@ def spread_db(cloud: Cloud) -> float:
     return {"UAV": 3.74, "Bird": 3.74, "Pedestrian": 3.94, "Vehicle": 3.41}[cloud.like]
 
 
-def pattern_dbsm(faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray) -> np.ndarray:
-    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape); azimuth 0 front, 90 left.
+def pattern_dbsm(
+    faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape), and its least value (dBsm).
+
+    azimuth: 0 front, 90 left.
 
     Faces share the directions as the tables say: the roof above 45 degrees (30 for vehicles), then quarters of azimuth.
     """
@@ -96,29 +107,52 @@ def pattern_dbsm(faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: n
     off = (azimuth_deg - centre + 180.0) % 360.0 - 180.0
     across = np.where(face >= 4, 0.0, np.minimum(12.0 * (off / width) ** 2, depth))
     along = np.minimum(12.0 * ((zenith_deg - high) / tall) ** 2, depth)
-    return peak - np.minimum(across + along, depth)
+    return peak - np.minimum(across + along, depth), peak - depth
+
+
+def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> np.ndarray:
+    """Return the loss (dB) at bistatic angles of 0 to pi (any shape); faces: None for a target without a pattern.
+
+    Source: TR 38.901, Eq. 7.9.2-3, without its floor, and Eq. 7.9.2-2.
+    """
+    if faces is None:
+        return BISTATIC_DB * np.sin(0.5 * angle_rad)
+    k1, k2 = BISTATIC[faces]
+    with np.errstate(divide="ignore"):
+        return k1 * np.sin(0.5 * k2 * angle_rad) - 5.0 * np.log10(np.maximum(np.cos(0.5 * angle_rad), 0.0))
 
 
 def pattern(view: View) -> np.ndarray:
-    """Return B1 (N, 1), relative to the mean cross section, in the station's direction."""
+    """Return B1 (N, 1), relative to the mean cross section, in the station's direction or at a link's bisector."""
     cloud = view.cloud
-    faces = None
-    if cloud.like == "Vehicle":
+    faces, mean = None, 0.0
+    if "body" in cloud.kinds and cloud.like == "Vehicle":
         faces, mean = VEHICLE, VEHICLE_DBSM
-    elif cloud.like == "UAV" and large(cloud):
+    elif "body" in cloud.kinds and cloud.like == "UAV" and large(cloud):
         faces, mean = LARGE_UAV, LARGE_UAV_DBSM
-    if faces is None or "body" not in cloud.kinds:
+    ends = view.ends()
+    if faces is None and len(ends) == 1:
         return np.ones((len(view.times_s), 1))
-    body = cloud.kinds.index("body")
-    away = np.asarray(view.station.position_m) - view.motion.translation[:, body]
+    body = cloud.kinds.index("body") if "body" in cloud.kinds else 0
+    ways = [np.asarray(end.station.position_m) - view.motion.translation[:, body] for end in ends]
+    away, angle = ways[0], np.zeros(len(view.times_s))
+    if len(ends) == 2:
+        units = [way / np.linalg.norm(way, axis=1, keepdims=True) for way in ways]
+        away = units[0] + units[1]
+        # The half angle by its tangent keeps small and large angles exact.
+        angle = 2.0 * np.arctan2(np.linalg.norm(units[0] - units[1], axis=1), np.linalg.norm(away, axis=1))
+    loss = bistatic_loss_db(faces, angle)
+    if faces is None:
+        return 10 ** (-loss / 10)[:, None]
     right, front, up = np.einsum("nij,ni->jn", view.motion.rotation[:, body], away)
     azimuth = np.degrees(np.arctan2(-right, front)) % 360.0
     zenith = np.degrees(np.arctan2(np.hypot(right, front), up))
-    return 10 ** ((pattern_dbsm(faces, azimuth, zenith) - mean) / 10)[:, None]
+    shone, floor = pattern_dbsm(faces, azimuth, zenith)
+    return 10 ** ((np.maximum(shone - loss, floor) - mean) / 10)[:, None]
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: the root of B1 B2; one draw a sample and station.
+    """Return the factor (N, 1) on all amplitudes: the root of B1 B2; one draw a sample and station or pair of stations.
 
     B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
     """
