@@ -63,6 +63,33 @@ def test_a_facade_shows_the_image_where_the_ray_meets_it():
     assert sine[0, 0] == pytest.approx(100.0 / np.linalg.norm([60.0, 100.0, 20.0]))
 
 
+def test_a_facade_is_called_dark_only_where_no_place_in_the_box_is_reflected():
+    rng, known = np.random.default_rng(4), []
+    for _ in range(400):
+        station = np.array([0.0, 0.0, 10.0])
+        facade = [*rng.uniform(-60, 60, 2), rng.uniform(0, 360), rng.uniform(5, 80), rng.uniform(5, 40)]
+        low = rng.uniform([-60, -60, 0], [60, 60, 60])
+        high = low + rng.uniform(0.1, 20, 3)
+        # Corners and faces of the box are the places that decide.
+        share = np.clip(rng.uniform(-0.3, 1.3, (1, 300, 3)), 0.0, 1.0)
+        seen = walls.mirrored(facade, low + share * (high - low), station)[2].any()
+        known.append((walls.dark(facade, low, high, station), bool(seen)))
+    assert (True, True) not in known
+    # The test knows dark boxes and lit ones, and most boxes without a reflection are known as dark.
+    assert known.count((False, True)) > 20 and known.count((True, False)) > 5 * known.count((False, False))
+
+
+def test_a_wall_that_reflects_nothing_changes_no_bit():
+    cloud, row = target(np.random.default_rng(3), points=4)
+    radio = network(subcarriers=12, symbols=2)
+    ground, wall = {"ground_reflection": {}, "squint": {}}, {"walls": {"facades": [[*FACADE[:2], 90.0, *FACADE[3:]]]}}
+    behind = {"walls": {"facades": [[-5000.0, 60.0, 0.0, 20.0, 20.0]]}}
+    for more in wall, behind:
+        with_it = received_signal(scene({**ground, **more}, radio), radio.stations[0], cloud, row)
+        without = received_signal(scene(ground, radio), radio.stations[0], cloud, row)
+        assert np.array_equal(with_it.signal, without.signal) == (more is behind)
+
+
 def test_paths_by_a_wall_are_the_sum_over_images():
     cloud, row = target(np.random.default_rng(3), points=4)
     radio = network(subcarriers=12, symbols=2, transmit=(2, 2), receive=(2, 2))

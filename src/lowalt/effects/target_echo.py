@@ -145,6 +145,10 @@ class TargetEcho:
         return samples
 
     def _paths_of(self, view: View) -> list[ImagePath]:
+        """All paths except the direct one, without those that carry nothing in the whole look."""
+        return [path for path, lit in zip(self._every_path(view), self._lit, strict=True) if lit]
+
+    def _every_path(self, view: View) -> list[ImagePath]:
         """All paths except the direct one; on a link those of its receiver, each with its sender's."""
         ends = [
             [path for one in providing(self.channel, AddsPaths) for path in one.module.paths(one.settings, end)]
@@ -169,12 +173,22 @@ class TargetEcho:
                 found += effect.module.images(effect.settings, view)
             else:
                 found += [path.places for path in effect.module.paths(effect.settings, view)]
-        return found
+        return [images for images, lit in zip(found, self._lit, strict=True) if lit]
+
+    @cached_property
+    def _whole(self) -> list[ImagePath]:
+        """All paths except the direct one, over the whole look."""
+        return self._every_path(self.view)
+
+    @cached_property
+    def _lit(self) -> list[bool]:
+        """Whether each of these paths carries anything in the look."""
+        return [any(np.any(one.coefficient) for one in (path, path.sender) if one is not None) for path in self._whole]
 
     @cached_property
     def _paths(self) -> list[ImagePath]:
-        """All paths except the direct one, over the whole look."""
-        return self._paths_of(self.view)
+        """The paths over the whole look that carry anything, except the direct one."""
+        return [path for path, lit in zip(self._whole, self._lit, strict=True) if lit]
 
     def _visible(self, effect: NamedEffect, view: View) -> np.ndarray:
         """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time."""
