@@ -6,7 +6,8 @@ For each room of `src/lowalt` a number of faults is drawn by seed. Each is set i
 that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too long.
 Maps of tests and outcomes are kept in `--kept`; the same command goes on where the last one stopped. Rooms take turns,
 so that all of them have about as many outcomes when time is up. The list of survivors holds every fault that survived
-a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay.
+a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay. A call for some
+rooms keeps the lines of the others in both tables.
 """
 
 import argparse
@@ -29,9 +30,10 @@ from mutation.trials import Outcome, copy_of_tree, trial
 from lowalt.common.csv_tables import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
-COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_time", "survived", "killed_percent",
-           "low_percent", "high_percent")  # fmt: skip
-"""`survived_first`: before tests were added; `low_percent`, `high_percent`: 95 % interval of `killed_percent`."""
+COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_time", "survived", "equivalent",
+           "killed_percent", "low_percent", "high_percent")  # fmt: skip
+"""`survived_first`: before tests were added; `equivalent`: survivors that change no result, by their verdict;
+`killed_percent`: of the faults tried except these; `low_percent`, `high_percent`: its 95 % interval."""
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
 _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "plan", "portable", "splits", "turns")
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
@@ -41,6 +43,12 @@ NEAR = {
     "shards": ("shards", "dataset"),
     "targets": _TARGETS,
     "common": _COMMON,
+    "commands": ("command",),
+    "measure": ("measure", "limits", "report_cost", "physics"),
+    "motion": ("motion", "laws", "limits", "plan"),
+    "noise": ("noise", "laws"),
+    "tiles": ("tiles", "spectra"),
+    "report": ("report", "gallery"),
 }
 """How the names of files of tests of a room begin, where not by the room's name alone."""
 
@@ -56,11 +64,15 @@ def rooms(root: Path) -> dict[str, list[Mutant]]:
     found: dict[str, list[Mutant]] = {}
     for path in sorted((root / "src/lowalt").rglob("*.py")):
         file = str(path.relative_to(root))
-        room = path.relative_to(root / "src/lowalt").parts[0].removesuffix(".py")
-        if file.endswith(("recognition/statistics.py", "recognition/intervals.py", "recognition/metrics.py")):
-            room = "statistics"
-        found.setdefault(room, []).extend(of_file(root, file))
+        found.setdefault(room_of(file), []).extend(of_file(root, file))
     return found
+
+
+def room_of(file: str) -> str:
+    """The room of a file, whose name is given from the root of the repository."""
+    if file.endswith(("recognition/statistics.py", "recognition/intervals.py", "recognition/metrics.py")):
+        return "statistics"
+    return Path(file).parts[2].removesuffix(".py")
 
 
 def run(
@@ -109,26 +121,41 @@ def survivor_row(root: Path, outcome: Outcome, verdicts: dict[tuple, str]) -> di
             "now": "killed" if outcome.killed else "survives", "verdict": verdict}  # fmt: skip
 
 
-def kept_verdicts(path: Path) -> dict[tuple, str]:
-    """Verdicts on survivors in a kept table, by (file, line before, line after)."""
+def kept_rows(path: Path) -> list[dict[str, str]]:
+    """Lines of a kept table; none where it is not there."""
     if not path.exists():
-        return {}
+        return []
     with path.open(encoding="utf-8", newline="") as file:
-        return {(row["file"], row["before"], row["after"]): row.get("verdict", "open") for row in csv.DictReader(file)}
+        return list(csv.DictReader(file))
 
 
-def room_rows(places: dict[str, list], drawn: dict[str, list], outcomes: list[Outcome], kept: Kept) -> list[dict]:
-    """Lines of the table by room: places for faults, faults drawn and tried, and how the tried ones ended."""
+def room_rows(places: dict[str, list], outcomes: list[Outcome], kept: Kept, survivors: list[dict]) -> list[dict]:
+    """Lines of the table by room: places for faults, faults drawn and tried, and how the tried ones ended.
+
+    `places`, by room: all places for faults, and those drawn of them.
+    """
     rows = []
-    for room, chosen in drawn.items():
+    for room, (every, chosen) in places.items():
         mine = [outcome for outcome in outcomes if outcome.mutant in set(chosen)]
         killed = sum(outcome.killed for outcome in mine)
         first = sum(kept.survived_once(outcome.mutant) for outcome in mine)
-        shares = (killed / len(mine), *wilson(killed, len(mine))) if mine else ()
-        values = (room, len(places[room]), len(chosen), len(mine), first, killed, sum(each.late for each in mine),
-                  len(mine) - killed, *(f"{100 * share:.1f}" for share in shares))  # fmt: skip
+        same = sum(room_of(row["file"]) == room and row["verdict"].startswith("equivalent") for row in survivors)
+        judged = len(mine) - same
+        shares = (killed / judged, *wilson(killed, judged)) if judged else ()
+        values = (room, len(every), len(chosen), len(mine), first, killed, sum(each.late for each in mine),
+                  len(mine) - killed, same, *(f"{100 * share:.1f}" for share in shares))  # fmt: skip
         rows.append(dict(zip_longest(COLUMNS, values, fillvalue="")))
     return rows
+
+
+def with_others(before: list[dict], found: list[dict], tried: set[str]) -> list[dict]:
+    """Lines of a table: those found, and of the kept ones those of rooms that were not tried; in the order of rooms."""
+
+    def room(row: dict) -> str:
+        """The room of a line, or of the file that it names."""
+        return row["room"] if "room" in row else room_of(row["file"])
+
+    return sorted([row for row in before if room(row) not in tried] + found, key=room)
 
 
 def main(argv: list[str] | None = None) -> None:
@@ -163,10 +190,12 @@ def main(argv: list[str] | None = None) -> None:
     in_turn = [mutant for mutant in chain(*zip_longest(*drawn.values())) if mutant]
     kept = Kept(asked.kept / "outcomes.jsonl", ROOT)
     outcomes = run(ROOT, found, in_turn, asked, until, kept)
-    write_csv(asked.out, COLUMNS, room_rows(places, drawn, outcomes, kept))
-    verdicts = kept_verdicts(asked.survivors)
+    before = kept_rows(asked.survivors)
+    verdicts = {(row["file"], row["before"], row["after"]): row["verdict"] for row in before}
     once = [survivor_row(ROOT, each, verdicts) for each in outcomes if kept.survived_once(each.mutant)]
-    write_csv(asked.survivors, SURVIVORS, once)
+    found = room_rows({room: (places[room], drawn[room]) for room in drawn}, outcomes, kept, once)
+    write_csv(asked.out, COLUMNS, with_others(kept_rows(asked.out), found, set(drawn)))
+    write_csv(asked.survivors, SURVIVORS, with_others(before, once, set(drawn)))
     print(f"{len(outcomes)} of {len(in_turn)} faults tried, {sum(each.killed for each in outcomes)} killed")
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-from mutants import wilson
+from mutants import room_of, room_rows, wilson, with_others
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, shown_tests
 from mutation.kept import Kept
@@ -154,6 +154,23 @@ def test_rates_have_wilson_s_interval():
     """A known case of the formula: 8 of 10 lie between 49.0 and 94.3 percent."""
     assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=5e-4)
     assert wilson(5, 5) == pytest.approx((0.566, 1.0), abs=5e-4) and wilson(0, 5)[0] == pytest.approx(0)
+
+
+def test_a_call_for_some_rooms_keeps_the_lines_of_the_others_and_equivalent_faults_count_for_nothing(tree):
+    assert (
+        room_of("src/lowalt/recognition/metrics.py") == "statistics" and room_of("src/lowalt/__main__.py") == "__main__"
+    )
+    one, two, three = of_file(tree, "src/lowalt/reach.py")[:3]
+    outcomes = [Outcome(one, True, 1), Outcome(two, False, 1), Outcome(three, False, 1)]
+    survivors = [{"file": one.file, "verdict": verdict} for verdict in ("equivalent: nothing is added", "open")]
+    kept = Kept(tree / "kept.jsonl", tree)
+    (row,) = room_rows({"reach": ([*outcomes, one], [one, two, three])}, outcomes, kept, survivors)
+    assert (row["places"], row["tried"], row["killed"], row["survived"], row["equivalent"]) == (4, 3, 1, 2, 1)
+    assert row["killed_percent"] == "50.0"
+    before = [{"room": "reach", "tried": "9"}, {"room": "echo", "tried": "8"}]
+    assert with_others(before, [row], {"reach"}) == [before[1], row]
+    lines = [{"file": "src/lowalt/reach.py"}, {"file": "src/lowalt/echo/api.py"}]
+    assert with_others(lines, [], {"reach"}) == [lines[1]]
 
 
 def test_a_copy_of_the_tree_follows_the_checkout_and_keeps_machine_code(tmp_path):
