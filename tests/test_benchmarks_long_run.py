@@ -89,7 +89,7 @@ def test_a_data_set_with_a_changed_byte_ends_the_run(tmp_path):
 
 @pytest.mark.workflow
 def test_the_workflow_plans_the_long_run_without_tiles_and_training(tmp_path):
-    overlay = long_run.size_overlay("long-again", 840, tmp_path)
+    overlay = long_run.size_overlay("long-again", 150, tmp_path)
     words = long_run.commands("long-again", 2, [overlay])[0]
     status, text = run(ROOT, ["-n", "--quiet", "rules", *words[3:]], os.environ)
     assert status == 0, text[-3000:]
@@ -97,5 +97,5 @@ def test_the_workflow_plans_the_long_run_without_tiles_and_training(tmp_path):
     jobs = {line[0]: int(line[1]) for line in lines if len(line) == 2 and line[1].isdigit()}
     chosen = ("motion", "echo", "noise", "shard", "index", "tiles", "train")
     assert {name: jobs.get(name, 0) for name in chosen} == {
-        "motion": 34, "echo": 102, "noise": 34, "shard": 102, "index": 1, "tiles": 0, "train": 0,
+        "motion": 6, "echo": 18, "noise": 6, "shard": 18, "index": 1, "tiles": 0, "train": 0,
     }  # fmt: skip

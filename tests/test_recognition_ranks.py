@@ -14,32 +14,52 @@ from lowalt.recognition import checkpoint, predictions, schemes
 from lowalt.recognition.__main__ import main
 from trainings import SETTINGS, with_training
 
-# One start of the ranks for all that they are asked: importing torch takes each of them seconds.
+# One process imports torch, which takes seconds, and becomes two ranks by forks, with the variables that torchrun sets;
+# tests/test_recognition_nodes.py starts them by torchrun itself.
 PROGRAM = """
-import json, sys
+import json, os, sys, traceback
+import timm, torch
 from lowalt.recognition.__main__ import main
 
-for line in json.loads(sys.argv[1]):
-    main(line)
+ranks = {}
+for rank in range(2):
+    child = os.fork()
+    if child:
+        ranks[child] = rank
+        continue
+    try:
+        os.environ |= {"RANK": str(rank), "LOCAL_RANK": str(rank)}
+        for line in json.loads(sys.argv[1]):
+            main(line)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
+    os._exit(0)
+while ranks:
+    child, status = os.wait()
+    del ranks[child]
+    if status:
+        for other in ranks:
+            os.kill(other, 9)
+        sys.exit(1)
 """
 
 
-def on_two_ranks(folder, *lines):
-    """Run command lines of `python -m lowalt.recognition` one after the other under torchrun."""
-    (folder / "lines.py").write_text(PROGRAM)
+def on_two_ranks(*lines):
+    """Run command lines of `python -m lowalt.recognition` one after the other on two ranks."""
     port = str(20000 + os.getpid() % 20000)
-    launch = ["-m", "torch.distributed.run", "--nproc-per-node", "2", "--master-port", port]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
-    command = [sys.executable, *launch, str(folder / "lines.py"), json.dumps(lines)]
-    run = subprocess.run(command, capture_output=True, env=environment, text=True)
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo", "WORLD_SIZE": "2",
+                   "MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port}  # fmt: skip
+    command = [sys.executable, "-c", PROGRAM, json.dumps(lines)]
+    run = subprocess.run(command, capture_output=True, env=environment, text=True, timeout=300)
     assert run.returncode == 0, run.stderr[-3000:]
 
 
 def training_line(folder, views, name, batch):
-    """A command line that trains twelve steps without random images, into `folder`/`name`."""
+    """A command line that trains six steps without random images, into `folder`/`name`."""
     table = folder / "schemes.csv"
     table.write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    settings = with_training(steps=12, validate_every=6, batch=batch)
+    settings = with_training(steps=6, validate_every=3, batch=batch)
     settings["augmentation"] = dict.fromkeys(SETTINGS["augmentation"], 0)
     # The shipped backbone, whose batch norm needs the statistics of the whole batch.
     shipped = load_yaml("config/default.yaml")["recognition"]["network"]["backbone"]
@@ -64,7 +84,7 @@ def both(views, trained, tmp_path_factory):
     main(training_line(folder, views, "half", 4))
     main(evaluation_line(folder, views, trained, "one.csv"))
     lines = training_line(folder, views, "two", 8), evaluation_line(folder, views, trained, "two.csv")
-    on_two_ranks(folder, *lines)
+    on_two_ranks(*lines)
     return folder
 
 

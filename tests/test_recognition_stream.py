@@ -105,11 +105,11 @@ def test_a_stopped_training_on_a_stream_resumes_exactly_and_workers_change_no_bi
         main(["views", "--settings", json.dumps({"size": SIZE}), "--index", str(run / "shards/index.json"),
               "--shard", shard.name, "--out", str(run / "views" / f"{shard.stem}.npz")])  # fmt: skip
     (tmp_path / "schemes.csv").write_text(",".join(schemes.COLUMNS) + "\nAB:VRP+VT,AB,VRP+VT,attention,,seen\n")
-    training = {**TRAINING, "steps": 8, "validate_every": 4, "stream": 0.5, "checkpoint_s": 0}
+    training = {**TRAINING, "steps": 4, "validate_every": 2, "stream": 0.5, "checkpoint_s": 0}
     settings = {**SETTINGS, "size": SIZE, "training": training}
     main(line(run, settings, tmp_path / "whole"))
     main(line(run, {**settings, "training": {**training, "workers": 2}}, tmp_path / "workers"))
-    step = kill_at(monkeypatch, 5)
+    step = kill_at(monkeypatch, 3)
     with pytest.raises(Killed):
         main(line(run, settings, tmp_path / "parts"))
     monkeypatch.setattr(runs.Trainer, "_step", step)

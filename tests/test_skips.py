@@ -18,8 +18,9 @@ CASES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.parametrize("workers", [(), ("-n", "2")], ids=["alone", "two workers"])
+@pytest.mark.parametrize(
+    ("name", "workers"), [*((name, ()) for name in CASES), ("a package's", ("-n", "2")), ("a file's", ("-n", "2"))]
+)
 def test_a_strict_run_fails_where_a_test_is_skipped_for_a_reason_not_listed(tmp_path, name, workers):
     source, status, words = CASES[name]
     (tmp_path / "test_one.py").write_text(source)

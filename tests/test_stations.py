@@ -19,7 +19,7 @@ PLACES = {
 }
 
 
-@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.slow), 5])
 def test_every_command_works_with_this_many_stations(tmp_path, count):
     pytest.importorskip("torch")
     network = WAVE | {"stations": {name: PLACES[name] for name in NAMES[:count]}}

@@ -8,8 +8,6 @@ job, and knows nothing of the Snakefile.
 import json
 import os
 import re
-import subprocess
-import sys
 
 import pytest
 import yaml
@@ -46,6 +44,7 @@ from rerun_model import (
     with_what_follows,
 )
 from snakemake_runs import run
+from snakemake_texts import declared
 from test_workflow import ROOT, workplace
 
 pytest.importorskip("snakemake")
@@ -135,6 +134,14 @@ CHANGES = {
     "nothing": Change(set(), ()),
 }
 
+QUICK = (
+    "seed", "scene", "more motion models", "an SNR added", "a subtype added", "a station more", "kind of shards",
+    "protocol", "a second training seed", "a target's record", "a mesh", "the table of schemes", "text of the report",
+    "code of tiles", "nothing",
+)  # fmt: skip
+"""Changes that are planned in every run of the tests. What the others rest on stands in the rule files, see the tests
+of the settings and of the code of each rule."""
+SLOW = [name for name in CHANGES if name not in QUICK]
 DRIVER = """
 import contextlib, io, json, os, sys
 from pathlib import Path
@@ -183,8 +190,9 @@ def jobs(text):
 
 
 @pytest.fixture(scope="module")
-def dry_runs(tmp_path_factory):
-    """What a dry run says after each change of a finished run."""
+def dry_runs(tmp_path_factory, request):
+    """What a dry run says after each change of a finished run that a test of this session asks about."""
+    asked = {item.callspec.params.get("name") for item in request.session.items if hasattr(item, "callspec")}
     folder = workplace(tmp_path_factory.mktemp("reruns"))
     (folder / "src/sitecustomize.py").unlink()
     # One subtype has meshes of the user; a dry run asks only whether they are there and what they hold.
@@ -208,15 +216,15 @@ def dry_runs(tmp_path_factory):
             else:
                 path.write_text(name)
     snakemake(folder, "--touch", "--forceall")
-    plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items()}
+    plan = {name: (yaml.safe_dump(change.overlay), change.edit) for name, change in CHANGES.items() if name in asked}
     (folder / "changes.json").write_text(json.dumps(plan))
     environment = os.environ | {"PYTHONPATH": str(folder / "src"), "LOWALT_INPUTS": str(folder / "inputs")}
-    driver = subprocess.run([sys.executable, "-c", DRIVER], cwd=folder, env=environment, capture_output=True, text=True)
-    assert driver.returncode == 0, (driver.stdout + driver.stderr)[-4000:]
-    return {name: (folder / "said" / f"{name}.txt").read_text() for name in CHANGES}
+    status, text = run(folder, [], environment, DRIVER)
+    assert status == 0, text[-4000:]
+    return {name: (folder / "said" / f"{name}.txt").read_text() for name in plan}
 
 
-@pytest.mark.parametrize("name", CHANGES)
+@pytest.mark.parametrize("name", [*QUICK, *(pytest.param(name, marks=pytest.mark.slow) for name in SLOW)])
 def test_a_change_re_runs_the_jobs_that_it_touches_and_names_the_reason(dry_runs, name):
     change, found = CHANGES[name], jobs(dry_runs[name])
     missing, more = change.jobs - set(found), set(found) - change.jobs
@@ -226,3 +234,11 @@ def test_a_change_re_runs_the_jobs_that_it_touches_and_names_the_reason(dry_runs
     reasons = [found[job] for job in change.jobs - followers - TILES - SETTINGS - MANIFEST]
     assert all(any(word in reason for word in change.reasons) for reason in reasons), reasons
     assert all(any(word in reason for reason in found.values()) for word in change.reasons)
+
+
+@pytest.mark.parametrize("name", [name for name in CHANGES if name.startswith("code of")])
+def test_a_rule_declares_the_source_files_that_are_edited_here(name):
+    """Its jobs then run again, as after an edit of `code of tiles` and after one of real jobs in test_workflow.py."""
+    change = CHANGES[name]
+    file = change.edit[0].removeprefix("src/lowalt/")
+    assert all(file in declared(rule) for rule in {job[0] for job in change.first})

@@ -1,6 +1,7 @@
 """Settings of the stages, options of commands and the report's manifest, as they follow from a configuration."""
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,8 +16,14 @@ from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
+from snakemake_texts import body
 
 ROOT = Path(__file__).parent.parent
+SETTINGS_OF = {
+    "cloud": "cloud", "motion": "motion", "echo": "echo", "echo_in_scene": "echo_in_scene", "noise": "noise",
+    "tiles": "images", "shard": "shard", "index": "index", "configuration": "configuration", "views": "views",
+    "train": "training", "evaluate": "evaluation", "report": "report",
+}  # fmt: skip
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
 
@@ -50,6 +57,12 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
     assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
     # The whole configuration stands next to the results and in the report.
     assert before.configuration(job) != after.configuration(job) and before.report(job) != after.report(job)
+
+
+@pytest.mark.parametrize("rule", SETTINGS_OF)
+def test_each_rule_is_given_the_settings_of_its_stage(rule):
+    block = re.search(r"^    params:\n((?:        .*\n)+)", body(rule), re.MULTILINE)[1]
+    assert re.search(r"^        settings=(.*?),?$", block, re.MULTILINE)[1] == f"settings.{SETTINGS_OF[rule]}"
 
 
 def test_settings_of_different_jobs_differ_and_are_json():

@@ -38,7 +38,7 @@ os.environ.clear()
 os.environ.update(order["environment"])
 sys.path[:0] = [order["folder"], *filter(None, order["environment"].get("PYTHONPATH", "").split(os.pathsep))]
 sys.argv = [snakemake.__file__.replace("__init__", "__main__"), *order["arguments"]]
-snakemake.cli.main()
+exec(order["program"])
 """
 
 
@@ -51,13 +51,16 @@ def _helper() -> subprocess.Popen:
     return started
 
 
-def run(folder: Path, arguments: Sequence[str], environment: Mapping[str, str]) -> tuple[int, str]:
-    """Exit status and text of `python -m snakemake ARGUMENTS` in `folder`.
+def run(
+    folder: Path, arguments: Sequence[str], environment: Mapping[str, str], program: str = "snakemake.cli.main()"
+) -> tuple[int, str]:
+    """Exit status and text of `python -m snakemake ARGUMENTS` in `folder`, or of another Python program there.
 
     Raises RuntimeError where the helper process has ended.
     """
     with tempfile.NamedTemporaryFile("r", errors="replace") as said:
-        order = {"folder": str(folder), "arguments": [*arguments], "environment": {**environment}, "said": said.name}
+        order = {"folder": str(folder), "arguments": [*arguments], "environment": {**environment}, "said": said.name,
+                 "program": program}  # fmt: skip
         helper = _helper()
         helper.stdin.write(json.dumps(order) + "\n")
         helper.stdin.flush()

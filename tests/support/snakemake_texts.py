@@ -53,11 +53,15 @@ rule size:
 """A Snakefile that uses this workflow as a module; root: the folder of the project."""
 
 
+def body(rule: str) -> str:
+    """The text of a rule in its rule file."""
+    text = "\n".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
+    return re.search(rf"^rule {rule}:\n(.*?)(?=^rule |\Z)", text, re.MULTILINE | re.DOTALL)[1]
+
+
 def declared(rule: str) -> set[str]:
     """The source files a rule declares as its code, relative to the package, from the arguments in its rule file."""
-    text = "\n".join(path.read_text() for path in sorted((ROOT / "workflow/rules").glob("*.smk")))
-    body = re.search(rf"^rule {rule}:\n(.*?)(?=^rule |\Z)", text, re.MULTILINE | re.DOTALL)[1]
-    arguments = re.search(r"code=code\((.*?)\)", body, re.DOTALL)[1]
+    arguments = re.search(r"code=code\((.*?)\)", body(rule), re.DOTALL)[1]
     modules = re.findall(r'"([\w.]+)"', arguments)
     if "SOURCE_MODULES" in arguments:
         modules += [f"lowalt.targets.{name}" for name in ("builtin", "gait", "mesh", "mocap")]
