@@ -32,7 +32,9 @@ def test_behind_a_converter_the_mean_square_error_stays_within_its_share_of_the_
     chain.run(frozenset(), leads=False)
     assert error_before(chain, allowed) > 100 * EXACT
     # Small errors count by the root of error times step, so half of the root asks for a quarter of the error.
-    assert error_before(chain, 0.01 * chain.step) == pytest.approx(4 * error_before(chain, 0.005 * chain.step))
+    assert error_before(chain, 0.01 * chain.receiving.step) == pytest.approx(
+        4 * error_before(chain, 0.005 * chain.receiving.step)
+    )
 
 
 def test_an_error_moves_codes_by_a_mean_square_of_itself_times_the_step():

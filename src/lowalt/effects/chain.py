@@ -2,30 +2,27 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import need, waveform
-from lowalt.effects.catalogue import NamedEffect, placed, providing, stream_name
+from lowalt.effects.catalogue import NamedEffect, placed, providing
 from lowalt.effects.interface import (
     AddsEchoes,
     AddsSignals,
     Amplifies,
-    ChangesResponse,
     ChoosesCells,
     FiltersCells,
-    Quantises,
     SamplesTime,
 )
 from lowalt.effects.listening import Listening
+from lowalt.effects.receiving import Receiving
 from lowalt.effects.sending import Sending
 from lowalt.effects.target_echo import EXACT, TargetEcho
+from lowalt.effects.tone_loops import strongest
 from lowalt.effects.view import View
-from lowalt.effects.waveform import Frame
 
 COARSEST = 0.1
 """Largest error of interpolation, relative to the sum of peak amplitudes."""
@@ -53,7 +50,7 @@ class Chain:
         draws: Callable[[str], np.random.Generator],
         power: float = 0.0,
     ):
-        self.view, self.draws, self.power = view, draws, power
+        self.view, self.draws = view, draws
         self.names = frozenset(effect.name for effect in effects)
         self.transmitter, self.channel, self.receiver, self.detection = (
             placed(effects, place) for place in ("transmitter", "channel", "receiver", "detection")
@@ -67,7 +64,7 @@ class Chain:
         self.target = TargetEcho(self.channel, view, draws, self.sending)
         self.others: list[TargetEcho] = []
         """Other targets of the beam, each with its own view; everything they ask for is computed."""
-        self.step = 0.0
+        self.receiving = Receiving(self.receiver, view, draws, self.sending, power)
 
     @property
     def error(self) -> float:
@@ -115,6 +112,16 @@ class Chain:
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
+        return self._cells_of(self.spectrum(on, chosen))
+
+    def _cells_of(self, spectrum: np.ndarray) -> np.ndarray:
+        """The range cells of responses (N, M); those of the direct echo are kept."""
+        if self.sending.pilots is None and spectrum is self.target.__dict__.get("direct"):
+            return self.target.direct_cells
+        return self.sending.cells(spectrum)
+
+    def spectrum(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
+        """Return the responses (N, M) behind the receiver with the physics `on`, of the symbols `chosen` (all)."""
         view, factor = self.view, self.target.routes
         rows = slice(None) if chosen is None else np.flatnonzero(chosen)
         if chosen is not None:
@@ -135,30 +142,13 @@ class Chain:
             if self._clutter is not None:
                 spectrum = spectrum + self._clutter[rows]
             if self._unknown is None:
-                spectrum, left = self._responded(spectrum)
+                spectrum, left = self.receiving.responded(spectrum)
                 if not left and not self.sending.distorts:
-                    return self.sending.cells(spectrum)
+                    return spectrum
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         if self._unknown is not None:
             samples = samples + self._unknown[rows]
-        for effect in left:
-            draws = self.draws(stream_name(effect.name))
-            if providing([effect], Quantises):
-                self.step = effect.module.step(effect.settings, samples)
-            samples = effect.module.receive(effect.settings, samples, self._frame, draws)
-        return self.sending.cells(self.sending.received(samples, rows))
-
-    def _responded(self, spectrum: np.ndarray) -> tuple[np.ndarray, list[NamedEffect]]:
-        """The response (N, M) after the receiver's leading effects that act on responses, and the remaining effects."""
-        for place, effect in enumerate(self.receiver):
-            changed = None
-            if providing([effect], ChangesResponse):
-                draws = self.draws(stream_name(effect.name))
-                changed = effect.module.respond(effect.settings, spectrum, self._bare_frame, draws)
-            if changed is None:
-                return spectrum, self.receiver[place:]
-            spectrum = changed
-        return spectrum, []
+        return self.receiving.sampled(samples, left, rows)
 
     @property
     def _company(self) -> frozenset[str]:
@@ -167,17 +157,33 @@ class Chain:
 
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
-        cells = self.cells(on, chosen)
+        spectrum = self.spectrum(on, chosen)
+        if not leads and chosen is None and (found := self._close(spectrum)) is not None:
+            return Outcome(*found, np.full(len(spectrum), np.nan))
+        cells = self._cells_of(spectrum)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
         for effect in providing(self.detection, FiltersCells):
-            cells = effect.module.process(effect.settings, cells, self._frame, self.draws(effect.name))
-        size = abs(cells)
+            cells = effect.module.process(effect.settings, cells, self.receiving.bare, self.draws(effect.name))
+        size = self.target.direct_sizes if cells is self.target.__dict__.get("direct_cells") else abs(cells)
         best, lead = size.argmax(axis=1), need.gap(size) if leads else np.full(len(cells), np.nan)
         for effect in providing(self.detection, ChoosesCells):
             best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
         outcome = Outcome(cells[np.arange(len(cells)), best], best, lead)
         return outcome if self.timing is None else self._evenly(outcome)
+
+    def _close(self, spectrum: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """The strongest cells of responses (N, M) behind the receiver that are close to the target's direct echo.
+
+        None where they are not, or where something stands between these cells and the outcome.
+        """
+        direct = self.target.__dict__.get("direct")
+        if direct is None or self.detection or self.timing is not None or self.sending.pilots is not None:
+            return None
+        if spectrum is direct:
+            cell = self.target.direct_best
+            return self.target.direct_cells[np.arange(len(cell)), cell], cell
+        return strongest(direct, self.target.direct_sizes, self.target.direct_best, spectrum)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""
@@ -226,19 +232,3 @@ class Chain:
         heard = [one.module.heard(one.settings, given) for one in providing(self.channel, AddsSignals)]
         found = [samples for samples in heard if samples is not None]
         return sum(found[1:], found[0]) if found else None
-
-    @cached_property
-    def _frame(self) -> Frame:
-        """The look as receiver and detection effects know it."""
-        aired = self.sending.aired if self.sending.distorts else None
-        return replace(self._bare_frame, sent=self.sending.known, aired=aired)
-
-    @cached_property
-    def _bare_frame(self) -> Frame:
-        """The look for effects that need no data: all ones in their place, so that none are drawn."""
-        view = self.view
-        range_m = float(np.linalg.norm(view.aim_m - np.asarray(view.station.position_m)))
-        starts = None if view.sampling is None else view.sampling.times_s
-        ones = np.broadcast_to(np.ones((), np.complex128), (view.network.symbols, view.network.subcarriers))
-        delay_s = 2.0 * range_m / SPEED_OF_LIGHT
-        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts)

@@ -239,7 +239,7 @@ class FiltersCells(Protocol):
     """Detection: an effect on all range cells before the strongest is chosen (canceller)."""
 
     def process(self, settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-        """Return the range cells (N, M) after the effect."""
+        """Return the range cells (N, M) after the effect; frame: the look with ones instead of its data."""
 
 
 @runtime_checkable

@@ -110,7 +110,7 @@ def received_signal(
     # Call the engine only where the chain would not compute the same echo itself.
     if not link and (not exact or (chain.target.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
-    chain.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
+    chain.receiving.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
         if share is not None and asked and steps_alone(chain):
@@ -142,8 +142,8 @@ def arriving(signal: np.ndarray) -> float:
 
 def seen_alone(chain: Chain) -> np.ndarray:
     """Return the target's echo (N,) on the direct path with its visibility and aspect; SNRs refer to it."""
-    cells = np.fft.ifft(chain.target.direct, axis=1)
-    return cells[np.arange(len(cells)), abs(cells).argmax(axis=1)]
+    cells = chain.target.direct_cells
+    return cells[np.arange(len(cells)), chain.target.direct_best]
 
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:

@@ -29,7 +29,7 @@ def error_before(chain: Chain, allowed: float) -> float:
     # Instants and frequencies are interpolated one after the other.
     strongest = stretch * 2.0 * float(chain.target.strengths.sum(axis=1).max())
     fits = allowed
-    if chain.step > 0:
-        fits = min(allowed, allowed**2 * math.sqrt(0.5 * chain.view.network.subcarriers) / chain.step)
+    if chain.receiving.step > 0:
+        fits = min(allowed, allowed**2 * math.sqrt(0.5 * chain.view.network.subcarriers) / chain.receiving.step)
     # Without an echo, any error is small enough.
     return min(max(EXACT, fits / strongest), COARSEST) if strongest > 0 else COARSEST

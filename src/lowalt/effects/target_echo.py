@@ -67,6 +67,21 @@ class TargetEcho:
         return steering.echo(self.view, factor=self.factor, error=EXACT)
 
     @cached_property
+    def direct_cells(self) -> np.ndarray:
+        """The range cells (N, M) of `direct`."""
+        return np.fft.ifft(self.direct, axis=1)
+
+    @cached_property
+    def direct_sizes(self) -> np.ndarray:
+        """The magnitudes (N, M) of these cells."""
+        return abs(self.direct_cells)
+
+    @cached_property
+    def direct_best(self) -> np.ndarray:
+        """The number (N,) of the strongest of these cells."""
+        return self.direct_sizes.argmax(axis=1)
+
+    @cached_property
     def own_response(self) -> np.ndarray:
         """Subcarriers (N, M) of this target with every effect of the scene, to rounding."""
         return self.subcarriers(self.view, frozenset(self.by_need), self.routes)

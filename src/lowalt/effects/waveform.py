@@ -13,6 +13,7 @@ import numpy as np
 
 from lowalt.common.network import Network, Station
 from lowalt.effects.phasors import phasors
+from lowalt.effects.tone_loops import carried, divided, looked_up
 
 QPSK = np.exp(1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
 """The four data symbols, of unit modulus."""
@@ -23,7 +24,12 @@ def sent(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray
 
     Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
     """
-    return QPSK[rng.integers(0, 4, (symbols, subcarriers), dtype=np.uint8)]
+    count = symbols * subcarriers
+    # The upper two bits of each byte, the lowest byte of a word first.
+    taken = rng.bit_generator.random_raw(-(-count // 8)).astype("<u8", copy=False).view(np.uint8)
+    result = np.empty((symbols, subcarriers), np.complex128)
+    looked_up(taken, QPSK, result.reshape(-1))
+    return result
 
 
 def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
@@ -32,11 +38,9 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
     response's. Source: 3GPP TS 38.211, 5.3.1.
     """
-    half = data.shape[-1] // 2
-    tones = np.empty(np.broadcast_shapes(response.shape, data.shape), np.complex128)
-    # The product is written in the transform's order at once: copies of whole looks cost more than the product.
-    np.multiply(response[..., half:], data[..., half:], out=tones[..., : tones.shape[-1] - half])
-    np.multiply(response[..., :half], data[..., :half], out=tones[..., tones.shape[-1] - half :])
+    response, data = np.broadcast_arrays(response, data)
+    tones = np.empty(data.shape, np.complex128)
+    carried(response, data, tones)
     return np.fft.ifft(tones, axis=-1, out=tones)
 
 
@@ -45,11 +49,9 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
-    half = data.shape[-1] // 2
     tones = np.fft.fft(samples, axis=-1)
-    result = np.conj(np.broadcast_to(data, tones.shape))
-    result[..., half:] *= tones[..., : tones.shape[-1] - half]
-    result[..., :half] *= tones[..., tones.shape[-1] - half :]
+    result = np.empty_like(tones)
+    divided(tones, np.broadcast_to(data, tones.shape), result)
     return result
 
 

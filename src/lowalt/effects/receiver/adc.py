@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -29,15 +30,24 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = Tru
     A component outside the range is put in the outermost step or, with clip False, in a step of its own. Source: Gersho
     and Gray 1992, ch. 5.
     """
-    step = full_scale * 2.0 ** (1 - bits)
-    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
-    code = np.floor(parts / step)
-    if clip:
-        half = 2.0 ** (bits - 1)
-        np.clip(code, -half, half - 1, out=code)
-    code += 0.5
-    code *= step
-    return code.view(np.complex128).reshape(samples.shape), int(np.count_nonzero(np.abs(parts) > full_scale))
+    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64).reshape(-1)
+    out = np.empty_like(parts)
+    most = 2.0 ** (bits - 1) if clip else np.inf
+    clipped = _steps(parts, full_scale * 2.0 ** (1 - bits), most, full_scale, out)
+    return out.view(np.complex128).reshape(samples.shape), int(clipped)
+
+
+@LEAN
+def _steps(parts, step, most, full_scale, out):
+    """Fill out (K,) with the middles of the steps of parts (K,), `most` to each side; return how many are clipped."""
+    clipped = 0
+    for i in range(np.uint64(len(parts))):
+        code = np.floor(parts[i] / step)
+        code = code if code > -most else -most
+        code = code if code < most - 1.0 else most - 1.0
+        out[i] = (code + 0.5) * step
+        clipped += 1 if abs(parts[i]) > full_scale else 0
+    return clipped
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:

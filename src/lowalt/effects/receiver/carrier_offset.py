@@ -43,4 +43,6 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     shift = offset_hz(settings, frame, rng)
     between = turned(2 * np.pi * np.mod(shift * frame.symbol_times_s, 1.0))
     within = turned(2 * np.pi * shift * frame.sample_times_s)
-    return samples * between[:, None] * within
+    result = samples * within
+    result *= between[:, None]
+    return result

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -37,4 +38,15 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     Source: Schenk 2008, ch. 5; nothing is drawn.
     """
     mu, nu = coefficients(settings)
-    return mu * samples + nu * samples.conj()
+    out = np.empty(samples.shape, np.complex128)
+    _mixed(np.ascontiguousarray(samples, np.complex128).reshape(-1), complex(mu), complex(nu), out.reshape(-1))
+    return out
+
+
+@LEAN
+def _mixed(samples, mu, nu, out):
+    """Fill out (K,) with mu r + nu conj(r) of samples r (K,)."""
+    a, b, c, d = mu.real, mu.imag, nu.real, nu.imag
+    for i in range(np.uint64(len(out))):
+        x, y = samples[i].real, samples[i].imag
+        out[i] = complex((a + c) * x + (d - b) * y, (b + d) * x + (a - c) * y)
