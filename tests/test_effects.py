@@ -14,6 +14,7 @@ from lowalt.common.streams import stream
 from lowalt.echo import echo_matrix, echo_signal
 from lowalt.echo.radar import radar
 from lowalt.effects import interface, waveform
+from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.checks import check
 from lowalt.effects.received import Scene, observe, received_signal
@@ -106,6 +107,14 @@ def test_a_coarser_response_errs_by_no_more_than_it_may(rng, squint, wavefront, 
     elements = np.prod(radio.transmit) * np.prod(radio.receive)
     peaks = radar(radio, station).scale * elements * np.sqrt(rcs).sum() / near**2 * (1 + 0.7) ** 2
     assert 1e-15 * peaks < abs(ours - exact).max() <= error * peaks
+
+
+def test_a_table_keeps_no_order_that_its_error_allows_to_leave_out():
+    for error in (1e-3, 1e-6, 1e-9):
+        mix, values = tables.joined(2.0, 5, 64, error)
+        assert mix.shape[1] == len(values) and 0.1 * error < abs(mix[:, -1]).sum()
+    kept = [tables.joined(2.0, 5, 64, error)[0].shape[1] for error in (1e-3, 1e-6, 1e-9)]
+    assert kept[0] < kept[1] < kept[2] < 60
 
 
 @settings(max_examples=20, deadline=None)

@@ -14,6 +14,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.effects.motion import gusts, rotor_spread
 from lowalt.effects.motion.markov import steps
+from lowalt.effects.view import summed
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.targets.cloud import Cloud
@@ -34,6 +35,17 @@ def target(name: str) -> tuple[Cloud, dict]:
     corners = region_polygon(masts, None)
     row = draw(stream(1, "motion", name, 0), cloud, record["published"], masts, corners, config["motion"])
     return cloud, {**row, "model": 0}
+
+
+def test_perturbations_add_up_part_by_part_and_what_none_of_them_moves_is_none():
+    angle, offset, tilt = TIMES, np.outer(TIMES, [1.0, 2.0, 3.0]), np.outer(TIMES, [4.0, 5.0, 6.0])
+    assert summed([]) is None
+    turned, moved = Perturbation({1: angle}), Perturbation({1: angle, 2: 3 * angle}, offset_m=offset)
+    found = summed([turned, moved, moved])
+    assert (found.angle_rad[1] == 3 * angle).all() and (found.angle_rad[2] == 6 * angle).all()
+    assert (found.offset_m == 2 * offset).all() and found.tilt_rad is None
+    found = summed([turned, Perturbation(tilt_rad=tilt)])
+    assert found.offset_m is None and (found.tilt_rad == tilt).all()
 
 
 @pytest.mark.parametrize("name", [QUAD, BIRD, CAR, WALKER])

@@ -3,6 +3,7 @@
 import io
 import json
 import math
+import tarfile
 from types import SimpleNamespace
 
 import pytest
@@ -95,3 +96,19 @@ def test_keys_are_unique_and_without_dots():
     assert len(keys) == len(snrs)
     assert not any("." in key or "/" in key for key in keys)
     assert snr_label(3) == snr_label(3.0) == "snr003"
+
+
+@pytest.mark.parametrize("samples", [0, 1, 2, 3])
+def test_an_archive_ends_with_two_empty_blocks_at_a_whole_record(samples):
+    """As plain tarfile fills it up, whatever it holds."""
+    file, plain = io.BytesIO(), io.BytesIO()
+    writer = Writer(file)
+    for number in range(samples):
+        writer.add(f"k{number}", b"{}", "png", bytes(1000 * number))
+    writer.close()
+    with tarfile.open(fileobj=plain, mode="w") as archive:
+        for number in range(2 * samples):
+            info = tarfile.TarInfo(f"m{number}")
+            info.size = 1000 * (number // 2) if number % 2 else 2
+            archive.addfile(info, io.BytesIO(bytes(info.size)))
+    assert len(file.getvalue()) == len(plain.getvalue())
