@@ -10,12 +10,12 @@ from skips import Skips
 # Files that take long, the longest first. Two processes share the files of tests, one file at a time: a long file that
 # begins last would keep one of them alone at the end.
 LONG = (
-    "test_workflow", "test_workflow_reruns", "test_bytes", "test_recognition_resume", "test_recognition_training",
-    "test_recognition_ranks", "test_dataset", "test_contributing", "test_wheel", "test_classes",
-    "test_effects_occlusion", "test_recognition_export", "test_recognition_memory", "test_recognition_stream",
-    "test_benchmarks_long_run", "test_report_plots", "test_echo", "test_effects", "test_effects_every",
-    "test_mutants", "test_attacks", "test_house", "test_recordings_unseen", "test_workflow_locks",
-    "test_workflow_board", "test_turns", "test_targets_more",
+    "test_workflow", "test_workflow_reruns", "test_recognition_resume", "test_recognition_training", "test_wheel",
+    "test_contributing", "test_recognition_ranks", "test_stations", "test_echo", "test_effects", "test_bytes",
+    "test_house", "test_dataset", "test_workflow_locks", "test_classes", "test_effects_occlusion",
+    "test_recognition_export", "test_recognition_memory", "test_recognition_stream", "test_mutants",
+    "test_report_plots", "test_effects_every", "test_attacks", "test_recordings_unseen", "test_benchmarks_long_run",
+    "test_skips", "test_workflow_board", "test_turns", "test_targets_more",
 )  # fmt: skip
 
 

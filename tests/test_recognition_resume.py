@@ -101,7 +101,7 @@ def test_foreign_damaged_and_missing_checkpoints_are_refused_by_name(views, trai
 def test_a_checkpoint_of_other_data_with_equal_counts_is_refused(views, tmp_path, monkeypatch):
     """Inverted images, the same keys and labels: another run, though every count is the same."""
     step = kill_at(monkeypatch, 5)
-    settings = with_training(checkpoint_s=0)
+    settings = with_training(steps=8, checkpoint_s=0)
     with pytest.raises(Killed):
         train(views, tmp_path, settings)
     monkeypatch.setattr(runs.Trainer, "_step", step)

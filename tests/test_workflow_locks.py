@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import snakemake_runs
 from lowalt.workflow import interrupts
 from lowalt.workflow.locks import guarded, holders, install, numbers, take, take_over
 from lowalt.workflow.owner import TOKEN, Owner, started
@@ -183,6 +184,12 @@ def start(folder, *arguments):
     return subprocess.Popen(command, cwd=folder, env=environment, start_new_session=True, **output)
 
 
+def ended(folder, *arguments):
+    """Exit status and text of a run that ends by itself."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    return snakemake_runs.run(folder, ["--cores", "1", "--rerun-incomplete", *arguments], environment)
+
+
 def wait_for(path):
     stop = time.monotonic() + 30
     while not path.exists() or not path.read_text().strip():
@@ -197,13 +204,12 @@ def test_snakemake_refuses_a_living_owner_and_takes_over_a_killed_one(tmp_path):
     (tmp_path / "Snakefile").write_text(SNAKEFILE)
     first = start(tmp_path)
     worker = int(wait_for(tmp_path / "worker.pid"))
-    second = start(tmp_path)
-    text = second.communicate(timeout=60)[0]
-    assert second.returncode != 0
+    status, text = ended(tmp_path)
+    assert status != 0
     assert f"process {first.pid} of {Owner.current().host} is running" in text and "Traceback" not in text
     # A refused run takes nothing from the one that runs.
     assert takers(tmp_path / ".snakemake/locks")[0].pid == first.pid
-    assert f"process {first.pid}" in start(tmp_path, "--dry-run").communicate(timeout=60)[0]
+    assert f"process {first.pid}" in ended(tmp_path, "--dry-run")[1]
     first.kill()
     # Its job lives on and holds the pipe of its output open.
     first.wait()
@@ -225,9 +231,8 @@ def test_snakemake_never_takes_over_the_lock_of_another_host(tmp_path):
     (tmp_path / "go").touch()
     take(tmp_path / ".snakemake/locks", replace(GONE, host="elsewhere"), KEYS)
     before = json.loads((tmp_path / ".snakemake/locks/0.owner.json").read_text())
-    run = start(tmp_path)
-    text = run.communicate(timeout=60)[0]
-    assert run.returncode != 0 and "host elsewhere" in text and "--unlock" in text
+    status, text = ended(tmp_path)
+    assert status != 0 and "host elsewhere" in text and "--unlock" in text
     assert json.loads((tmp_path / ".snakemake/locks/0.owner.json").read_text()) == before
-    assert start(tmp_path, "--unlock").wait(60) == 0
-    assert start(tmp_path).wait(60) == 0
+    assert ended(tmp_path, "--unlock")[0] == 0
+    assert ended(tmp_path)[0] == 0
