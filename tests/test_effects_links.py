@@ -216,7 +216,7 @@ def test_a_links_record_has_the_half_range_sum():
         ("{}", "A-B: {transmit: A, receive: B}", "links between two stations"),
         ("{direct_path: {}}", "A-B: {transmit: A, receive: Z}", "expected two of"),
         ("{direct_path: {}}", "A-A: {transmit: A, receive: A}", "expected two of"),
-        ("{direct_path: {}, clutter: {}}", "A-B: {transmit: A, receive: B}", "clutter"),
+        ("{direct_path: {}, background_channel: {}}", "A-B: {transmit: A, receive: B}", "background_channel"),
         ("{direct_path: {}}", "A-B: {transmit: A, normal_deg: 3.0}", "stations.A-B"),
     ],
 )

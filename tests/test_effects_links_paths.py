@@ -173,4 +173,4 @@ def test_a_facade_reflects_between_points_on_each_ends_own_side():
     # B stands beyond this wall, A and the target before it.
     settings = walls.DEFAULTS | {"facades": [[100.0, 0.0, 0.0, 400.0, 80.0]]}
     out, back = (walls.paths(settings, end)[0] for end in own.ends())
-    assert out.coefficient.all() and not back.coefficient.any()
+    assert np.all(out.coefficient) and not np.any(back.coefficient)

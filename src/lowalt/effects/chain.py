@@ -134,7 +134,7 @@ class Chain:
                 samples += other.own_samples[rows]
             if self._clutter is not None:
                 cut = self.target.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
-                samples = samples + self.sending.still(self._clutter, cut, self._offset_cells)[rows]
+                samples = samples + self._still(cut)[rows]
         else:
             spectrum = self.target.subcarriers(view, on, factor)
             for other in self.others:
@@ -207,22 +207,28 @@ class Chain:
             values[contested] = new
         return merged
 
-    @property
-    def _offset_cells(self) -> float:
-        """How far the echoes of everything but the target stand beyond the centres of their range cells."""
+    def _still(self, cut: NamedEffect | None) -> np.ndarray:
+        """Time samples (N, M) of the echoes of everything but the target, cut by the prefix at their range cells."""
+        if cut is None or len(self._added) < 2:
+            return self.sending.still(self._clutter, cut, self._added[0][0] if self._added else 0.0)
+        return sum(self.sending.still(one, cut, offset) for offset, one in self._added)
+
+    @cached_property
+    def _added(self) -> list[tuple[float, np.ndarray]]:
+        """How far the echoes of everything but the target stand beyond their range cells' centres, and they (N, M)."""
+        found = []
         for effect in providing(self.channel, AddsEchoes):
-            if hasattr(effect.module, "offset_cells") and self.view.station.transmitter is not None:
-                return effect.module.offset_cells(self.view)
-        offsets = [getattr(effect.module, "OFFSET_CELLS", 0.0) for effect in providing(self.channel, AddsEchoes)]
-        return offsets[0] if offsets else 0.0
+            module = effect.module
+            one = module.scatter(effect.settings, self.view, self.draws(effect.name))
+            fixed = getattr(module, "OFFSET_CELLS", 0.0)
+            offset = module.offset_cells(self.view) if hasattr(module, "offset_cells") else fixed
+            found += [(offset, one)] if one.any() else []
+        return found
 
     @cached_property
     def _clutter(self) -> np.ndarray | None:
         """Sum of the echoes of everything but the target (N, M), None where there are none."""
-        added = [
-            effect.module.scatter(effect.settings, self.view, self.draws(effect.name))
-            for effect in providing(self.channel, AddsEchoes)
-        ]
+        added = [one for _, one in self._added]
         return sum(added[1:], added[0]) if added else None
 
     @cached_property

@@ -2,7 +2,8 @@
 
 A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle). Its amplitude
 is compound Gaussian: a texture, drawn once and correlated between neighbours, times speckle whose still part stays and
-whose moving part has Billingsley's exponential Doppler spectrum. Each patch has range side lobes (`patches`).
+whose moving part has Billingsley's exponential Doppler spectrum. Each patch has range side lobes (`patches`). On a link
+cells are of the range sum (`land_between`), and Doppler is that along the bisector.
 """
 
 from functools import lru_cache
@@ -15,8 +16,9 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
-from lowalt.effects.antenna import Element, gain, local_gain
-from lowalt.effects.channel import patches
+from lowalt.effects.antenna import Element, local_gain
+from lowalt.effects.channel import land_between, patches
+from lowalt.effects.channel.land_between import target_power
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
@@ -24,7 +26,9 @@ SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
     "laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable densities under change of scale, Ann. Prob. 3, "
     "1975; texture from cell to cell: Tough & Ward, J. Phys. D 32, 1999, its correlation length: estimate; "
-    "windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6"
+    "windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; on links: gamma "
+    "(sin psi_1 sin psi_2)^(1/2), Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the plane of both grazing "
+    "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
 )
 DEFAULTS = {
     "gamma": 0.03, "clutter_to_signal_db": None, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5,
@@ -180,11 +184,13 @@ def _normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
 
 
 def speckle(
-    rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float
-) -> np.ndarray:
+    rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float,
+    slow: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
     """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided exponential spectrum.
 
-    still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m).
+    still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m); slow: (cells,) factor on Doppler
+    frequencies, None for 1.
     """
     kept = _normal(rng, cells)[:, None]
     if not np.isfinite(still):
@@ -194,7 +200,9 @@ def speckle(
     # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
     strong = shape > np.sqrt(FAINT)
     drawn = _normal(rng, cells, int(strong.sum()))
-    drawn *= np.sqrt(1 / (1 + still)) * shape[strong]
+    if slow is not None:
+        shape = land_between.slowed(len(shape), step_s, beta * wavelength_m, slow)
+    drawn *= np.sqrt(1 / (1 + still)) * shape[..., strong]
     lines[:, strong] = drawn
     moving = np.fft.ifft(lines, axis=1, norm="forward", out=lines)[:, :count]
     moving += np.sqrt(still / (1 + still)) * kept
@@ -203,24 +211,34 @@ def speckle(
 
 def mean_power(settings: dict, view: View) -> np.ndarray:
     """Return the mean power (cells,) (W) of the land in every slant-range cell, at the level that settings ask for."""
-    power = cell_power(settings, view.network, view.station, view.aim_m, view.element)
+    return _land(settings, view)[0]
+
+
+def _land(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray | None]:
+    """Mean power (cells,) (W), and on a link how much each cell's Doppler is slowed."""
+    slow = None
+    if view.station.transmitter is None:
+        power = cell_power(settings, view.network, view.station, view.aim_m, view.element)
+    else:
+        power, slow = land_between.cell_power(settings, view.network, view.station, view.aims_m, view.element)
     if settings["clutter_to_signal_db"] is None:
-        return power
+        return power, slow
     wanted = target_power(view) * 10 ** (settings["clutter_to_signal_db"] / 10)
-    return power * (wanted / power.sum())
+    total = power.sum()
+    return power * (wanted / total) if total > 0 else power, slow
 
 
 def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
     network, station = view.network, view.station
-    power = mean_power(settings, view)
+    power, slow = _land(settings, view)
     frequency = radar(network, station).centre_hz
     correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
     uniform = patches.alike(1.0 - rng.random((2, len(power))), correlation)
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
     still, beta = windblown(settings["wind_mps"], frequency)
     waves = speckle(
-        rng, len(power), len(view.times_s), network.symbol_interval_s, still, beta, SPEED_OF_LIGHT / frequency
+        rng, len(power), len(view.times_s), network.symbol_interval_s, still, beta, SPEED_OF_LIGHT / frequency, slow
     )
     # Land beyond the unambiguous range folds into the cells it shares with nearer land.
     cells = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
@@ -230,12 +248,3 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     np.fft.fft(cells, axis=1, out=cells)
     cells *= patches.ramp(network.subcarriers)
     return cells
-
-
-def target_power(view: View) -> float:
-    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
-    radio = radar(view.network, view.station)
-    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
-    range_m = float(np.linalg.norm(view.aim_m - radio.station))
-    shaped = 1.0 if view.element is None else float(gain(view.element, view.station, view.aim_m))
-    return (radio.scale * elements * shaped) ** 2 * float(view.cloud.rcs_m2.sum()) / range_m**4
