@@ -17,7 +17,9 @@ import scene_levels  # noqa: E402
 
 SCENES = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml"))
 
-QUICK = "links", "rural"
+LINKED = "links", "triangle"
+"""Scenes with links between stations."""
+QUICK = "triangle", "rural"
 """Scenes that `explain` is asked about in every run of the tests."""
 
 
@@ -38,7 +40,7 @@ def test_the_kept_levels_of_a_scene_are_the_codes(name):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_kept_levels_of_a_scene_follow_by_hand(name):
-    table, link = kept(name), name == "links"
+    table, link = kept(name), name in LINKED
     out, back = (415.6, 407.1) if link else (415.6, 415.6)
     noise_figure = 9.0 if name == "worst" else 7.0
     path = next(value for level, value in table.items() if level.startswith("path"))
@@ -76,7 +78,7 @@ def test_the_note_on_other_stations_has_the_kept_levels():
 def test_explain_says_the_cyclic_prefix_and_the_levels_of_every_scene(name, monkeypatch):
     monkeypatch.chdir(ROOT)
     paths = [ROOT / "config/default.yaml", ROOT / f"config/scenes/{name}.yaml"]
-    station = "A-B" if name == "links" else "A"
+    station = "A-B" if name in LINKED else "A"
     config = load(paths, ROOT / "workflow/schemas/config.schema.yaml")
     text = explanation(scene_facts(config, None, [scene_levels.SAMPLE], station, False))
     assert "cyclic prefix 0.586 us, covers 88 m: this echo loses 26% of its window" in text
