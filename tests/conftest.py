@@ -86,5 +86,5 @@ def trained(views, tmp_path_factory):
     from trainings import train, with_training
 
     folder = tmp_path_factory.mktemp("model")
-    train(views, folder, with_training(steps=150, validate_every=50))
+    train(views, folder, with_training(steps=80, validate_every=40, ema=0.95))
     return folder

@@ -10,7 +10,7 @@ from lowalt.tiles import Images, Renderer, Scale, split
 from pictures import SCALES, echoes, renderer
 
 torch = pytest.importorskip("torch")
-from lowalt.tiles.device import DeviceRenderer  # noqa: E402
+from lowalt.tiles.device import DeviceRenderer, _power_of_two  # noqa: E402
 
 DEVICES = ["cpu", *(["cuda"] if torch.cuda.is_available() else [])]
 
@@ -23,6 +23,11 @@ def batch():
         echoes(3, level=1e-37), echoes(4, level=1e37),
     ]  # fmt: skip
     return np.stack(samples).astype(np.complex64)
+
+
+def test_powers_of_two_are_exact_over_the_range_of_normal_numbers():
+    exponents = torch.arange(-126, 128)
+    assert _power_of_two(exponents).tolist() == [2.0**exponent for exponent in exponents.tolist()]
 
 
 @pytest.mark.parametrize("device", DEVICES)

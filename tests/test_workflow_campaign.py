@@ -13,7 +13,7 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.workflow.campaign import LARGE_MB, SMALL_MB, room_mb
-from lowalt.workflow.disturb import disturb, workers
+from lowalt.workflow.disturb import MemoryGroup, _kill, disturb, workers
 from lowalt.workflow.trial import checksums
 
 
@@ -73,3 +73,26 @@ def test_a_file_s_next_writer_removes_what_a_killed_one_left_and_nothing_else(tm
     with replacing(tmp_path / "seen.npy") as temporary:
         temporary.write_text("whole")
     assert {path.name for path in tmp_path.iterdir()} == {"seen.npy", *left[1:]}
+
+
+def test_a_signal_reaches_every_process_that_still_runs():
+    class Process:
+        def __init__(self, runs):
+            self.runs, self.got = runs, []
+
+        def send_signal(self, number):
+            if not self.runs:
+                raise psutil.NoSuchProcess(1)
+            self.got.append(number)
+
+    processes = [Process(True), Process(False), Process(True)]
+    _kill(processes, signal.SIGTERM)
+    assert [process.got for process in processes] == [[signal.SIGTERM], [], [signal.SIGTERM]]
+
+
+def test_a_memory_group_without_the_files_of_the_second_version_uses_those_of_the_first(tmp_path):
+    group = MemoryGroup(tmp_path)
+    files = [path.relative_to(tmp_path / f"lowalt-campaign-{os.getpid()}") for path in
+             (group.limit, group.usage, group.events)]  # fmt: skip
+    assert [*map(str, files)] == ["memory.limit_in_bytes", "memory.usage_in_bytes", "memory.oom_control"]
+    assert group.none == "-1"
