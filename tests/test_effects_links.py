@@ -18,9 +18,10 @@ from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import direct_path
 from lowalt.effects.checks import check
+from lowalt.effects.one_way import range_sum
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.receiver import link_offset
-from lowalt.effects.response import _range_sum, response
+from lowalt.effects.response import response
 from lowalt.shards.record import geometry
 from test_effects import network, target
 
@@ -83,7 +84,7 @@ def test_a_link_back_to_its_own_place_is_the_station_itself_to_the_last_bit(rece
 def test_a_links_range_sum_is_carried_and_off_by_rounding_alone():
     rng = np.random.default_rng(5)
     origin = np.array([50.0, 40.0, 20.0]) + 10 ** rng.uniform(0, 4, (5000, 1)) * rng.normal(size=(5000, 3))
-    whole, found = reference(origin, radar(linked(), A)), _range_sum(linked(), link(A, A), origin)
+    whole, found = reference(origin, radar(linked(), A)), range_sum(linked(), link(A, A), origin)
     assert (found[:, 5] == whole[:, 5]).all() and abs(found[:, [4, 6]]).max() <= 0.5
     assert abs(found[:, [4, 6]] - whole[:, [4, 6]]).max() <= 2.0**-53
 

@@ -129,12 +129,10 @@ class Chain:
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
         left = self.receiver
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
-            samples = self.target.samples(view, on, factor, rows)
-            for other in self.others:
-                samples += other.own_samples[rows]
-            if self._clutter is not None:
-                cut = self.target.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
-                samples = samples + self._still(cut)[rows]
+            still, samples = self._moving(view, on, factor, rows)
+            if not left and not self.sending.distorts and self._unknown is None:
+                return still + self.sending.received(samples, rows)
+            samples += waveform.transmit(still, self.sending.aired[rows])
         else:
             spectrum = self.target.subcarriers(view, on, factor)
             for other in self.others:
@@ -149,6 +147,18 @@ class Chain:
         if self._unknown is not None:
             samples = samples + self._unknown[rows]
         return self.receiving.sampled(samples, left, rows)
+
+    def _moving(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """All echoes with leakage between subcarriers: a response (N, M), and samples (N, M) to add to its own."""
+        still, samples = self.target.arriving(view, on, factor, rows)
+        for other in self.others:
+            samples += other.own_samples[rows]
+        if self._clutter is not None:
+            cut = self.target.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
+            samples = samples + self._still(cut)[rows]
+        return still, samples
 
     @property
     def _company(self) -> frozenset[str]:

@@ -69,24 +69,63 @@ def turned(whole, cells, half_steps, total):
 
 
 @LOOPS
-def delayed(planes, own, whole, cells, result):
-    """Add own[n] (planes[n, 0] + j planes[n, 1]), delayed, to result (N, M).
+def halves(planes, table, work):
+    """Fill work (4, H) with the sums over orders of planes (2, P) times table (P, M): even orders', then odd orders'.
 
-    planes: (N, 2, M); the delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells.
+    Rows: real and imaginary part. H = (M + 1) // 2 subcarriers from the lowest one; about the middle of the band the
+    functions of even orders are even and those of odd orders are odd.
+    """
+    for parity in range(2):
+        real, imag = work[2 * parity], work[2 * parity + 1]
+        real[:] = 0.0
+        imag[:] = 0.0
+        for p in range(parity, table.shape[0], 4):
+            # Two orders a pass over the subcarriers; the number of orders may be odd.
+            q, more = (p + 2, 1.0) if p + 2 < table.shape[0] else (p, 0.0)
+            one, two = table[p], table[q]
+            a, b, c, d = planes[0, p], planes[1, p], more * planes[0, q], more * planes[1, q]
+            for m in range(np.uint64(len(real))):
+                real[m] += a * one[m] + c * two[m]
+                imag[m] += b * one[m] + d * two[m]
+
+
+@LOOPS
+def ramp(start, step, total, real, imag):
+    """Fill real, imag (H,) with the phase factors start, start step, start step^2, ... in strides, to rounding."""
+    wide = step[1]
+    real[0], imag[0] = start.real, start.imag
+    for k in range(1, min(STRIDE, len(real))):
+        phase = complex(real[k - 1], imag[k - 1]) * step[0]
+        real[k], imag[k] = phase.real, phase.imag
+    for k in range(STRIDE, len(real)):
+        real[k] = real[k - STRIDE] * wide.real - imag[k - STRIDE] * wide.imag
+        imag[k] = real[k - STRIDE] * wide.imag + imag[k - STRIDE] * wide.real
+
+
+@LOOPS
+def spread(planes, table, own, whole, cells, result):
+    """Add own[n] times the response of moments (N, 2, P), real and imaginary, delayed, to result (N, M).
+
+    table: (P, M) real, each order's values at the subcarriers, even or odd about the band's middle as the order is; the
+    delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells.
     """
     symbols, total = result.shape
-    ramp_re, ramp_im = np.empty(STRIDE), np.empty(STRIDE)
+    half = (total + 1) // 2
+    work, turn, sums = np.empty((4, half)), np.empty((2, half)), np.empty((2, total))
     for n in range(symbols):
-        step, wide = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
-        phase = 1.0 + 0.0j
-        for k in range(STRIDE):
-            ramp_re[k], ramp_im[k] = phase.real, phase.imag
-            phase *= step
-        phase = own[n] * turned(whole[n], cells[n], 1 - total, total)
-        for first in range(0, total, STRIDE):
-            a, b = phase.real, phase.imag
-            for k in range(min(STRIDE, total - first)):
-                x, y = planes[n, 0, first + k], planes[n, 1, first + k]
-                c, d = a * x - b * y, a * y + b * x
-                result[n, first + k] += complex(c * ramp_re[k] - d * ramp_im[k], c * ramp_im[k] + d * ramp_re[k])
-            phase *= wide
+        halves(planes[n], table, work)
+        even_re, even_im, odd_re, odd_im = work[0], work[1], work[2], work[3]
+        step = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
+        ramp(turned(whole[n], cells[n], 1 - total, total), step, total, turn[0], turn[1])
+        re, im, x, y = turn[0], turn[1], own[n].real, own[n].imag
+        low_re, low_im, high_re, high_im = sums[0], sums[1], sums[0, ::-1], sums[1, ::-1]
+        for m in range(np.uint64(half)):
+            a, b, c, d = even_re[m] + odd_re[m], even_im[m] + odd_im[m], x * re[m] - y * im[m], x * im[m] + y * re[m]
+            low_re[m], low_im[m] = a * c - b * d, a * d + b * c
+        # Above the middle the odd orders and the delay's phase change their signs.
+        for m in range(np.uint64(total - half)):
+            a, b, c, d = even_re[m] - odd_re[m], even_im[m] - odd_im[m], x * re[m] + y * im[m], y * re[m] - x * im[m]
+            high_re[m], high_im[m] = a * c - b * d, a * d + b * c
+        row = result[n]
+        for m in range(np.uint64(total)):
+            row[m] += complex(low_re[m], low_im[m])

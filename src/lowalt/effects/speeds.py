@@ -6,6 +6,7 @@ For complex times the same sums bound how far positions leave the real space, wh
 interpolation in time needs.
 """
 
+import math
 from functools import cached_property
 from itertools import pairwise
 
@@ -55,17 +56,19 @@ class Speeds:
                 turning[part] += self._rate(moving) * self._lever(part, order)
         return duration_s * (self.body_mps + self.node_mps + self.tilt_radps * self.reach_m + turning)
 
-    def imaginary_m(self, imaginary_s: float) -> np.ndarray:
-        """Return a bound (P,) of the imaginary part of positions at complex times, |Im t| <= `imaginary_s` (m).
+    def imaginary_m(self, imaginary_s: np.ndarray | float) -> np.ndarray:
+        """Return a bound (..., P) of the imaginary part of positions at complex times, |Im t| <= `imaginary_s` (m).
 
+        imaginary_s: any shape (...).
         A turn by a complex angle a + jb is cosh(b) times a turn plus j sinh(b) times another, so several in a row have
         an imaginary part of at most sinh of the sum of their |b|, times what they turn: the attitude turns the whole
         reach, the hinges only what lies beyond the first of them.
         """
         even, amplitudes, beats = self._turns
-        swung = amplitudes * np.sinh(np.minimum(beats * imaginary_s, 700.0))
-        tilt = np.full(len(even), min(self.tilt_radps * imaginary_s, 700.0))
-        angle = np.minimum(tilt + even * imaginary_s + swung.sum(axis=1), 700.0)
+        imaginary_s = np.asarray(imaginary_s, np.float64)[..., None]
+        swung = amplitudes * np.sinh(np.minimum(beats * imaginary_s[..., None], 700.0))
+        tilt = np.minimum(self.tilt_radps * imaginary_s, 700.0)
+        angle = np.minimum(tilt + even * imaginary_s + swung.sum(axis=-1), 700.0)
         turned = self.reach_m * np.sinh(tilt) + self._hinged_m * np.sinh(angle)
         return imaginary_s * (self.body_mps + self.node_mps) + turned
 
@@ -96,14 +99,16 @@ class Speeds:
     @cached_property
     def _lengths(self) -> list[list[float]]:
         """Distances along each part's hinges: origin to first hinge, hinge to hinge, last hinge to farthest point."""
-        result = []
-        for part, chain in enumerate(self._chains):
-            stops = [np.zeros(3), *(self.cloud.hinges[moving] for moving in chain)]
-            hops = [float(np.linalg.norm(b - a)) for a, b in pairwise(stops)]
-            mine = self.cloud.points[self.cloud.part == part]
-            last = float(np.linalg.norm(mine - stops[-1], axis=1).max()) if len(mine) else 0.0
-            result.append([*hops, last])
-        return result
+        stops = [[np.zeros(3), *(self.cloud.hinges[moving] for moving in chain)] for chain in self._chains]
+        hops = [[math.dist(a, b) for a, b in pairwise(places)] for places in stops]
+        away = self.cloud.points - np.array([places[-1] for places in stops])[self.cloud.part]
+        return [[*mine, last] for mine, last in zip(hops, self._largest_of(away), strict=True)]
+
+    def _largest_of(self, vectors: np.ndarray) -> list[float]:
+        """The largest length of the points' vectors (L, 3) in each part, zero for a part without points."""
+        result = np.zeros(len(self.cloud.kinds))
+        np.maximum.at(result, self.cloud.part, np.sqrt(np.einsum("li,li->l", vectors, vectors)))
+        return result.tolist()
 
     def _lever(self, part: int, order: int) -> float:
         """Largest distance (m) that the turn about a hinge of a part's chain, the order-th, carries its points by."""
@@ -118,13 +123,11 @@ class Speeds:
 
     @cached_property
     def _arms(self) -> list[float]:
-        """Each part's `_arm`."""
-        return [self._arm(part) if chain else 0.0 for part, chain in enumerate(self._chains)]
-
-    def _arm(self, part: int) -> float:
-        """Largest distance of a part's points from its own axis (m)."""
-        mine = self.cloud.points[self.cloud.part == part] - self.cloud.hinges[part]
-        return float(np.linalg.norm(np.cross(mine, self.cloud.axes[part]), axis=1).max()) if len(mine) else 0.0
+        """Largest distance of each part's points from its own axis (m), zero for parts that do not turn."""
+        turning = np.array([bool(chain) for chain in self._chains])
+        hinges, axes = np.where(turning[:, None], [self.cloud.hinges, self.cloud.axes], 0.0)
+        part = self.cloud.part
+        return self._largest_of(np.cross(self.cloud.points - hinges[part], axes[part]))
 
     def _added(self, part: int) -> float:
         """Largest angular rate that motion effects add to a part (rad/s)."""

@@ -1,6 +1,7 @@
 """A target's frequency response under beams that may be turned during the look."""
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,25 +20,39 @@ def echo(view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float
     return Steered(view, paths, **asked).echo(factor)
 
 
+class SameSymbols(NamedTuple):
+    """What instants of the same symbols share: the beams (`View.beam_rows`), and how much ranges differ (m)."""
+
+    rows: list[tuple[int, np.ndarray, np.ndarray]]
+    farther_m: float
+
+
 class Steered:
     """The one-way factors of a view's target, beam by beam, from which echoes of any strengths follow."""
 
     def __init__(
         self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
-        error: float = 1e-14, kept: dict | None = None,
+        error: float = 1e-14, kept: dict | None = None, like: "Steered | None" = None, span: SameSymbols | None = None,
     ):  # fmt: skip
-        """Prepare the factors; kept: as in `response.OneWayFactors`, for every beam."""
-        self.view, asked = view, {"squint": squint, "wavefront": wavefront, "error": error}
+        """Prepare the factors; kept and like: as in `response.OneWayFactors`, for every beam.
+
+        span: of the symbols, where the view is one of several instants in them.
+        """
+        self.view = view
+        asked = {"squint": squint, "wavefront": wavefront, "error": error}
+        asked["farther_m"] = 0.0 if span is None else span.farther_m
         given, self.steady = (view.network, view.station), not view.turning
         if self.steady:
             out, back = view.aims_m
+            asked["like"] = None if like is None else like.beams[0][2]
             rays = OneWayFactors(*given, view.places, back, paths, sender_aim_m=out, kept=kept, **asked)
             self.beams = [(slice(None), 1.0, rays)]
             return
         self.beams = []
-        for number, aims, rows in view.beam_rows():
+        for place, (number, aims, rows) in enumerate(view.beam_rows() if span is None else span.rows):
             some = [_at_rows(path, rows) for path in paths]
             own = None if kept is None else kept.setdefault(number, {})
+            asked["like"] = None if like is None else like.beams[place][2]
             rays = OneWayFactors(
                 *given, view.places[rows], aims[1], some, sender_aim_m=aims[0], kept=own, **asked
             )  # fmt: skip
@@ -48,16 +63,28 @@ class Steered:
 
         Symbols in which the factor is zero for all points are zero.
         """
-        view, roots = self.view, np.sqrt(self.view.cloud.rcs_m2)
+        return self.spectrum(self.moments(factor))
+
+    def moments(self, factor: np.ndarray | float = 1.0) -> list[list[np.ndarray]]:
+        """Return the moments (`response.OneWayFactors.moments`) of every beam, with `factor` on every amplitude."""
+        roots = np.sqrt(self.view.cloud.rcs_m2)
+        return [rays.moments(roots * _rows_of(factor, rows)) for rows, _, rays in self.beams]
+
+    def spectrum(self, moments: list[list[np.ndarray]]) -> np.ndarray:
+        """Return the subcarriers (N, M) of every beam's moments, or of sums of such of instants alike."""
         if self.steady:
-            return self.beams[0][2].summed(roots * factor)
-        result = np.empty((len(view.times_s), view.network.subcarriers), np.complex128)
-        for rows, phase, rays in self.beams:
-            result[rows] = phase * rays.summed(roots * _rows_of(factor, rows))
+            return self.beams[0][2].spectrum(moments[0])
+        result = np.empty((len(self.view.times_s), self.view.network.subcarriers), np.complex128)
+        for (rows, phase, rays), mine in zip(self.beams, moments, strict=True):
+            result[rows] = phase * rays.spectrum(mine)
         return result
 
+    def largest(self, moments: list[list[np.ndarray]]) -> float:
+        """Return a bound of the largest subcarrier that `spectrum` makes of these moments."""
+        return max(rays.largest(mine) for (_, _, rays), mine in zip(self.beams, moments, strict=True))
 
-def _rows_of(values: np.ndarray | complex, rows: np.ndarray) -> np.ndarray | complex:
+
+def _rows_of(values: np.ndarray | complex, rows: np.ndarray | slice) -> np.ndarray | complex:
     """The rows of a table (N, L) or (R, N, L), or the value that all rows share."""
     return values[..., rows, :] if np.ndim(values) > 1 and values.shape[-2] > 1 else values
 

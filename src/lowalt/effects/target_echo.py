@@ -5,12 +5,11 @@ from functools import cached_property
 
 import numpy as np
 
-from lowalt.effects import need, steering, waveform
+from lowalt.effects import arrivals, need, steering, waveform
 from lowalt.effects.catalogue import NamedEffect, providing
 from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
 from lowalt.effects.response import ImagePath
 from lowalt.effects.sending import Sending
-from lowalt.effects.steering import Steered
 from lowalt.effects.view import View
 
 EXACT = 1e-13
@@ -48,18 +47,18 @@ class TargetEcho:
     @cached_property
     def strengths(self) -> np.ndarray:
         """Largest sum of amplitudes (N, P) that each part can have in a range cell before the receiver."""
-        back = _amplitude(self._paths)
-        out = _amplitude([path.sender or path for path in self._paths])
+        back = _amplitude(self.paths)
+        out = _amplitude([path.sender or path for path in self.paths])
         return need.part_amplitudes(self.view) * (out * back) * float(np.max(self.routes))
 
     @cached_property
     def routes(self) -> np.ndarray | float:
         """Factor on the points' amplitudes: `factor`, or that of each route where the scene tells them apart."""
         told = providing(self.channel, WeighsRoutes)
-        if not told or not self._paths:
+        if not told or not self.paths:
             return self.factor
         weighing = providing(self.channel, WeighsPoints)
-        return told[0].module.routes(told[0].settings, self.view, self._paths, weighing, self._visible)
+        return told[0].module.routes(told[0].settings, self.view, self.paths, weighing, self._visible)
 
     @cached_property
     def direct(self) -> np.ndarray:
@@ -93,7 +92,7 @@ class TargetEcho:
 
     def subcarriers(self, view: View, on: frozenset[str], factor: np.ndarray | float) -> np.ndarray:
         """Return the subcarriers (N, M) with the physics `on`, summed over all paths."""
-        paths = self._paths if view is self.view else self._paths_of(view)
+        paths = self.paths if view is self.view else self.paths_of(view)
         if view is self.view and factor is self.factor and not paths and not on & {"squint", "wavefront"}:
             return self.direct
         return steering.echo(
@@ -107,59 +106,16 @@ class TargetEcho:
 
         view, factor: the target and its points' factors at these symbols alone.
         """
-        if "symbol_motion" not in on:
-            still = np.zeros(1), np.ones((1, view.network.subcarriers))
-            return self._summed(view, on, factor, rows, still)
-        moving = self.by_need["symbol_motion"].module
-        samples = self._summed(view, on, factor, rows, moving.instants(view, self.error))
-        bent = np.flatnonzero(moving.bent(view))
-        if len(bent):
-            part = view.at(view.times_s[bent])
-            own = factor if np.ndim(factor) == 0 else _every_row(factor, len(samples))[..., bent, :]
-            numbers = np.arange(len(self.view.times_s))[rows][bent]
-            samples[bent] = self._summed(part, on, own, numbers, moving.pieces(part, self.error))
-        return samples
+        still, samples = self.arriving(view, on, factor, rows)
+        return samples + waveform.transmit(still, self.sending.aired[rows])
 
-    def _summed(
-        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows, times: tuple[np.ndarray, np.ndarray]
-    ) -> np.ndarray:
-        """Time samples (N, M) of the target's echo from its response at instants of a symbol.
+    def arriving(
+        self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the echo as a response (N, M) and time samples to add to its own (`arrivals.arriving`)."""
+        return arrivals.arriving(self, view, on, factor, rows)
 
-        times: the instants (Q,) or (Q, N) s and their interpolation weights (Q, M) or (Q, N, M). Points are summed in
-        groups that lose equally many samples.
-        """
-        delays, weights = times
-        groups: list[tuple[int, np.ndarray | float, np.ndarray | slice]] = [(0, factor, slice(None))]
-        if "cyclic_prefix" in on:
-            cut = self.by_need["cyclic_prefix"]
-            first = cut.module.first_samples(cut.settings, view)
-            chosen = [(count, first == count) for count in range(int(first.min()), int(first.max()) + 1)]
-            groups = [(count, factor * mine, _any_of(mine)) for count, mine in chosen if mine.any()]
-            turned = cut.module.turn(cut.settings, view.network, waveform.baseband_hz(view.network))
-        # Visibility and reflection coefficients stay during a symbol; only places move.
-        held = self._paths if view is self.view else self._paths_of(view)
-        samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
-        now, before = self.sending.aired[rows], self.sending.aired_before[rows] if "cyclic_prefix" in on else None
-        kept: dict = {}
-        delays = delays if delays.ndim == 2 else delays[:, None]
-        seen = view.at_each(view.times_s + delays) if "symbol_motion" in on else [view]
-        for later, weight in zip(seen, weights, strict=True):
-            paths = held
-            if held and later is not view:
-                paths = self._moved(later, held)
-            rays = Steered(
-                later, paths, squint="squint" in on, wavefront="wavefront" in on, error=self.error, kept=kept
-            )
-            for count, strength, lit in groups:
-                spectrum = rays.echo(strength)[lit]
-                echo = waveform.transmit(spectrum, now[lit])
-                if count:
-                    echo[:, :count] = waveform.transmit(spectrum * turned, before[lit])[:, :count]
-                echo *= weight[lit] if weight.ndim == 2 else weight
-                samples[lit] += echo
-        return samples
-
-    def _paths_of(self, view: View) -> list[ImagePath]:
+    def paths_of(self, view: View) -> list[ImagePath]:
         """All paths except the direct one, without those that carry nothing in the whole look."""
         return [path for path, lit in zip(self._every_path(view), self._lit, strict=True) if lit]
 
@@ -171,7 +127,7 @@ class TargetEcho:
         ]
         return ends[0] if len(ends) == 1 else _paired(*ends)
 
-    def _moved(self, view: View, held: list[ImagePath]) -> list[ImagePath]:
+    def moved(self, view: View, held: list[ImagePath]) -> list[ImagePath]:
         """The paths `held`, with the images at the instants of `view`."""
         senders = [path.sender or path for path in held]
         ends = [
@@ -201,7 +157,7 @@ class TargetEcho:
         return [any(np.any(one.coefficient) for one in (path, path.sender) if one is not None) for path in self._whole]
 
     @cached_property
-    def _paths(self) -> list[ImagePath]:
+    def paths(self) -> list[ImagePath]:
         """The paths over the whole look that carry anything, except the direct one."""
         return [path for path, lit in zip(self._whole, self._lit, strict=True) if lit]
 
@@ -223,14 +179,3 @@ def _paired(out: list[ImagePath], back: list[ImagePath]) -> list[ImagePath]:
 def _amplitude(paths: list[ImagePath]) -> float:
     """Largest sum of the amplitudes of one way over the direct path and all others."""
     return 1.0 + sum(float(np.max(abs(path.coefficient))) for path in paths)
-
-
-def _every_row(factor: np.ndarray, count: int) -> np.ndarray:
-    """A factor (N or 1, L) or (R, N or 1, L) with a row for each of `count` symbols."""
-    return np.broadcast_to(factor, (*factor.shape[:-2], count, factor.shape[-1]))
-
-
-def _any_of(chosen: np.ndarray) -> np.ndarray | slice:
-    """Return the symbols (K,) in which any point (N, L) is chosen, as a slice where these are all."""
-    found = chosen.any(axis=1)
-    return slice(None) if found.all() else np.flatnonzero(found)

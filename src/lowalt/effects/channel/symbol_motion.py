@@ -42,7 +42,7 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     The rest of the phase, up to half the band away, enters by its power series, which gives expm1.
     """
     network, radio = view.network, radar(view.network, view.station)
-    path = Speeds(view).travel_m(duration_s(view))
+    path = _speeds(view).travel_m(duration_s(view))
     spherical = "wavefront" in others
     near = np.maximum(view.nearest_m() - path - (farthest_m(network) if spherical else 0.0), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -52,6 +52,13 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
         stretch = (1.0 + path / near) ** 2 - 1.0
         louder = (1.0 + farthest_m(network) / near) ** 2 if spherical else 1.0
         return np.nan_to_num(louder * ((1.0 + stretch) * (phase + edge) + stretch), nan=np.inf)
+
+
+def _speeds(view: View) -> Speeds:
+    """The bounds of the view's motion, which do not depend on its instants and so are kept with it."""
+    if "speeds" not in view.__dict__:
+        view.__dict__["speeds"] = Speeds(view)
+    return view.__dict__["speeds"]
 
 
 def _frames(view: View) -> np.ndarray:
@@ -76,17 +83,17 @@ def pieces(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
     """
     first, last = _frames(view).T
     samples, useful_s = view.network.subcarriers, duration_s(view)
-    count = len(instants(view, error)[0])
-    if 2 * count >= samples or (abs(np.floor(last) - np.floor(first)) > 1).any():
+    points = count(view, error)
+    if 2 * points >= samples or (abs(np.floor(last) - np.floor(first)) > 1).any():
         delays, weights = every_sample(view)
         return delays[:, None], weights[:, None]
     bend = np.maximum(np.floor(first), np.floor(last))
     share = np.clip((bend - first) / (last - first), 1e-9, 1.0 - 1e-9)[:, None]
     at = np.arange(samples) / samples
-    before, nodes = at < share, 0.5 * (interpolation.points(count) + 1.0)
+    before, nodes = at < share, 0.5 * (interpolation.points(points) + 1.0)
     place = np.where(before, at / share, (at - share) / (1.0 - share))
-    weight = interpolation.weights(count, np.clip(2.0 * place - 1.0, -1.0, 1.0).ravel())
-    weight = weight.reshape(*place.shape, count).transpose(2, 0, 1)
+    weight = interpolation.weights(points, np.clip(2.0 * place - 1.0, -1.0, 1.0).ravel())
+    weight = weight.reshape(*place.shape, points).transpose(2, 0, 1)
     delays = np.concatenate([share * nodes, share + (1.0 - share) * nodes], axis=1)
     return useful_s * delays.T, np.concatenate([weight * before, weight * ~before])
 
@@ -100,29 +107,69 @@ def every_sample(view: View) -> tuple[np.ndarray, np.ndarray]:
 def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
     """Return instants (Q,) s within a symbol and their interpolation weights (Q, M) at its M samples.
 
-    Q Chebyshev points keep every range cell to `error`, relative to the sum of peak amplitudes: the interpolation of a
-    function bounded by B on an ellipse of semi-axes' sum rho errs by at most 4 B rho^(1-Q) / (rho - 1). Where that
-    needs more points than samples, the instants are the samples themselves, which is exact.
+    Q Chebyshev points keep every range cell to `error` (`count`). Where that needs more points than samples, the
+    instants are the samples themselves, which is exact.
+    """
+    samples, points = view.network.subcarriers, count(view, error)
+    if points >= samples:
+        return every_sample(view)
+    return nodes_s(view, points), interpolation.weights(points, places(samples)).T
+
+
+def nodes_s(view: View, points: int) -> np.ndarray:
+    """Return the Chebyshev points (points,) of a symbol (s), from its end to its beginning."""
+    return 0.5 * duration_s(view) * (interpolation.points(points) + 1.0)
+
+
+def places(samples: int) -> np.ndarray:
+    """Return where a symbol's samples stand in it, (samples,), from -1 at its beginning to 1 at its end."""
+    return 2.0 * np.arange(samples) / samples - 1.0
+
+
+def farther_m(view: View) -> float:
+    """Return a bound of how much any point's range differs within a symbol (m), inf next to the station.
+
+    With squint ranges count to an array's middle, which changes by the point's travel over its range times the array's
+    size. Images move as far as their points and are no nearer.
+    """
+    travel = float(_speeds(view).travel_m(duration_s(view)).max())
+    room = float(view.nearest_m().min()) - travel - farthest_m(view.network)
+    return travel * (1.0 + farthest_m(view.network) / room) if room > 0.0 else np.inf
+
+
+def rounding(view: View) -> float:
+    """Return the error of a range cell by the last binary digit of positions, relative to the sum of amplitudes.
+
+    A coordinate is rounded by up to 2^-53 of itself, at each instant by another amount. No number of instants and of
+    orders in time gives a response that is more accurate than its places.
+    """
+    farthest = float(abs(view.middles).max() + view.radii.max())
+    return 2.0**-53 * farthest * 2 * np.pi * radar(view.network, view.station).turns
+
+
+def count(view: View, error: float) -> int:
+    """Return how many Chebyshev points of a symbol keep every range cell to `error`; at most its samples.
+
+    The error is relative to the sum of peak amplitudes: the interpolation of a function bounded by B on an ellipse of
+    semi-axes' sum rho errs by at most 4 B rho^(1-Q) / (rho - 1).
     """
     samples, half = view.network.subcarriers, 0.5 * duration_s(view)
-    speeds, radio = Speeds(view), radar(view.network, view.station)
+    speeds, radio = _speeds(view), radar(view.network, view.station)
     near = view.nearest_m().min(axis=0)
     farthest = farthest_m(view.network)
     wave = 2 * np.pi * (2 * radio.centre_hz + radio.bandwidth_hz) / SPEED_OF_LIGHT
-    travel, count = speeds.travel_m(1.0), samples
-    for rho in ELLIPSES:
-        wide, high = 0.5 * (rho + 1.0 / rho), 0.5 * (rho - 1.0 / rho)
-        beyond = speeds.imaginary_m(high * half)
-        # Real times reach a half-symbol times `wide` from its middle; positions also swell by the imaginary turn.
-        moved = travel * (1.0 + wide) * half + 2.0 * beyond + farthest
-        if not (near > 4.0 * moved).all():
-            break
-        # |Im d| is below a third of |Re d|, so |Im r| <= 1.07 |Im d|; elements add their distance over the range.
-        growth = wave * 1.07 * beyond * (1.0 + 2.5 * farthest / (near - moved))
-        largest = float((growth - 2.0 * np.log1p(-moved / near)).max())
-        need = 1.0 + (np.log(4.0 * np.sqrt(samples) / (error * (rho - 1.0))) + largest) / np.log(rho)
-        count = min(count, max(int(np.ceil(need)), 1))
-    if count >= samples:
-        return every_sample(view)
-    weights = interpolation.weights(count, 2.0 * np.arange(samples) / samples - 1.0)
-    return half * (interpolation.points(count) + 1.0), weights.T
+    travel, rho = speeds.travel_m(1.0), ELLIPSES[:, None]
+    wide, high = 0.5 * (rho + 1.0 / rho), 0.5 * (rho - 1.0 / rho)
+    beyond = speeds.imaginary_m(high[:, 0] * half)
+    # Real times reach a half-symbol times `wide` from its middle; positions also swell by the imaginary turn.
+    moved = travel * (1.0 + wide) * half + 2.0 * beyond + farthest
+    holds = (near > 4.0 * moved).all(axis=1)
+    if not holds[0]:
+        return samples
+    holds = np.logical_and.accumulate(holds)
+    rho, moved, beyond = rho[holds, 0], moved[holds], beyond[holds]
+    # |Im d| is below a third of |Re d|, so |Im r| <= 1.07 |Im d|; elements add their distance over the range.
+    growth = wave * 1.07 * beyond * (1.0 + 2.5 * farthest / (near - moved))
+    largest = (growth - 2.0 * np.log1p(-moved / near)).max(axis=1)
+    need = 1.0 + (np.log(4.0 * np.sqrt(samples) / (error * (rho - 1.0))) + largest) / np.log(rho)
+    return min(samples, max(int(np.ceil(need.min())), 1))

@@ -1,0 +1,175 @@
+"""A target's echo with all that leaks between subcarriers: motion inside a symbol, and echoes beyond the cyclic prefix.
+
+Within a symbol the response is a series in time of few orders (`time_series`). Its order zero leaks nowhere and stays a
+response; every further order costs one transform to time samples. Points that lose equally many samples to the prefix
+form a group, which costs one more transform an order, for the samples in which the previous symbol stands in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lowalt.effects import time_series, waveform
+from lowalt.effects.steering import SameSymbols, Steered
+from lowalt.effects.view import View
+
+if TYPE_CHECKING:
+    from lowalt.effects.target_echo import TargetEcho
+
+
+def arriving(
+    echo: TargetEcho, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the echo of the symbols `rows` as a response (N, M) and the time samples (N, M) to add to its own.
+
+    view, factor, on: as in `samples`. The response has no leakage between subcarriers; the samples have all of it.
+    """
+    if "symbol_motion" not in on:
+        return _in_orders(echo, view, on, factor, rows)
+    moving = echo.by_need["symbol_motion"].module
+    # Half of the error is for the instants, the other half for the orders that are left out.
+    allowed = 0.5 * max(echo.error, moving.rounding(view))
+    count = moving.count(view, allowed)
+    if count < view.network.subcarriers and np.isfinite(moving.farther_m(view)):
+        still, samples = _in_orders(echo, view, on, factor, rows, count, allowed)
+    else:
+        still = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
+        samples = _at_instants(echo, view, on, factor, rows, moving.instants(view, echo.error))
+    bent = np.flatnonzero(moving.bent(view))
+    if len(bent):
+        part = view.at(view.times_s[bent])
+        own = factor if np.ndim(factor) == 0 else _every_row(factor, len(samples))[..., bent, :]
+        numbers = np.arange(len(echo.view.times_s))[rows][bent]
+        samples[bent] = _at_instants(echo, part, on, own, numbers, moving.pieces(part, echo.error))
+        still[bent] = 0.0
+    return still, samples
+
+
+def _in_orders(
+    echo: TargetEcho,
+    view: View,
+    on: frozenset[str],
+    factor: np.ndarray | float,
+    rows,
+    count: int = 1,
+    allowed: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The result of `arriving` from series in time of `count` orders, or of fewer that err by at most `allowed`.
+
+    allowed: relative to the largest sum of amplitudes.
+    """
+    groups, turned = _groups(echo, view, on, factor)
+    times, farther = view.times_s[None], 0.0
+    if "symbol_motion" in on:
+        moving = echo.by_need["symbol_motion"].module
+        times, farther = view.times_s + moving.nodes_s(view, count)[:, None], moving.farther_m(view)
+    found: list[list[time_series.Moments]] = [[] for _ in groups]
+    first = None
+    for rays in _rays(echo, view, on, times, farther):
+        first = first or rays
+        for mine, (_, strength, _) in zip(found, groups, strict=True):
+            mine.append(rays.moments(strength))
+    series = [time_series.orders(mine) for mine in found]
+    samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
+    now = echo.sending.aired[rows] if turned is not None or count > 1 else None
+    other = None if turned is None else turned * echo.sending.aired_before[rows] - now
+    orders = 1
+    if count > 1:
+        share = allowed if turned is None else 0.5 * allowed
+        orders = time_series.kept(series, first, share * float(echo.strengths.sum(axis=1).max()))
+    shapes = time_series.polynomials(orders, 2.0 * np.arange(samples.shape[1]) / samples.shape[1] - 1.0)
+    for order, shape in enumerate(shapes):
+        spectra = [first.spectrum(mine[order]) for mine in series]
+        whole = sum(spectra[1:], spectra[0])
+        if order == 0:
+            still = whole
+        else:
+            samples += shape * waveform.transmit(whole, now)
+        for (cut, _, lit), spectrum in zip(groups, spectra, strict=True):
+            if cut:
+                samples[lit, :cut] += shape[:cut] * waveform.transmit(spectrum[lit], other[lit])[:, :cut]
+    return still, samples
+
+
+def _groups(
+    echo: TargetEcho, view: View, on: frozenset[str], factor: np.ndarray | float
+) -> tuple[list[tuple[int, np.ndarray | float, np.ndarray | slice]], np.ndarray | None]:
+    """Points in groups that lose equally many samples to the prefix, and the previous symbol's phase factor (M,).
+
+    A group: the samples that carry the previous symbol, the points' factors, the symbols in which it has points.
+    """
+    if "cyclic_prefix" not in on:
+        return [(0, factor, slice(None))], None
+    cut = echo.by_need["cyclic_prefix"]
+    first = cut.module.first_samples(cut.settings, view)
+    chosen = [(count, first == count) for count in range(int(first.min()), int(first.max()) + 1)]
+    groups = [(count, factor * mine, _any_of(mine)) for count, mine in chosen if mine.any()]
+    return groups, cut.module.turn(cut.settings, view.network, waveform.baseband_hz(view.network))
+
+
+def _rays(
+    echo: TargetEcho, view: View, on: frozenset[str], times: np.ndarray, farther_m: float | None = None
+) -> Iterator[Steered]:
+    """Yield the one-way factors at each row of times (Q, N) s, which differ by less than a symbol.
+
+    farther_m: bound of how much ranges differ between the rows (m), by which all rows get moments of the same
+    functions; None for rows that are on their own. Visibility and reflection coefficients stay during a symbol;
+    only places move.
+    """
+    held = echo.paths if view is echo.view else echo.paths_of(view)
+    kept: dict = {}
+    asked = {"squint": "squint" in on, "wavefront": "wavefront" in on, "error": echo.error, "kept": kept}
+    first, span = None, None
+    if farther_m is not None:
+        span = SameSymbols(view.beam_rows() if view.turning else [], farther_m)
+    for later in view.at_each(times) if "symbol_motion" in on else [view]:
+        paths = held
+        if held and later is not view:
+            paths = echo.moved(later, held)
+        rays = Steered(later, paths, **asked, like=first, span=span)
+        if span is not None:
+            first = first or rays
+        yield rays
+
+
+def _at_instants(
+    echo: TargetEcho,
+    view: View,
+    on: frozenset[str],
+    factor: np.ndarray | float,
+    rows,
+    times: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Time samples (N, M) of the target's echo from its response at instants of a symbol.
+
+    times: the instants (Q,) or (Q, N) s and their interpolation weights (Q, M) or (Q, N, M). Points are summed in
+    groups that lose equally many samples.
+    """
+    delays, weights = times
+    groups, turned = _groups(echo, view, on, factor)
+    samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
+    now, before = echo.sending.aired[rows], echo.sending.aired_before[rows] if turned is not None else None
+    delays = delays if delays.ndim == 2 else delays[:, None]
+    for rays, weight in zip(_rays(echo, view, on, view.times_s + delays), weights, strict=True):
+        for count, strength, lit in groups:
+            spectrum = rays.echo(strength)[lit]
+            heard = waveform.transmit(spectrum, now[lit])
+            if count:
+                heard[:, :count] = waveform.transmit(spectrum * turned, before[lit])[:, :count]
+            heard *= weight[lit] if weight.ndim == 2 else weight
+            samples[lit] += heard
+    return samples
+
+
+def _every_row(factor: np.ndarray, count: int) -> np.ndarray:
+    """A factor (N or 1, L) or (R, N or 1, L) with a row for each of `count` symbols."""
+    return np.broadcast_to(factor, (*factor.shape[:-2], count, factor.shape[-1]))
+
+
+def _any_of(chosen: np.ndarray) -> np.ndarray | slice:
+    """Return the symbols (K,) in which any point (N, L) is chosen, as a slice where these are all."""
+    found = chosen.any(axis=1)
+    return slice(None) if found.all() else np.flatnonzero(found)

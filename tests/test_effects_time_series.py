@@ -1,0 +1,79 @@
+"""A symbol's response as a series in time: its orders, those left out, and the loop from moments to subcarriers."""
+
+import numpy as np
+import pytest
+
+from lowalt.effects import arrivals, moment_loops, time_series
+from lowalt.effects import response_tables as tables
+from lowalt.effects.catalogue import called
+from lowalt.effects.chain import Chain
+from lowalt.effects.channel import symbol_motion
+from lowalt.effects.received import Scene, observe
+from test_effects_bounds import network, target
+
+
+@pytest.mark.parametrize("count", [1, 2, 63, 64])
+def test_moments_become_subcarriers_as_in_the_plain_sum(count):
+    rng = np.random.default_rng(count)
+    table = tables.table(0.7, count, 1e-14)
+    planes, own = rng.normal(size=(3, 2, len(table))), np.exp(1j * rng.normal(size=3))
+    whole, cells = np.array([0, 7, 1000]), rng.normal(size=3)
+    found = np.full((3, count), 1.0 + 0j)
+    moment_loops.spread(planes, table, own, whole, cells, found)
+    off = np.arange(count) - 0.5 * (count - 1)
+    delay = np.exp(-2j * np.pi * (whole + cells)[:, None] * off / count)
+    truth = own[:, None] * ((planes[:, 0] + 1j * planes[:, 1]) @ table) * delay
+    assert abs(found - 1.0 - truth).max() < 1e-11
+
+
+def test_orders_are_those_of_the_polynomial_through_the_instants():
+    rng = np.random.default_rng(2)
+    terms, at = rng.normal(size=(4, 5, 2, 3)), np.linspace(-1.0, 1.0, 7)
+    nodes = np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+    values = np.tensordot(time_series.polynomials(4, nodes).T, terms, 1)
+    found = time_series.orders([[[value]] for value in values])
+    assert np.stack([order[0][0] for order in found]) == pytest.approx(terms)
+    assert time_series.polynomials(4, at)[3] == pytest.approx(4 * at**3 - 3 * at)
+
+
+def moving(tolerance: float | None, prefix: bool):
+    """The chain of a rotor that turns by a quarter of a radian in a symbol, and what is asked of it."""
+    radio = network(subcarrier_spacing_hz=15e3, subcarriers=64)
+    cloud, row = target([[0.1, 0, 0], [-0.1, 0.02, 0], [0, 0.1, 0.05]], rotor=True, x_m=120.0, rate_hz=600.0)
+    names = ("symbol_motion", "cyclic_prefix") if prefix else ("symbol_motion",)
+    settings = {"symbol_motion": {}, "cyclic_prefix": {"prefix_s": 3e-7}}
+    scene = Scene(radio, 3, tolerance, tuple(called({name: settings[name] for name in names})))
+    view = observe(scene, radio.stations[0], cloud, row)
+    return Chain(list(scene.effects), view, lambda name: scene.stream(name, row, "A"), 1.0), frozenset(names)
+
+
+@pytest.mark.parametrize("prefix", [False, True])
+@pytest.mark.parametrize("error", [1e-3, 1e-6, 1e-9])
+def test_orders_left_out_change_no_cell_by_more_than_is_allowed(error, prefix, monkeypatch):
+    chain, on = moving(None, prefix)
+    truth, kept, all_of_them = chain.cells(on), [], time_series.kept
+    monkeypatch.setattr(time_series, "kept", lambda *given: (kept.append(all_of_them(*given)), kept[-1])[1])
+    chain.error = error
+    change = abs(chain.cells(on) - truth).max() / chain.peaks.sum(axis=1).max()
+    assert change <= error and kept[0] < symbol_motion.count(chain.view, 1e-13)
+    # The order after the last one matters.
+    monkeypatch.setattr(time_series, "kept", lambda *given: kept[0] - 1)
+    assert abs(chain.cells(on) - truth).max() / chain.peaks.sum(axis=1).max() > 1e-3 * error
+
+
+def test_series_and_instants_one_by_one_agree():
+    chain, on = moving(None, True)
+    view, given = chain.view, (chain.target, chain.view, on, 1.0, slice(None))
+    still, samples = arrivals.arriving(*given)
+    whole = arrivals.waveform.transmit(still, chain.sending.aired) + samples
+    by_sample = arrivals._at_instants(*given, symbol_motion.every_sample(view))
+    assert abs(whole - by_sample).max() < 1e-11 * abs(by_sample).max()
+
+
+def test_no_range_differs_within_a_symbol_by_more_than_its_bound():
+    chain, _ = moving(None, False)
+    view = chain.view
+    later = view.at(view.times_s + 0.6 * symbol_motion.duration_s(view))
+    station = np.asarray(view.station.position_m)
+    moved = abs(np.linalg.norm(later.places - station, axis=2) - np.linalg.norm(view.places - station, axis=2)).max()
+    assert 0.05 * symbol_motion.farther_m(view) < moved <= symbol_motion.farther_m(view)
