@@ -9,7 +9,7 @@ import every_effect
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
-from lowalt.effects.channel import cross_sections, cyclic_prefix, direct_path, line_of_sight, occlusion
+from lowalt.effects.channel import cross_sections, cyclic_prefix, direct_path, occlusion
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import response
 from test_effects_links import A, B, link, linked
@@ -28,7 +28,7 @@ def seen(station, radio=None, size_m=0.5):
 @pytest.mark.parametrize(
     ("module", "settings"),
     [(occlusion, {"blades": "opaque"}), (occlusion, {"strength": 0.6}), (cross_sections, {}),
-     (cross_sections, {"blades": "diffuse", "power": 2.0}), (line_of_sight, {"environment": "UMi"})],
+     (cross_sections, {"blades": "diffuse", "power": 2.0})],
 )  # fmt: skip
 def test_a_link_back_to_its_own_place_weighs_points_as_the_station(module, settings):
     settings = module.DEFAULTS | settings
@@ -39,7 +39,11 @@ def test_a_link_back_to_its_own_place_weighs_points_as_the_station(module, setti
         assert own == pytest.approx(back, rel=1e-12, abs=1e-14)
 
 
-@pytest.mark.parametrize("effects", [{"occlusion": {}, "cross_sections": {}}, {"cyclic_prefix": {"prefix_s": 2e-7}}])
+@pytest.mark.parametrize(
+    "effects",
+    [{"occlusion": {}, "cross_sections": {}}, {"cyclic_prefix": {"prefix_s": 2e-7}},
+     {"line_of_sight": {"environment": "UMi", "blocked_db": 9.0}}],
+)  # fmt: skip
 def test_a_link_back_to_its_own_place_hears_the_stations_own_echo(effects):
     radio, view = linked(symbols=6, subcarriers=32), seen(A)
     station, scene = replace(link(A, A), name="A"), Scene(radio, 5, None, tuple(called(effects)))
@@ -87,18 +91,24 @@ def test_a_facet_is_the_physical_optics_of_a_disc_between_both_ends():
     assert lit > 5 and (found[(cosines[0] <= 0) | (cosines[1] <= 0)] == 0).all()
 
 
-def test_both_ways_of_a_link_are_blocked_by_themselves():
-    settings = line_of_sight.DEFAULTS | {"environment": "UMi", "blocked_db": 10.0}
-    far = replace(B, position_m=(400.0, 100.0, 15.0))
-    view = seen(link(A, far))
-    chances = [line_of_sight.probability("UMi", np.hypot(60 - end.position_m[0], 25 - end.position_m[1]), 30.0)
-               for end in (A, far)]  # fmt: skip
-    rng = np.random.default_rng(1)
-    found = np.array([line_of_sight.visible(settings, view, rng)[0, 0] for _ in range(4000)])
-    shares = {round(20 * np.log10(value)): np.mean(found == value) for value in np.unique(found)}
-    assert set(shares) <= {0, -10, -20} and 0.1 < chances[1] < 0.9
-    assert shares[0] == pytest.approx(chances[0] * chances[1], abs=0.03)
-    assert shares.get(-20, 0.0) == pytest.approx((1 - chances[0]) * (1 - chances[1]), abs=0.03)
+def test_a_building_hides_a_target_from_a_station_and_from_its_way_of_every_link():
+    far = replace(B, position_m=(400.0, 100.0, 15.0), frequency_hz=A.frequency_hz)
+    radio = replace(linked(symbols=6, subcarriers=32, transmit=(2, 1), receive=(2, 1)), stations=(A, far))
+    own = seen(A, radio)
+    shut = called({"line_of_sight": {"environment": "UMi", "blocked_db": 10.0}})
+    found = []
+    for model in range(12):
+        row, echoes = own.row | {"model": model}, []
+        for end in (A, far, link(A, far), link(far, A)):
+            clear, seen_now = (
+                abs(received_signal(Scene(radio, 5, None, tuple(some)), end, own.cloud, row).signal[0])
+                for some in ((), shut)
+            )
+            echoes.append(round(20 * np.log10(seen_now / clear)))
+        found.append(echoes)
+    one, two, out, back = np.array(found).T
+    assert (out == (one + two) // 2).all() and (back == out).all()
+    assert set(two) == {0, -20} and {0, -10} <= set(out)
 
 
 def test_a_links_echo_and_its_direct_path_are_cut_at_their_own_delays():

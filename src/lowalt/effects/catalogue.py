@@ -84,6 +84,8 @@ LOOK_WIDE = ("link_offset",)
 """Effects past the motion whose draws are the same for all stations of a look."""
 PAIR_WIDE = ("fluctuation",)
 """Effects whose draws are the same for both directions of a link."""
+BY_END = ("line_of_sight",)
+"""Effects that act on each way of a link as the station at its end draws them for its own look."""
 
 
 class NamedEffect(NamedTuple):

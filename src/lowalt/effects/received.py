@@ -171,11 +171,13 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
     return result
 
 
-def _drawn(scene: Scene, row: dict, station: Station, name: str) -> np.random.Generator:
+def _drawn(scene: Scene, row: dict, station: Station, name: str, end: Station | None = None) -> np.random.Generator:
     """Return an effect's stream: one for all stations if its draws belong to the whole look, else one a station.
 
-    Both directions of a link share the stream of an effect whose draws belong to the pair.
+    Both directions of a link share the stream of an effect whose draws belong to the pair. end: the station whose
+    stream is asked for, None for `station`.
     """
+    station = end or station
     if name in LOOK_WIDE:
         return scene.stream(name, row)
     if name in PAIR_WIDE and station.transmitter is not None:

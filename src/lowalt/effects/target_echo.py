@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from lowalt.effects import arrivals, need, steering, waveform
-from lowalt.effects.catalogue import NamedEffect, providing
+from lowalt.effects.catalogue import BY_END, NamedEffect, providing
 from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
 from lowalt.effects.response import ImagePath
 from lowalt.effects.sending import Sending
@@ -24,7 +24,7 @@ class TargetEcho:
     """
 
     def __init__(
-        self, channel: list[NamedEffect], view: View, draws: Callable[[str], np.random.Generator], sending: Sending
+        self, channel: list[NamedEffect], view: View, draws: Callable[..., np.random.Generator], sending: Sending
     ):
         self.channel, self.view, self.draws, self.sending = channel, view, draws, sending
         self.error = EXACT
@@ -165,7 +165,13 @@ class TargetEcho:
         """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time."""
         if view is self.view and effect.name in self._seen:
             return self._seen[effect.name]
-        found = effect.module.visible(effect.settings, view, self.draws(effect.name))
+        if view.station.transmitter is not None and effect.name in BY_END:
+            out, back = (
+                effect.module.visible(effect.settings, end, self.draws(effect.name, end.station)) for end in view.ends()
+            )
+            found = np.sqrt(out * back)
+        else:
+            found = effect.module.visible(effect.settings, view, self.draws(effect.name))
         if view is self.view:
             self._seen[effect.name] = found
         return found

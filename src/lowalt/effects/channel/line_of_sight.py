@@ -1,8 +1,8 @@
 """Blocked line of sight: buildings hide a target from a station with the probability of a 3GPP environment.
 
 One draw a sample and station decides for the whole look. A blocked echo loses `blocked_db` on the way out and again on
-the way back. On a link each way is drawn by itself, and not as the stations at its ends draw theirs. Set SNRs refer to
-the echo as it arrives: against noise at a set SNR a blocked echo is as strong as any.
+the way back. What hides a target from a station's own look hides it on that station's way of every link. Set SNRs refer
+to the echo as it arrives: against noise at a set SNR a blocked echo is as strong as any.
 """
 
 import math
@@ -66,15 +66,9 @@ def _falling(flat_m: float, near_m: float, decay_m: float) -> float:
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
-    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 20) for each way that is blocked.
-
-    One draw for a station, whose ways are blocked together, and one for each end of a link.
-    """
+    """Return the factor (N, 1) on all amplitudes: 1, or 10^(-`blocked_db` / 10) for two blocked ways; one draw."""
     x, y, height = (view.row[f"{axis}_m"] for axis in "xyz")
-    blocked, places = 0, [end.station.position_m for end in view.ends()]
-    # Two ends at one place are one way.
-    for place in dict.fromkeys(places):
-        flat = math.hypot(x - place[0], y - place[1])
-        hidden = float(rng.random()) >= probability(settings["environment"], flat, height)
-        blocked += hidden * (2 // len(set(places)))
-    return np.full((len(view.times_s), 1), 10 ** (-blocked * settings["blocked_db"] / 20) if blocked else 1.0)
+    place = view.station.position_m
+    flat = math.hypot(x - place[0], y - place[1])
+    blocked = float(rng.random()) >= probability(settings["environment"], flat, height)
+    return np.full((len(view.times_s), 1), 10 ** (-2 * settings["blocked_db"] / 20) if blocked else 1.0)
