@@ -103,6 +103,19 @@ def test_a_link_is_the_same_in_both_directions(effects):
     assert abs(one - received({}, radio, link(A, THERE))).max() > 1e-4 * abs(one).max()
 
 
+def test_effects_that_are_idle_change_no_bit_of_a_link():
+    radio, own = linked(symbols=6, subcarriers=32), seen(A)
+    off = {
+        "ground_reflection": {"permittivity": 1.0, "conductivity_s_m": 0.0}, "walls": {"facades": []},
+        "pointing_error": {"sigma_deg": 0.0}, "fluctuation": {"pattern": False, "spread_db": 0.0},
+        "clutter": {"gamma": 0.0}, "line_of_sight": {"blocked_db": 0.0}, "reflected_aspect": {"follow": []},
+    }  # fmt: skip
+    bare, idle = (
+        received_signal(scene(effects, radio), radio.station("A-B"), own.cloud, own.row).signal for effects in ({}, off)
+    )
+    assert (bare == idle).all()
+
+
 def test_each_end_of_a_link_points_as_its_station_does():
     radio = linked(symbols=4, transmit=(8, 1), receive=(4, 2))
     own, asked = seen(A, radio), scene({"pointing_error": {"sigma_deg": 1.5}}, radio)
