@@ -230,7 +230,9 @@ def test_another_workflow_in_another_folder_uses_this_one_as_a_module(finished, 
 
 
 def test_the_catalogue_s_snakefile_plans_the_same_run(finished):
-    """Of a finished data set nothing is left to do, whichever of the two files is read."""
+    """Of a finished data set nothing is left to do, whichever of the two files is read; the default is all there is."""
+    words = (ROOT / "workflow/Snakefile").read_text().split("rule default:")[1].split()
+    assert words == ["default_target:", "True", "input:", "rules.all.input,"]
     text = snakemake(finished, "--dry-run", "--snakefile", "workflow/Snakefile", "--", "data")
     assert "Nothing to be done" in text and not re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE)
 
