@@ -1,5 +1,6 @@
 """Noise: the SNR that was set is the SNR that is there, and every stream is its own."""
 
+import json
 import math
 
 import numpy as np
@@ -8,9 +9,11 @@ import pytest
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
 from lowalt.common.normals import circular
+from lowalt.motion import write_table
 from lowalt.noise import add_noise
-from lowalt.noise.__main__ import load_echoes, load_powers
+from lowalt.noise.__main__ import load_echoes, load_powers, main
 from lowalt.noise.chunk import noisy_signals
+from moving_clouds import row
 
 
 def measured_snr_db(snr_db: float, scale: float = 1.0) -> float:
@@ -131,3 +134,23 @@ def test_an_echo_file_that_was_cut_is_named(tmp_path):
             with pytest.raises(InputError, match=r"A\.npy: not a whole (echo|power) file"):
                 load([str(path)], ["A"], 2)
         np.save(path, np.ones((2, 40), complex))
+
+
+def test_the_command_adds_noise_at_every_snr_and_says_how_many_samples(tmp_path, capsys):
+    write_table(tmp_path / "m.csv", [row(model=0), row(model=1), row(model=2)])
+    echo = np.ones((3, 40), np.complex64)
+    np.save(tmp_path / "A.npy", echo)
+    settings = json.dumps({"seed": 1, "stations": ["A"], "snr_db": [3, "inf"]})
+    main(["--settings", settings, "--motion", str(tmp_path / "m.csv"), "--echoes", str(tmp_path / "A.npy"),
+          "--out", str(tmp_path / "noisy.npy")])  # fmt: skip
+    noisy = np.load(tmp_path / "noisy.npy")
+    assert noisy.shape == (3, 2, 1, 40) and (noisy[:, 1, 0] == echo).all() and (noisy[:, 0, 0] != echo).all()
+    assert capsys.readouterr().err.strip().endswith("noisy.npy: 6 samples")
+
+
+@pytest.mark.parametrize("option", ["--settings", "--motion", "--echoes", "--out"])
+def test_the_command_asks_for_what_it_cannot_do_without(option, capsys):
+    given = {"--settings": "{}", "--motion": "m.csv", "--echoes": "A.npy", "--out": "noisy.npy"}
+    with pytest.raises(SystemExit):
+        main([word for name, value in given.items() if name != option for word in (name, value)])
+    assert f"required: {option}" in capsys.readouterr().err
