@@ -62,3 +62,30 @@ def test_data_are_the_numbers_that_numpy_draws(shape):
     numpys = np.random.Generator(np.random.PCG64(4)).integers(0, 4, shape, dtype=np.uint8)
     np.testing.assert_array_equal(waveform.sent(np.random.Generator(np.random.PCG64(4)), *shape), waveform.QPSK[numpys])
     assert waveform.sent(stream(4, "waveform"), *shape).shape == shape
+
+
+def test_a_receiver_that_takes_tones_makes_the_same_samples():
+    from effects_frames import frame
+    from lowalt.effects.receiver import clock_offset
+
+    look, settings = frame(network(subcarriers=32, symbols=9)), {**clock_offset.DEFAULTS, "fixed_ppm": 3.0}
+    samples = np.random.default_rng(5).normal(size=(9, 32)) + 0j
+    found = clock_offset.retimed(settings, np.fft.fft(samples, axis=1), look, np.random.default_rng(6))
+    np.testing.assert_array_equal(found, clock_offset.receive(settings, samples, look, np.random.default_rng(6)))
+
+
+def test_halves_that_a_shuffle_does_not_need_are_drawn_again():
+    one, other = stream(7, "shuffle"), stream(7, "shuffle")
+    for count in (2, 3, 20, 31, 33, 100, 7):
+        np.testing.assert_array_equal(one.permutation(count), slowly_shuffled(other, count))
+        assert one.integers(0, 1000) == other.integers(0, 1000)
+
+
+def slowly_shuffled(draws, count):
+    order = np.arange(count)
+    for place in range(count - 1, 0, -1):
+        partner = place + 1
+        while partner > place:
+            partner = int(draws._halves(1)[0]) & ((1 << place.bit_length()) - 1)
+        order[[place, partner]] = order[[partner, place]]
+    return order

@@ -16,6 +16,8 @@ Sources: Lemire 2019, ACM TOMACS 29(1); Box and Muller 1958; NumPy NEP 19.
 """
 
 import math
+import sys
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,9 +25,11 @@ from lowalt.common.errors import InputError
 from lowalt.common.portable import log, sine_cosine_turns
 
 Size = int | tuple[int, ...] | None
+PERIOD = 1 << 128
+"""Words after which PCG64 repeats itself."""
 _HALF = np.uint64(0xFFFFFFFF)
 COMPILED = 4096
-"""From this many normal numbers on, compiled code makes them: the same bits in a tenth of the time."""
+"""From this many normal numbers on, and once it is loaded, compiled code makes them: the same bits in less time."""
 
 
 def _count(size: Size) -> int:
@@ -36,6 +40,12 @@ def _count(size: Size) -> int:
 def _shaped(values: np.ndarray, size: Size):
     """The one value as a number, or all in the shape asked for."""
     return values[0].item() if size is None else values.reshape(size)
+
+
+@lru_cache(maxsize=256)
+def _masks(count: int) -> list[int]:
+    """The lowest bits, as many as each place below `count` has."""
+    return [(1 << place.bit_length()) - 1 for place in range(count)]
 
 
 class Draws(np.random.Generator):
@@ -57,8 +67,10 @@ class Draws(np.random.Generator):
         """The next `count` 32-bit halves, as (count,) uint64; an upper half left over waits for the next call."""
         kept = [] if self._kept is None else [self._kept]
         fresh = self.words((count - len(kept) + 1) // 2)
-        pairs = np.stack([fresh & _HALF, fresh >> np.uint64(32)], axis=1).ravel()
-        halves = np.concatenate([np.array(kept, np.uint64), pairs])
+        # Seen as 32-bit numbers, the lower half of a word stands first.
+        halves = fresh.astype("<u8", copy=False).view("<u4").astype(np.uint64)
+        if kept:
+            halves = np.append(np.array(kept, np.uint64), halves)
         self._kept = int(halves[count]) if len(halves) > count else None
         return halves[:count]
 
@@ -110,14 +122,31 @@ class Draws(np.random.Generator):
     def _shuffled(self, count: int, first: int) -> np.ndarray:
         """Return 0 .. count - 1, each place from the last to `first` swapped with a random place not above it."""
         order, place = list(range(count)), count - 1
+        masks = _masks(count)
+        # Take more halves at a time than most shuffles need, and give back those that are left.
+        ahead = isinstance(self.bit_generator, np.random.PCG64)
         while place >= first:
-            # Each place needs at least one half, so every half that is drawn is used.
-            for half in self._halves(place - first + 1).tolist():
-                partner = half & ((1 << place.bit_length()) - 1)
+            # Each place needs at least one half, so without giving back every half that is drawn is used.
+            halves = iter(self._halves((place - first + 1) * (2 if ahead else 1)).tolist())
+            for half in halves:
+                partner = half & masks[place]
                 if partner <= place:
                     order[place], order[partner] = order[partner], order[place]
                     place -= 1
+                    if place < first:
+                        break
+            self._give_back(list(halves))
         return np.array(order, np.int64)
+
+    def _give_back(self, halves: list[int]) -> None:
+        """Return the last halves drawn, in their order, as if they had never been drawn."""
+        count = len(halves) + (self._kept is not None)
+        if halves and isinstance(self.bit_generator, np.random.PCG64):
+            self.bit_generator.advance(PERIOD - (count + 1) // 2)
+            # Of a word of which only the upper half is given back, this half waits.
+            self._kept = halves[0] if count % 2 else None
+            if count % 2:
+                self.words(1)
 
     def permutation(self, x, axis: int = 0):
         """Return 0 .. x - 1 in random order, int64, or the entries of an array along its first axis."""
@@ -146,7 +175,7 @@ class Draws(np.random.Generator):
         if kwargs:
             raise InputError(f"standard_normal: arguments {sorted(kwargs)}, expected none besides size")
         count = _count(size)
-        if count >= COMPILED:
+        if count >= COMPILED or "lowalt.common.normals" in sys.modules:
             # Import here: most commands draw few numbers, and loading the compiler takes longer than these draws.
             from lowalt.common.normals import interleaved
 

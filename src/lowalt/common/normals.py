@@ -1,6 +1,7 @@
 """Complex normal numbers from raw random words, compiled: the bits of `lowalt.common.draws` in less time.
 
-Only additions, products, divisions, square roots and comparisons of float64 in one written order, never fused.
+Only additions, products, divisions, square roots and comparisons of float64 in one written order, never fused. No
+divisor can be zero, and without a check for it these loops become vector instructions.
 """
 
 import numpy as np
@@ -17,7 +18,7 @@ _STEP = 2.0**-53
 _TURN = 2 * np.pi
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def _minus_log(first, out):
     """out = -ln((upper 53 bits of first + 1) 2^-53)."""
     for i in range(first.size):
@@ -38,7 +39,7 @@ def _minus_log(first, out):
         out[i] = -(k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f))
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def fill(words, scale, out):
     """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64."""
     count = out.shape[1]

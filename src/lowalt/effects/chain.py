@@ -64,6 +64,7 @@ class Chain:
         self.target = TargetEcho(self.channel, view, draws, self.sending)
         self.others: list[TargetEcho] = []
         """Other targets of the beam, each with its own view; everything they ask for is computed."""
+        self._near = False
         self.receiving = Receiving(self.receiver, view, draws, self.sending, power)
 
     @property
@@ -127,7 +128,7 @@ class Chain:
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
-        left = self.receiver
+        left, self._near = self.receiver, False
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             still, samples = self._moving(view, on, factor, rows)
             if not left and not self.sending.distorts and self._unknown is None:
@@ -143,6 +144,9 @@ class Chain:
                 spectrum, left = self.receiving.responded(spectrum)
                 if not left and not self.sending.distorts:
                     return spectrum
+            self._near = spectrum is self.target.__dict__.get("direct")
+            if self._unknown is None:
+                return self.receiving.aired(spectrum, left, rows)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         if self._unknown is not None:
             samples = samples + self._unknown[rows]
@@ -183,17 +187,14 @@ class Chain:
         return outcome if self.timing is None else self._evenly(outcome)
 
     def _close(self, spectrum: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """The strongest cells of responses (N, M) behind the receiver that are close to the target's direct echo.
+        """The strongest cells of responses (N, M) that the receiver has made of the target's direct echo alone.
 
-        None where they are not, or where something stands between these cells and the outcome.
+        None where they hold more, or where something stands between these cells and the outcome.
         """
-        direct = self.target.__dict__.get("direct")
-        if direct is None or self.detection or self.timing is not None or self.sending.pilots is not None:
+        if not self._near or self.detection or self.timing is not None or self.sending.pilots is not None:
             return None
-        if spectrum is direct:
-            cell = self.target.direct_best
-            return self.target.direct_cells[np.arange(len(cell)), cell], cell
-        return strongest(direct, self.target.direct_sizes, self.target.direct_best, spectrum)
+        target = self.target
+        return strongest(target.direct, target.direct_sizes, target.direct_best, spectrum)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""

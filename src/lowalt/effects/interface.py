@@ -2,7 +2,6 @@
 
 An effect is a module, `effects/{place}/{name}.py`. It must offer everything in `Effect` and the functions of exactly
 one protocol that names its place below; those marked optional come in addition. The chain asks by `isinstance`.
-
 N symbols, L points, P parts, M subcarriers. Arrays are complex128 or float64. `settings` holds every key of `DEFAULTS`.
 `rng` is the stream (seed, "effect", name, subtype, model[, station]), so no effect moves another's draws. Types only.
 """
@@ -55,10 +54,7 @@ class Amplifies(Protocol):
     """Optional, not motion or channel: an effect that can make an error of its input larger."""
 
     def amplifies(self, settings: dict) -> float:
-        """Return the largest factor on an error's 2-norm (transmitter, receiver) or sum over symbols; 1 if not offered.
-
-        math.inf where the effect is not continuous.
-        """
+        """Return the largest factor on an error's 2-norm, or sum over symbols; inf if not continuous, 1 if absent."""
 
 
 @runtime_checkable
@@ -146,10 +142,7 @@ class WeighsRoutes(Protocol):
         self, settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
         visible: Callable[[NamedEffect, View], np.ndarray],
     ) -> np.ndarray:  # fmt: skip
-        """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`.
-
-        weighing: the scene's effects that provide `WeighsPoints`; visible: returns the factor of one of them.
-        """
+        """Return the factors (R, N, L) on two-way amplitudes by each path; visible: gives that of one of `weighing`."""
 
 
 @runtime_checkable
@@ -222,16 +215,21 @@ class ChangesSamples(Protocol):
 
 
 @runtime_checkable
+class ChangesTones(Protocol):
+    """Optional, receiver: an effect that begins with a transform of its samples, which may then be given at once."""
+
+    def retimed(self, settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return the samples (N, M) of `receive`, given np.fft.fft of its samples; tones may be overwritten."""
+
+
+@runtime_checkable
 class ChangesResponse(Protocol):
     """Optional, receiver: an effect that can also act on subcarriers before there are samples, in less time."""
 
     def respond(
         self, settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator
     ) -> np.ndarray | None:
-        """Return the response (N, M) whose samples are those that `receive` returns, None where there is none.
-
-        frame: the look with ones instead of its data.
-        """
+        """Return the response (N, M) with the samples of `receive`, None for none; frame: ones instead of its data."""
 
 
 @runtime_checkable

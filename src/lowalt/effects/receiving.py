@@ -7,8 +7,9 @@ from functools import cached_property
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.effects import waveform
 from lowalt.effects.catalogue import NamedEffect, providing, stream_name
-from lowalt.effects.interface import ChangesResponse, Quantises
+from lowalt.effects.interface import ChangesResponse, ChangesTones, Quantises
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
@@ -35,6 +36,15 @@ class Receiving:
                 return spectrum, self.effects[place:]
             spectrum = changed
         return spectrum, []
+
+    def aired(self, spectrum: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> np.ndarray:
+        """Return the responses (N, M) behind the effects `left` of responses (N, M) of the symbols `rows`, as sent."""
+        tones = waveform.tones_of(spectrum, self.sending.aired[rows])
+        if left and providing(left[:1], ChangesTones):
+            draws = self.draws(stream_name(left[0].name))
+            samples = left[0].module.retimed(left[0].settings, tones, self.frame, draws)
+            return self.sampled(samples, left[1:], rows)
+        return self.sampled(np.fft.ifft(tones, axis=1, out=tones), left, rows)
 
     def sampled(self, samples: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> np.ndarray:
         """Return the responses (N, M) of time samples (N, M) of the symbols `rows`, behind the effects `left`."""

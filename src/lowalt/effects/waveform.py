@@ -38,10 +38,16 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
     response's. Source: 3GPP TS 38.211, 5.3.1.
     """
+    tones = tones_of(response, data)
+    return np.fft.ifft(tones, axis=-1, out=tones)
+
+
+def tones_of(response: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the transform (N, M) of the samples of `transmit`."""
     response, data = np.broadcast_arrays(response, data)
     tones = np.empty(data.shape, np.complex128)
     carried(response, data, tones)
-    return np.fft.ifft(tones, axis=-1, out=tones)
+    return tones
 
 
 def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:

@@ -14,10 +14,11 @@ from scipy.special import gamma, gammaincinv
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.common.normals import circular
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.effects.antenna import Element, local_gain
-from lowalt.effects.channel import land_between, patches
+from lowalt.effects.channel import clutter_loops, land_between, patches
 from lowalt.effects.channel.land_between import target_power
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
@@ -196,14 +197,14 @@ def speckle(
     if not np.isfinite(still):
         return np.repeat(kept, count, axis=1)
     shape = _shape(count, step_s, beta, wavelength_m)
-    lines = np.zeros((cells, len(shape)), np.complex128)
+    lines = np.empty((cells, len(shape)), np.complex128)
     # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
     strong = shape > np.sqrt(FAINT)
-    drawn = _normal(rng, cells, int(strong.sum()))
+    words = rng.bit_generator.random_raw(2 * cells * int(strong.sum()))
     if slow is not None:
         shape = land_between.slowed(len(shape), step_s, beta * wavelength_m, slow)
-    drawn *= np.sqrt(1 / (1 + still)) * shape[..., strong]
-    lines[:, strong] = drawn
+    shape = np.ascontiguousarray(np.atleast_2d(np.sqrt(1 / (1 + still)) * shape))
+    clutter_loops.lines(*circular(words, np.sqrt(0.5)), shape, strong, lines)
     moving = np.fft.ifft(lines, axis=1, norm="forward", out=lines)[:, :count]
     moving += np.sqrt(still / (1 + still)) * kept
     return moving
@@ -242,9 +243,7 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     )
     # Land beyond the unambiguous range folds into the cells it shares with nearer land.
     cells = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
-    for first in range(0, len(power), network.subcarriers):
-        some = slice(first, min(first + network.subcarriers, len(power)))
-        cells[:, : some.stop - first] += lit[some] * waves[some].T
+    clutter_loops.folded(lit, waves, cells)
     np.fft.fft(cells, axis=1, out=cells)
     cells *= patches.ramp(network.subcarriers)
     return cells

@@ -5,12 +5,14 @@ Blades are flat facets in physical optics, as large as a point's share of its pa
 is one, so that a target keeps its mean cross section; points without a normal stay isotropic.
 """
 
+import math
 from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import j1
 
+from lowalt.common.jit import LEAN
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects.view import View
@@ -85,9 +87,20 @@ def facet_radius_m(points: np.ndarray) -> float:
 
 def aspect_cosine(view: View) -> np.ndarray:
     """Return the cosine (N, L) between every point's normal and its line of sight, NaN without a normal."""
-    away = np.asarray(view.station.position_m) - view.places
-    length = np.sqrt(np.einsum("nli,nli->nl", away, away))
-    return np.einsum("nli,nli->nl", view.normals, away) / length
+    normals, places = (np.ascontiguousarray(np.swapaxes(one, 1, 2)) for one in (view.normals, view.places))
+    result = np.empty((len(places), places.shape[2]))
+    _cosines(normals, places, np.asarray(view.station.position_m, np.float64), result)
+    return result
+
+
+@LEAN
+def _cosines(normals, places, station, out):
+    """Fill out (N, L) with the cosines between normals and the ways from places to the station, both (N, 3, L)."""
+    for n in range(len(places)):
+        x, y, z, u, v, w = places[n, 0], places[n, 1], places[n, 2], normals[n, 0], normals[n, 1], normals[n, 2]
+        for l in range(np.uint64(out.shape[1])):  # noqa: E741
+            a, b, c = station[0] - x[l], station[1] - y[l], station[2] - z[l]
+            out[n, l] = (u[l] * a + v[l] * b + w[l] * c) / math.sqrt(a * a + b * b + c * c)
 
 
 def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:

@@ -18,6 +18,9 @@ from lowalt.effects.waveform import turned
 SPACING = 90
 """Fewest samples from one symbol to the next; with fewer, the slow part would reach half the sample rate."""
 
+BLOCK = 64
+"""Samples whose fast part is summed together."""
+
 
 class Grid(NamedTuple):
     """Where a spectrum is taken and how phases follow from it; weights hold the windows and the widths (Hz)."""
@@ -172,4 +175,10 @@ def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Ge
     slow = slow_phase(points, at_key, delay_s, rng)
     fast = rng.standard_normal(slow.shape)
     root = _root(points, at_key, delay_s)
-    return slow if root is None else slow + fast @ root.T
+    if root is None:
+        return slow
+    # A lower triangle: a block of samples asks only for the draws up to its end.
+    for first in range(0, len(root), BLOCK):
+        rows = slice(first, min(first + BLOCK, len(root)))
+        slow[:, rows] += fast[:, : rows.stop] @ root[rows, : rows.stop].T
+    return slow

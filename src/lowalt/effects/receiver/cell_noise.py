@@ -11,6 +11,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
+from lowalt.effects.receiver._white import with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -47,7 +48,4 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     if settings["snr_db"] is None:
         return samples
     power = frame.reference * 10 ** (-settings["snr_db"] / 10)
-    noise = rng.standard_normal((*samples.shape, 2)).view(np.complex128)[..., 0]
-    noise *= math.sqrt(power / 2)
-    noise += samples
-    return noise
+    return with_noise(samples, math.sqrt(power / 2), rng)

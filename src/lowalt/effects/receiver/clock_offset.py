@@ -21,7 +21,7 @@ DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
 MOST_SUBCARRIERS = 100_000
 """The largest number of subcarriers the configuration allows."""
 
-ROUNDING = 1e-16
+ROUNDING = 1e-14
 """Largest share of a sample that the series of the stretch leaves out."""
 
 
@@ -72,10 +72,14 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
     station.
     """
+    return retimed(settings, np.fft.fft(samples, axis=1), frame, rng)
+
+
+def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the samples of `receive` from the tones (N, M) of its samples, in the transform's order, as work space."""
     rate = fast(settings, frame, rng)
     early = -rate / (1 + rate)
-    count, baseband = samples.shape[1], np.fft.ifftshift(frame.baseband_hz)
-    tones = np.fft.fft(samples, axis=1)
+    count, baseband = tones.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
     at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
     tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones)) * at_middle

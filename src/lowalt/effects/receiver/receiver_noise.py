@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lowalt.effects.receiver._white import with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -33,7 +34,4 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     Source: Friis 1944 (noise figure); the link budget's power is the network's `power_w` a subcarrier.
     """
     power = variance(settings, frame.network.subcarrier_spacing_hz) / samples.shape[1]
-    noise = rng.standard_normal((*samples.shape, 2)).view(np.complex128)[..., 0]
-    noise *= math.sqrt(power / 2)
-    noise += samples
-    return noise
+    return with_noise(samples, math.sqrt(power / 2), rng)

@@ -19,6 +19,8 @@ SOURCE = (
 )
 DEFAULTS = {"backoff_db": 8.0, "smoothness": 2.0}
 
+TOGETHER = 16
+"""Symbols amplified together; their samples fit into a core's cache."""
 OVERSAMPLING = 4
 LOOPS = kernel(error_model="numpy")
 
@@ -69,14 +71,21 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
     Saturation is at `backoff_db` over the signal's mean power. Subcarriers stand around the oscillator at M // 2.
     """
     symbols, count = sent.shape
-    wide = np.zeros((symbols, OVERSAMPLING * count), np.complex128)
-    half = count // 2
-    # The transform's order: the oscillator's subcarrier and those above it, then those below it at the end.
-    last = wide.shape[1] - half
-    wide[:, : count - half], wide[:, last:] = sent[:, half:], sent[:, :half]
-    # Without the inverse transform's 1 / length, the mean power of the samples is the number of subcarriers.
-    samples = np.fft.ifft(wide, axis=1, norm="forward", out=wide)
+    half, length = count // 2, OVERSAMPLING * count
+    last = length - half
     saturation = math.sqrt(count) * 10 ** (settings["backoff_db"] / 20)
-    _compress(samples.reshape(-1), 1.0 / saturation**2, float(settings["smoothness"]))
-    spectrum = np.fft.fft(samples, axis=1, norm="forward", out=samples)
-    return np.concatenate([spectrum[:, last:], spectrum[:, : count - half]], axis=1)
+    result = np.empty(sent.shape, np.complex128)
+    work = np.empty((min(TOGETHER, symbols), length), np.complex128)
+    for first in range(0, symbols, TOGETHER):
+        data = sent[first : first + TOGETHER]
+        wide = work[: len(data)]
+        # The transform's order: the oscillator's subcarrier and those above it, then those below it at the end.
+        wide[:, : count - half], wide[:, last:] = data[:, half:], data[:, :half]
+        wide[:, count - half : last] = 0.0
+        # Without the inverse transform's 1 / length, the mean power of the samples is the number of subcarriers.
+        np.fft.ifft(wide, axis=1, norm="forward", out=wide)
+        _compress(wide.reshape(-1), 1.0 / saturation**2, float(settings["smoothness"]))
+        np.fft.fft(wide, axis=1, norm="forward", out=wide)
+        amplified = result[first : first + TOGETHER]
+        amplified[:, half:], amplified[:, :half] = wide[:, : count - half], wide[:, last:]
+    return result
