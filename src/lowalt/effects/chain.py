@@ -144,8 +144,7 @@ class Chain:
                 spectrum, left = self.receiving.responded(spectrum)
                 if not left and not self.sending.distorts:
                     return spectrum
-            self._near = spectrum is self.target.__dict__.get("direct")
-            if self._unknown is None:
+                self._near = spectrum is self.target.__dict__.get("direct")
                 return self.receiving.aired(spectrum, left, rows)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         if self._unknown is not None:
@@ -193,8 +192,7 @@ class Chain:
         """
         if not self._near or self.detection or self.timing is not None or self.sending.pilots is not None:
             return None
-        target = self.target
-        return strongest(target.direct, target.direct_sizes, target.direct_best, spectrum)
+        return strongest(self.target.direct, self.target.direct_sizes, self.target.direct_best, spectrum)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""

@@ -4,10 +4,13 @@ The station sees every point's image below the ground, weighted with the complex
 back by either path gives four echoes; the response forms them. Points are taken to be above the ground.
 """
 
+import math
+
 import numpy as np
 from scipy.special import i0e
 
 from lowalt.common.errors import InputError
+from lowalt.common.jit import LEAN
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects import series
@@ -84,16 +87,34 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
     """Return the points' images (N, L, 3) m below the ground."""
-    mirrored = view.places.copy(order="K")
-    np.negative(mirrored[..., 2], out=mirrored[..., 2])
-    return [mirrored]
+    return [_mirrored(view)[0]]
+
+
+def _mirrored(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """The points' images (N, L, 3) m, and the sine (N, L), 0 to 1, of the grazing angle of the rays to them."""
+    planes = np.ascontiguousarray(np.swapaxes(view.places, 1, 2))
+    images, sine = np.empty_like(planes), np.empty((len(planes), planes.shape[2]))
+    _mirror(planes, np.asarray(view.station.position_m, np.float64), images, sine)
+    return np.swapaxes(images, 1, 2), sine
+
+
+@LEAN
+def _mirror(planes, station, images, sine):
+    """Fill images (N, 3, L) and sine (N, L) of `_mirrored` for places in planes (N, 3, L)."""
+    for n in range(len(planes)):
+        x, y, z = planes[n, 0], planes[n, 1], planes[n, 2]
+        i, j, k = images[n, 0], images[n, 1], images[n, 2]
+        for l in range(np.uint64(planes.shape[2])):  # noqa: E741
+            i[l], j[l], k[l] = x[l], y[l], -z[l]
+            a, b, c = x[l] - station[0], y[l] - station[1], -z[l] - station[2]
+            share = -c / math.sqrt(a * a + b * b + c * c)
+            share = share if share > 0.0 else 0.0
+            sine[n, l] = share if share < 1.0 else 1.0
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:
     """Return the one further path: images (N, L, 3) m and coefficients (N, L)."""
-    (mirrored,) = images(settings, view)
-    away = mirrored - np.asarray(view.station.position_m)
-    sine = -away[..., 2] / np.sqrt(np.einsum("nli,nli->nl", away, away))
+    mirrored, sine = _mirrored(view)
     # The coefficient at the middle of the station's band is used for the whole band.
     frequency = radar(view.network, view.station).centre_hz
     properties = (*ground(settings, frequency), frequency, settings["polarisation"])
@@ -104,6 +125,6 @@ def paths(settings: dict, view: View) -> list[ImagePath]:
         return found * roughness(sine, settings["roughness_m"], frequency) if settings["roughness_m"] > 0 else found
 
     # Over the few degrees that a look covers, the coefficient is a short series of the sine.
-    coefficient = series.at(reflected, np.clip(sine, 0.0, 1.0))
+    coefficient = series.at(reflected, sine)
     below = np.asarray(view.station.position_m) * [1.0, 1.0, -1.0]
     return [ImagePath(mirrored, coefficient * view.relative_gain(mirrored), below)]

@@ -144,8 +144,10 @@ def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | N
     lags = covariance(points, at_key, delay_s)
     if lags[0] <= 0:
         return None
+    # Row i holds the lags |i - j|.
+    both = np.concatenate([lags[:0:-1], lags])
+    matrix = np.lib.stride_tricks.sliding_window_view(both, len(lags))[::-1].copy()
     index = np.arange(len(lags))
-    matrix = lags[np.abs(index[:, None] - index)]
     # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
     matrix[index, index] += 4 * np.finfo(float).eps * len(lags) ** 2 * lags[0]
     return np.linalg.cholesky(matrix)
