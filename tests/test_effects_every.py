@@ -34,6 +34,14 @@ def test_random_scenes_of_all_effects_keep_their_tolerance():
     assert len(named) > 20 and most > 1e-6
 
 
+def test_a_target_that_reflects_nothing_leaves_the_prefix_to_the_land_around_it():
+    one = case(np.random.default_rng([4, 462]).random(NUMBERS_OF_A_SCENE))
+    found = one.received(one.tolerance)
+    assert found.power == 0 and {"clutter", "cyclic_prefix"} <= set(one.effects)
+    assert [note.computed for note in found.decisions if note.name == "cyclic_prefix"] == [True]
+    assert change(one) <= 1
+
+
 @pytest.mark.slow
 def test_1000_random_scenes_of_all_effects_keep_their_tolerance():
     named, most, broken = drawn(1000, 4)

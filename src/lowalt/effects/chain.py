@@ -107,9 +107,10 @@ class Chain:
     def _largest(self, shares: np.ndarray) -> float:
         """Return the largest change of a range cell, from each part's bound relative to its peak.
 
-        A part without amplitude changes nothing, even where its bound is infinite.
+        A part without amplitude changes nothing. A bound infinite for all parts may be of echoes that are not theirs.
         """
-        return float((np.where(self.peaks > 0.0, shares, 0.0) * self.peaks).sum(axis=1).max())
+        change = (np.where(self.peaks > 0.0, shares, 0.0) * self.peaks).sum(axis=1).max()
+        return math.inf if np.isposinf(shares).all() else float(change)
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
