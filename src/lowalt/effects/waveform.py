@@ -44,8 +44,10 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
 
 def tones_of(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Return the transform (N, M) of the samples of `transmit`."""
-    response, data = np.broadcast_arrays(response, data)
-    tones = np.empty(data.shape, np.complex128)
+    shape = np.broadcast_shapes(response.shape, data.shape)
+    # Compiled loops take whole arrays: a view that repeats its rows would ask for machine code of its own.
+    response, data = (one if one.shape == shape else np.broadcast_to(one, shape).copy() for one in (response, data))
+    tones = np.empty(shape, np.complex128)
     carried(response, data, tones)
     return tones
 
