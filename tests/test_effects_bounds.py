@@ -13,6 +13,7 @@ from lowalt.effects.channel import squint, symbol_motion
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.response import response
 from lowalt.effects.speeds import Speeds
+from lowalt.effects.target_echo import EXACT
 from lowalt.motion.poses import Perturbation
 from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud
@@ -176,6 +177,30 @@ def test_a_part_without_amplitude_adds_nothing_to_a_bound_even_an_infinite_one(m
     chain.__dict__["peaks"] = np.zeros_like(chain.peaks)
     chain.limit(1e-3)
     assert chain.interpolation() == 0 and chain.bounds(frozenset({"squint"})) == {"squint": 0.0}
+
+
+def test_the_bound_of_interpolation_holds_the_rounding_of_positions_where_motion_inside_a_symbol_is_computed():
+    place = [
+        0.9862630952568765,
+        0.29339956096105435,
+        0.5208163509082427,
+        0.2586623394532822,
+        0.23922688847725226,
+        0.17350896379637493,
+        0.6282748940622144,
+        0.3708711388727066,
+        0.1341072962994907,
+        0.4572968063277512,
+        0.4954088629249479,
+    ]
+    share = used(place, "cyclic_prefix", frozenset(BY_NEED) - {"cyclic_prefix"})
+    assert 1e-4 < share <= 1
+    radio, cloud, row = decoded(place)
+    asked = scene(radio, {"symbol_motion": {}})
+    view = observe(asked, radio.stations[0], cloud, row)
+    chain = Chain(list(asked.effects), view, lambda name: asked.stream(name, row, "A"), 1.0)
+    chain.limit(1e-15 * chain.peaks.sum(axis=1).max())
+    assert chain.error == EXACT
 
 
 @pytest.mark.slow

@@ -9,14 +9,7 @@ import numpy as np
 
 from lowalt.effects import need, waveform
 from lowalt.effects.catalogue import NamedEffect, placed, providing
-from lowalt.effects.interface import (
-    AddsEchoes,
-    AddsSignals,
-    Amplifies,
-    ChoosesCells,
-    FiltersCells,
-    SamplesTime,
-)
+from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, ChoosesCells, FiltersCells, SamplesTime
 from lowalt.effects.listening import Listening
 from lowalt.effects.receiving import Receiving
 from lowalt.effects.sending import Sending
@@ -84,17 +77,21 @@ class Chain:
 
     def interpolation(self) -> float:
         """Return a bound of a range cell's error by interpolation in frequency and time (units of the signal)."""
-        stages = 2.0 if "symbol_motion" in self.target.by_need else 1.0
-        return stages * self.error * float(self.peaks.sum(axis=1).max())
+        moving = self.target.by_need.get("symbol_motion")
+        in_time = max(self.error, moving.module.rounding(self.view)) if moving else 0.0
+        return (self.error + in_time) * float(self.peaks.sum(axis=1).max())
 
     def limit(self, allowed: float) -> None:
         """Set the error of interpolation so that no range cell errs by more than `allowed` (units of the signal).
 
         Where `allowed` is below rounding, the error is that of rounding. Of a target that no ray reaches, nothing errs.
         """
-        self.error = EXACT
+        self.error = COARSEST
         reached = self.interpolation()
-        self.error = min(max(EXACT, EXACT * allowed / reached), COARSEST) if reached > 0.0 else COARSEST
+        self.error = max(EXACT, COARSEST * min(1.0, allowed / reached)) if reached > 0.0 else COARSEST
+        # The positions' rounding stays, however small the error; 1 + 1e-9 lets the division above round.
+        if self.interpolation() > (1.0 + 1e-9) * allowed:
+            self.error = EXACT
 
     def bounds(self, names: frozenset[str]) -> dict[str, float]:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
