@@ -19,7 +19,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -251,8 +251,10 @@ space: $(SETUP)  ## disk and memory of jobs, measured: make space RUNS='results/
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
 		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
 
-reference-choices: $(SETUP)  ## keep the tables of a finished `make choices` and a finished `make confirm`
+reference-choices:  ## keep the tables of a finished `make choices`
 	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
+
+reference-confirm:  ## keep the tables of a finished `make confirm`
 	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
 
 rotors: $(BASE)  ## blade passing frequencies read from the default's signals, against the truth: results/reference/default-rotors.csv
