@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.effects import arrivals, moment_loops, time_series
+from lowalt.effects import arrivals, interpolation, moment_loops, time_series
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
@@ -30,10 +30,10 @@ def test_orders_are_those_of_the_polynomial_through_the_instants():
     rng = np.random.default_rng(2)
     terms, at = rng.normal(size=(4, 5, 2, 3)), np.linspace(-1.0, 1.0, 7)
     nodes = np.cos(np.pi * (np.arange(4) + 0.5) / 4)
-    values = np.tensordot(time_series.polynomials(4, nodes).T, terms, 1)
+    values = np.tensordot(interpolation.polynomials(4, nodes).T, terms, 1)
     found = time_series.orders([[[value]] for value in values])
     assert np.stack([order[0][0] for order in found]) == pytest.approx(terms)
-    assert time_series.polynomials(4, at)[3] == pytest.approx(4 * at**3 - 3 * at)
+    assert interpolation.polynomials(4, at)[3] == pytest.approx(4 * at**3 - 3 * at)
 
 
 def moving(tolerance: float | None, prefix: bool):

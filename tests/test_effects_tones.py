@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lowalt.common.streams import stream
-from lowalt.effects import tone_loops, waveform
+from lowalt.effects import strongest_cell, waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, received_signal
 from test_effects import network, target
@@ -30,7 +30,7 @@ def test_the_strongest_cell_is_found_among_all_that_a_change_can_lift(subcarrier
     after = np.exp(2j * np.pi * rng.random((60, 1))) * rng.uniform(0.5, 2, (60, 1)) * before + noise
     _, sizes, best = cells_of(before)
     truth, own, number = cells_of(after)
-    found = tone_loops.strongest(before, sizes, best, after)
+    found = strongest_cell.strongest(before, sizes, best, after)
     assert found is not None
     value, cell = found
     np.testing.assert_allclose(own[np.arange(60), cell], own.max(axis=1), rtol=1e-12)
@@ -43,7 +43,7 @@ def test_symbols_that_differ_too_much_are_left_to_the_transform():
     rng = np.random.default_rng(2)
     before, after = (rng.normal(size=(40, 64)) + 0j for _ in range(2))
     _, sizes, best = cells_of(before)
-    assert tone_loops.strongest(before, sizes, best, after) is None
+    assert strongest_cell.strongest(before, sizes, best, after) is None
 
 
 def test_a_receiver_finds_the_cells_that_a_transform_of_its_responses_finds(monkeypatch):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lowalt.effects import time_series, waveform
+from lowalt.effects import interpolation, time_series, waveform
 from lowalt.effects.steering import SameSymbols, Steered
 from lowalt.effects.view import View
 
@@ -80,7 +80,7 @@ def _in_orders(
     if count > 1:
         share = allowed if turned is None else 0.5 * allowed
         orders = time_series.kept(series, first, share * float(echo.strengths.sum(axis=1).max()))
-    shapes = time_series.polynomials(orders, 2.0 * np.arange(samples.shape[1]) / samples.shape[1] - 1.0)
+    shapes = interpolation.polynomials(orders, interpolation.samples(samples.shape[1]))
     for order, shape in enumerate(shapes):
         spectra = [first.spectrum(mine[order]) for mine in series]
         whole = sum(spectra[1:], spectra[0])

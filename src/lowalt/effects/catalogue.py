@@ -74,6 +74,8 @@ PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
 """Place of every effect by its name."""
 BY_NEED = ("squint", "wavefront", "symbol_motion", "cyclic_prefix")
 """Physics beyond Eq. 7 that is left out where its bound allows it."""
+ON_ALL_ECHOES = ("cyclic_prefix",)
+"""Physics by need that also changes echoes that no target sends, as the land's; its bound is of targets alone."""
 
 
 ONE_OSCILLATOR = ("clock_offset", "carrier_offset")

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.effects import need, waveform
-from lowalt.effects.catalogue import NamedEffect, placed, providing
+from lowalt.effects.catalogue import ON_ALL_ECHOES, NamedEffect, placed, providing
 from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, ChoosesCells, FiltersCells, SamplesTime
 from lowalt.effects.listening import Listening
-from lowalt.effects.receiving import Receiving
+from lowalt.effects.receiving import Heard, Receiving
 from lowalt.effects.sending import Sending
+from lowalt.effects.strongest_cell import strongest
 from lowalt.effects.target_echo import EXACT, TargetEcho
-from lowalt.effects.tone_loops import strongest
 from lowalt.effects.view import View
 
 COARSEST = 0.1
@@ -57,7 +57,6 @@ class Chain:
         self.target = TargetEcho(self.channel, view, draws, self.sending)
         self.others: list[TargetEcho] = []
         """Other targets of the beam, each with its own view; everything they ask for is computed."""
-        self._near = False
         self.receiving = Receiving(self.receiver, view, draws, self.sending, power)
 
     @property
@@ -95,23 +94,21 @@ class Chain:
 
     def bounds(self, names: frozenset[str]) -> dict[str, float]:
         """Return the largest change of a range cell by each physics by need of `names` (units of the signal)."""
-        return {
-            name: self._largest(effect.module.bound(effect.settings, self.view, self.names - {name}))
-            for name, effect in self.target.by_need.items()
-            if name in names
-        }
+        return {name: self._largest(effect) for name, effect in self.target.by_need.items() if name in names}
 
-    def _largest(self, shares: np.ndarray) -> float:
-        """Return the largest change of a range cell, from each part's bound relative to its peak.
+    def _largest(self, effect: NamedEffect) -> float:
+        """Return the largest change of a range cell by an effect: each part's bound times its peak.
 
-        A part without amplitude changes nothing. A bound infinite for all parts may be of echoes that are not theirs.
+        A part without amplitude changes nothing, even where its bound is infinite.
         """
-        change = (np.where(self.peaks > 0.0, shares, 0.0) * self.peaks).sum(axis=1).max()
-        return math.inf if np.isposinf(shares).all() else float(change)
+        if effect.name in ON_ALL_ECHOES and providing(self.channel, AddsEchoes):
+            return math.inf
+        shares = effect.module.bound(effect.settings, self.view, self.names - {effect.name})
+        return float((np.where(self.peaks > 0.0, shares, 0.0) * self.peaks).sum(axis=1).max())
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
-        return self._cells_of(self.spectrum(on, chosen))
+        return self._cells_of(self.heard(on, chosen).responses)
 
     def _cells_of(self, spectrum: np.ndarray) -> np.ndarray:
         """The range cells of responses (N, M); those of the direct echo are kept."""
@@ -119,18 +116,18 @@ class Chain:
             return self.target.direct_cells
         return self.sending.cells(spectrum)
 
-    def spectrum(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
-        """Return the responses (N, M) behind the receiver with the physics `on`, of the symbols `chosen` (all)."""
+    def heard(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Heard:
+        """Return what the receiver makes of the symbols `chosen` (all) with the physics `on`."""
         view, factor = self.view, self.target.routes
         rows = slice(None) if chosen is None else np.flatnonzero(chosen)
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
-        left, self._near = self.receiver, False
+        left = self.receiver
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             still, samples = self._moving(view, on, factor, rows)
             if not left and not self.sending.distorts and self._unknown is None:
-                return still + self.sending.received(samples, rows)
+                return Heard(still + self.sending.received(samples, rows))
             samples += waveform.transmit(still, self.sending.aired[rows])
         else:
             spectrum = self.target.subcarriers(view, on, factor)
@@ -141,13 +138,13 @@ class Chain:
             if self._unknown is None:
                 spectrum, left = self.receiving.responded(spectrum)
                 if not left and not self.sending.distorts:
-                    return spectrum
-                self._near = spectrum is self.target.__dict__.get("direct")
-                return self.receiving.aired(spectrum, left, rows)
+                    return Heard(spectrum)
+                alone = spectrum is self.target.__dict__.get("direct")
+                return Heard(self.receiving.aired(spectrum, left, rows), alone)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         if self._unknown is not None:
             samples = samples + self._unknown[rows]
-        return self.receiving.sampled(samples, left, rows)
+        return Heard(self.receiving.sampled(samples, left, rows))
 
     def _moving(
         self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
@@ -168,10 +165,10 @@ class Chain:
 
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
-        spectrum = self.spectrum(on, chosen)
-        if not leads and chosen is None and (found := self._close(spectrum)) is not None:
-            return Outcome(*found, np.full(len(spectrum), np.nan))
-        cells = self._cells_of(spectrum)
+        heard = self.heard(on, chosen)
+        if not leads and chosen is None and (found := self._close(heard)) is not None:
+            return Outcome(*found, np.full(len(heard.responses), np.nan))
+        cells = self._cells_of(heard.responses)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
         for effect in providing(self.detection, FiltersCells):
@@ -183,14 +180,14 @@ class Chain:
         outcome = Outcome(cells[np.arange(len(cells)), best], best, lead)
         return outcome if self.timing is None else self._evenly(outcome)
 
-    def _close(self, spectrum: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """The strongest cells of responses (N, M) that the receiver has made of the target's direct echo alone.
+    def _close(self, heard: Heard) -> tuple[np.ndarray, np.ndarray] | None:
+        """The strongest cells of what the receiver has made of the target's direct echo alone.
 
         None where they hold more, or where something stands between these cells and the outcome.
         """
-        if not self._near or self.detection or self.timing is not None or self.sending.pilots is not None:
+        if not heard.alone or self.detection or self.timing is not None or self.sending.pilots is not None:
             return None
-        return strongest(self.target.direct, self.target.direct_sizes, self.target.direct_best, spectrum)
+        return strongest(self.target.direct, self.target.direct_sizes, self.target.direct_best, heard.responses)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""

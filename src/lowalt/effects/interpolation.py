@@ -13,8 +13,17 @@ def weights(count: int, at: np.ndarray) -> np.ndarray:
 
     Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
     """
-    order = np.arange(count)
-    return np.cos(order[:, None] * np.arccos(at)).T @ coefficients(count)
+    return polynomials(count, at).T @ coefficients(count)
+
+
+def polynomials(count: int, at: np.ndarray) -> np.ndarray:
+    """Return the Chebyshev polynomials (count, K) of order 0 .. count - 1 at `at` (K,) on [-1, 1]."""
+    return np.cos(np.arange(count)[:, None] * np.arccos(at))
+
+
+def samples(count: int) -> np.ndarray:
+    """Return where `count` evenly spaced samples of a symbol stand in it, from -1 at its beginning up to below 1."""
+    return 2.0 * np.arange(count) / count - 1.0
 
 
 def coefficients(count: int) -> np.ndarray:

@@ -61,7 +61,7 @@ def decisions(
         elif name in left:
             why = f"its bound fits the tolerance {tolerance:g}"
         elif math.isinf(share):
-            why = "no bound carries through this scene's receiver"
+            why = "nothing bounds its change in this scene"
         else:
             why = f"its bound exceeds what the tolerance {tolerance:g} leaves"
         result.append(Decision(name, share, name not in left, why))

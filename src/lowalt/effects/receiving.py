@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,13 @@ from lowalt.effects.interface import ChangesResponse, ChangesTones, Quantises
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
+
+
+class Heard(NamedTuple):
+    """Responses (N, M) behind the receiver, and whether it has acted on the target's direct echo alone."""
+
+    responses: np.ndarray
+    alone: bool = False
 
 
 class Receiving:

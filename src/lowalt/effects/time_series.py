@@ -41,8 +41,3 @@ def kept(series: Sequence[list[Moments]], rays: Steered, allowed: float) -> int:
             break
         count -= 1
     return count
-
-
-def polynomials(count: int, places: np.ndarray) -> np.ndarray:
-    """Return the Chebyshev polynomials (count, M) at places (M,) from -1 to 1."""
-    return np.cos(np.arange(count)[:, None] * np.arccos(places))

@@ -9,17 +9,15 @@ cells are of the range sum (`land_between`), and Doppler is that along the bisec
 from functools import lru_cache
 
 import numpy as np
-from scipy.fft import next_fast_len
 from scipy.special import gamma, gammaincinv
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.common.normals import circular
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
-from lowalt.effects.antenna import Element, local_gain
+from lowalt.effects.antenna import Element, gain, local_gain
 from lowalt.effects.channel import clutter_loops, land_between, patches
-from lowalt.effects.channel.land_between import target_power
+from lowalt.effects.channel.windblown import speckle, windblown
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
@@ -38,12 +36,6 @@ DEFAULTS = {
 
 OFFSET_CELLS = patches.OFFSET
 """How far all of this effect's echoes stand beyond the centres of their range cells."""
-MPH = 0.44704
-"""Metres per second in a statute mile per hour, the unit of Billingsley's formulas."""
-TAIL = 1e-3
-"""Largest correlation left where the synthesised moving part wraps round."""
-FAINT = 1e-11
-"""Share of the moving part's power in each of the frequencies that are not drawn."""
 
 
 def idle(settings: dict) -> bool:
@@ -153,61 +145,17 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
     return 1.0 / (stable * gamma(1.0 + 1.0 / index))
 
 
-def windblown(wind_mps: float, frequency_hz: float) -> tuple[float, float]:
-    """Return the ratio of still to moving power and the exponential spectrum's slope beta (s/m).
-
-    The formula for the slope ends at a wind of one mile an hour; below, the slope keeps its value there.
-    Source: Billingsley 2002, chapter 6 (wind in miles per hour, frequency in GHz).
-    """
-    miles = wind_mps / MPH
-    if miles == 0:
-        return np.inf, np.inf
-    still = 489.8 * miles**-1.55 * (frequency_hz / 1e9) ** -1.21
-    return still, 1.0 / (0.1048 * (np.log10(max(miles, 1.0)) + 0.4147))
-
-
-@lru_cache(maxsize=32)
-def _shape(count: int, step_s: float, beta: float, wavelength_m: float) -> np.ndarray:
-    """Root of the moving part's power (K,) in each of K >= count frequencies, aliased by sampling every `step_s`."""
-    decay = beta * wavelength_m / (4 * np.pi)
-    long = next_fast_len(count + int(decay / np.sqrt(TAIL) / step_s))
-    frequency = np.fft.fftfreq(long, step_s)
-    # The spectrum exp(-beta lambda |f| / 2) summed over all its images 1 / step_s apart, a geometric series.
-    slope, period = 0.5 * beta * wavelength_m, 1.0 / step_s
-    power = np.exp(-slope * abs(frequency)) + np.exp(-slope * (period - abs(frequency)))
-    power /= -np.expm1(-slope * period)
-    return np.sqrt(power / power.sum())
-
-
-def _normal(rng: np.random.Generator, *shape: int) -> np.ndarray:
-    """Circular complex normals of unit power."""
-    return rng.standard_normal((*shape, 2)).view(np.complex128)[..., 0] * np.sqrt(0.5)
-
-
-def speckle(
-    rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float,
-    slow: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
-    """Return unit-power speckle (cells, count): a constant part plus a part with a two-sided exponential spectrum.
-
-    still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m); slow: (cells,) factor on Doppler
-    frequencies, None for 1.
-    """
-    kept = _normal(rng, cells)[:, None]
-    if not np.isfinite(still):
-        return np.repeat(kept, count, axis=1)
-    shape = _shape(count, step_s, beta, wavelength_m)
-    lines = np.empty((cells, len(shape)), np.complex128)
-    # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
-    strong = shape > np.sqrt(FAINT)
-    words = rng.bit_generator.random_raw(2 * cells * int(strong.sum()))
-    if slow is not None:
-        shape = land_between.slowed(len(shape), step_s, beta * wavelength_m, slow)
-    shape = np.ascontiguousarray(np.atleast_2d(np.sqrt(1 / (1 + still)) * shape))
-    clutter_loops.lines(*circular(words, np.sqrt(0.5)), shape, strong, lines)
-    moving = np.fft.ifft(lines, axis=1, norm="forward", out=lines)[:, :count]
-    moving += np.sqrt(still / (1 + still)) * kept
-    return moving
+def target_power(view: View) -> float:
+    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
+    radio, ends, shaped = radar(view.network, view.station), view.ends(), [1.0, 1.0]
+    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
+    ways_m = [float(np.linalg.norm(end.aim_m - np.asarray(end.station.position_m))) for end in ends]
+    if view.element is not None:
+        shaped = [float(gain(view.element, end.station, end.aim_m)) for end in ends]
+    total = float(view.cloud.rcs_m2.sum())
+    if len(ends) == 1:
+        return (radio.scale * elements * shaped[0]) ** 2 * total / ways_m[0] ** 4
+    return (radio.scale * elements) ** 2 * shaped[0] * shaped[1] * total / (ways_m[0] * ways_m[1]) ** 2
 
 
 def mean_power(settings: dict, view: View) -> np.ndarray:

@@ -37,10 +37,8 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     """Return a bound (N, P) of the cut's change of any range cell, relative to each part's peak amplitudes.
 
     Nothing changes for echoes within the prefix. For others the window's first samples are replaced by samples of the
-    same 2-norm at most, so a range cell changes by at most 2. Echoes of the surroundings may always be later: no bound.
+    same 2-norm at most, so a range cell changes by at most 2.
     """
-    if {"clutter", "background_channel"} & others:
-        return np.full((1, 1), np.inf)
     ends = [view.station.transmitter or view.station, view.station]
     farthest = sum(np.linalg.norm(view.middles - np.asarray(end.position_m), axis=2) + view.radii for end in ends)
     return np.where(farthest / SPEED_OF_LIGHT > length_s(settings, view.network), 2.0, 0.0)

@@ -15,7 +15,6 @@ from lowalt.echo.radar import radar
 from lowalt.effects.antenna import Element, gain
 from lowalt.effects.channel import patches
 from lowalt.effects.response_loops import LOOPS, array_sum
-from lowalt.effects.view import View
 
 STRIP = 256
 """Patches that pass through the loops together."""
@@ -153,28 +152,3 @@ def cell_power(
         slowed = np.add.reduceat(each * found.slow, found.first)
         slow[found.cell] = np.where(power[found.cell] > 0, slowed / np.maximum(power[found.cell], 1e-300), 1.0)
     return radio.scale**2 * settings["gamma"] * power, slow
-
-
-def slowed(count: int, step_s: float, decay: float, slow: np.ndarray) -> np.ndarray:
-    """Return the root of the moving part's power (cells, count) in each frequency, aliased by sampling every `step_s`.
-
-    decay: twice the slope of the exponential spectrum over frequency (s) of a station that hears itself; slow: (cells,)
-    factor on Doppler frequencies, where 0 leaves all power at zero frequency.
-    """
-    frequency, period = abs(np.fft.fftfreq(count, step_s)), 1.0 / step_s
-    slope = 0.5 * decay / np.maximum(slow, 1e-6)[:, None]
-    power = np.exp(-slope * frequency) + np.exp(-slope * (period - frequency))
-    return np.sqrt(power / power.sum(axis=1, keepdims=True))
-
-
-def target_power(view: View) -> float:
-    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
-    radio, ends, shaped = radar(view.network, view.station), view.ends(), [1.0, 1.0]
-    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
-    ways_m = [float(np.linalg.norm(end.aim_m - np.asarray(end.station.position_m))) for end in ends]
-    if view.element is not None:
-        shaped = [float(gain(view.element, end.station, end.aim_m)) for end in ends]
-    total = float(view.cloud.rcs_m2.sum())
-    if len(ends) == 1:
-        return (radio.scale * elements * shaped[0]) ** 2 * total / ways_m[0] ** 4
-    return (radio.scale * elements) ** 2 * shaped[0] * shaped[1] * total / (ways_m[0] * ways_m[1]) ** 2

@@ -113,17 +113,12 @@ def instants(view: View, error: float = 1e-12) -> tuple[np.ndarray, np.ndarray]:
     samples, points = view.network.subcarriers, count(view, error)
     if points >= samples:
         return every_sample(view)
-    return nodes_s(view, points), interpolation.weights(points, places(samples)).T
+    return nodes_s(view, points), interpolation.weights(points, interpolation.samples(samples)).T
 
 
 def nodes_s(view: View, points: int) -> np.ndarray:
     """Return the Chebyshev points (points,) of a symbol (s), from its end to its beginning."""
     return 0.5 * duration_s(view) * (interpolation.points(points) + 1.0)
-
-
-def places(samples: int) -> np.ndarray:
-    """Return where a symbol's samples stand in it, (samples,), from -1 at its beginning to 1 at its end."""
-    return 2.0 * np.arange(samples) / samples - 1.0
 
 
 def farther_m(view: View) -> float:

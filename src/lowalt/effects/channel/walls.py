@@ -115,8 +115,9 @@ def dark(facade: list[float], low: np.ndarray, high: np.ndarray, station_m: np.n
     ray = corners - 2 * off[:, None] * normal - station_m
     meets = station_m + (own / (own + off))[:, None] * ray - foot
     across, up, room = meets @ along, meets[:, 2], 1e-6
-    beside = across.min() > 0.5 * facade[3] + room or across.max() < -0.5 * facade[3] - room
-    return bool(beside or up.min() > facade[4] + room or up.max() < -room)
+    misses_sides = across.min() > 0.5 * facade[3] + room or across.max() < -0.5 * facade[3] - room
+    misses_height = up.min() > facade[4] + room or up.max() < -room
+    return bool(misses_sides or misses_height)
 
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
