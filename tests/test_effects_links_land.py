@@ -147,3 +147,14 @@ def test_the_levels_of_a_link_hold_its_land():
     assert clutter.target_power(link) == pytest.approx((abs(np.fft.ifft(echo, axis=1)[0]) ** 2).sum(), rel=1e-9)
     asked = settings_of(clutter_to_signal_db=7.0)
     assert clutter.mean_power(asked, link).sum() == pytest.approx(10**0.7 * clutter.target_power(link))
+
+
+@pytest.mark.parametrize("hears", ["A", "A-B"])
+def test_a_targets_power_has_the_element_at_each_end(hears):
+    network = replace(NETWORK, stations=(*NETWORK.stations, between(high_m=60.0)))
+    plain = seen(body([[0, 0, 0]]), network, x_m=200.0, y_m=100.0, z_m=60.0).of(network.station(hears))
+    shaped = replace(plain, element=TILTED)
+    gains = [gain(TILTED, end.station, end.aim_m) for end in plain.ends()]
+    two_way = gains[0] ** 2 if hears == "A" else gains[0] * gains[1]
+    assert abs(10 * np.log10(gains[0] / gains[-1])) > 0.5 or hears == "A"
+    assert clutter.target_power(shaped) == pytest.approx(two_way * clutter.target_power(plain), rel=1e-12)
