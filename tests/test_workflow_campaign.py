@@ -6,14 +6,16 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import psutil
 import pytest
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.workflow import disturb as disturbances
 from lowalt.workflow.campaign import LARGE_MB, SMALL_MB, room_mb
-from lowalt.workflow.disturb import MemoryGroup, _kill, disturb, workers
+from lowalt.workflow.disturb import MemoryGroup, _kill, disturb, one_worker, workers
 from lowalt.workflow.trial import checksums
 
 
@@ -96,3 +98,51 @@ def test_a_memory_group_without_the_files_of_the_second_version_uses_those_of_th
              (group.limit, group.usage, group.events)]  # fmt: skip
     assert [*map(str, files)] == ["memory.limit_in_bytes", "memory.usage_in_bytes", "memory.oom_control"]
     assert group.none == "-1"
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Time that passes only while the code sleeps: a namespace with `now` (s), and `each`, called at every sleep."""
+    found = SimpleNamespace(now=0.0, each=lambda: None)
+
+    def sleep(seconds):
+        found.now += seconds
+        found.each()
+
+    monkeypatch.setattr(disturbances, "time", SimpleNamespace(monotonic=lambda: found.now, sleep=sleep))
+    return found
+
+
+def test_a_run_without_a_worker_is_left_after_a_minute_and_one_that_ended_at_once(clock, monkeypatch):
+    monkeypatch.setattr(disturbances, "workers", lambda main: {})
+    runs = SimpleNamespace(is_running=lambda: True, status=lambda: psutil.STATUS_SLEEPING)
+    assert one_worker(runs, random.Random(0)) is None
+    assert clock.now == pytest.approx(60, abs=0.03)
+    for over in ({"is_running": lambda: False}, {"status": lambda: psutil.STATUS_ZOMBIE}):
+        clock.now = 0.0
+        assert disturb("worker", SimpleNamespace(**(vars(runs) | over)), random.Random(0), None) is None
+        assert clock.now == 0
+
+
+@pytest.mark.parametrize("killed_after", [3, None])
+def test_a_memory_limit_follows_what_is_held_until_one_process_is_killed_and_is_then_lifted(
+    killed_after, tmp_path, clock
+):
+    group, limits = MemoryGroup(tmp_path), []
+    group.usage.write_text("1000\n")
+    group.events.write_text("oom_kill_disable 0\nunder_oom 0\noom_kill 4\n")
+
+    def each():
+        clock.now += 7
+        limits.append(group.limit.read_text())
+        group.usage.write_text("900\n")
+        if len(limits) == killed_after:
+            group.events.write_text("oom_kill_disable 0\nunder_oom 0\noom_kill 5\n")
+
+    clock.each = each
+    assert group.starve() == (killed_after is not None)
+    assert limits[:3] == ["900", "810", "810"] and group.limit.read_text() == "-1"
+    if killed_after:
+        assert len(limits) == killed_after
+    else:
+        assert 60 <= clock.now < 68

@@ -1,0 +1,119 @@
+"""Pictures of one target and of an inspected mesh: what is drawn where, read from the figure before it is a PNG."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import pyplot as plt
+from matplotlib.colors import to_rgba
+
+from craft import craft
+from lowalt.report.figures import inspection, target
+from lowalt.targets.guesses import Component
+from lowalt.targets.inspection import Inspection
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """A function that draws a picture and returns its figure."""
+
+    def draw(module, name, *given):
+        figures = []
+        monkeypatch.setattr(module, "png", lambda figure: figures.append(figure) or b"")
+        getattr(module, name)(*given)
+        return figures[0]
+
+    yield draw
+    plt.close("all")
+
+
+def offsets(panel) -> np.ndarray:
+    return panel.collections[0].get_offsets()
+
+
+def test_an_inspection_shows_each_plane_at_one_scale_and_what_may_move_in_colours(drawn):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.1], [2.0, 1.0, 0.2], [-2.0, 3.0, 0.4]])
+    low, high = points.min(axis=0), points.max(axis=0)
+    parts = [
+        Component(7, low, high, 9, True, ""),
+        *(Component(i, low + i, high + i, 3, True, "", "wheel") for i in (2, 5)),
+    ]
+    found = Inspection(
+        Path("a$b.obj"), "in", "given", low, high, 4, "z", "y", [], parts, "Vehicle", points, np.array([7, 2, 5, 7])
+    )
+    figure = drawn(inspection, "inspection_picture", found)
+    assert tuple(figure.get_size_inches()) == (14, 5)
+    assert figure.get_suptitle() == r"a\$b.obj: unit in (given); guessed: up z, front y"
+    for panel, (across, high_axis) in zip(figure.axes, [(0, 1), (1, 2), (0, 2)], strict=True):
+        np.testing.assert_array_equal(offsets(panel), points[:, [across, high_axis]])
+        for axis, name, limits in [
+            (across, panel.get_xlabel(), panel.get_xlim()),
+            (high_axis, panel.get_ylabel(), panel.get_ylim()),
+        ]:
+            assert name == f"the file's {'xyz'[axis]} (m)"
+            # The largest extent is 4 m; a margin of 8 % on each side.
+            np.testing.assert_allclose(limits, (low + high)[axis] / 2 + np.array([-2.32, 2.32]))
+        assert panel.get_aspect() == 1 and not panel.lines
+        assert [(text.get_text(), *text.get_position()) for text in panel.texts] == [
+            ("wheel", part.centre[across], part.centre[high_axis]) for part in parts[1:]
+        ]
+        colours = panel.collections[0].get_facecolors()
+        np.testing.assert_allclose(colours[1:3], [to_rgba("tab:blue"), to_rgba("tab:orange")])
+        np.testing.assert_array_equal(colours[0], colours[3])
+        np.testing.assert_allclose(colours[0][:2], colours[0][1], atol=0.001)
+
+
+def test_an_inspected_bird_has_its_shoulders_marked_on_both_sides(drawn):
+    body = np.stack(np.broadcast_arrays(np.linspace(-0.1, 0.1, 41), 0.0, [[-0.05], [0.05]]), -1).reshape(-1, 3)
+    wings = np.stack(np.broadcast_arrays([[-1.0], [1.0]] * np.linspace(0.11, 1, 41), 0.0, 0.0), -1).reshape(-1, 3)
+    points = np.concatenate([body, wings]) + np.array([3.0, 0.0, 0.0])
+    low, high = points.min(axis=0), points.max(axis=0)
+    found = Inspection(
+        Path("crow.stl"), "m", "given", low, high, 1, "z", "y", [], [], "Bird", points, np.zeros(len(points), int)
+    )
+    figure = drawn(inspection, "inspection_picture", found)
+    assert 0.1 < found.shoulder_m < 0.15
+    sides = [3.0 - found.shoulder_m, 3.0 + found.shoulder_m]
+    top, side, front = figure.axes
+    assert not side.lines
+    for panel in (top, front):
+        assert [line.get_xdata()[0] for line in panel.lines] == pytest.approx(sides)
+    assert figure.get_suptitle().endswith(", wings beyond the dashed lines")
+
+
+def test_a_target_is_seen_from_three_sides_with_its_hinge_and_front(drawn, monkeypatch):
+    monkeypatch.setattr(target, "_motion_row", lambda *given: {})
+    monkeypatch.setattr(target, "_spectra", lambda *given: None)
+    cloud = craft()
+    cloud.normals[3] = [0.0, 0.0, 1.0]
+    figure = drawn(target, "target_picture", cloud)
+    assert tuple(figure.get_size_inches()) == (14, 8.6)
+    middle, half = (cloud.points.min(0) + cloud.points.max(0)) / 2, 0.58 * np.ptp(cloud.points, axis=0).max()
+    titles = {"from above": (0, 1), "from the right": (1, 2), "from behind": (0, 2)}
+    for panel, (title, (across, up)) in zip(figure.axes[:3], titles.items(), strict=True):
+        assert panel.get_title() == title and panel.get_aspect() == 1
+        assert (panel.get_xlabel(), panel.get_ylabel()) == (target.AXES[across], target.AXES[up])
+        np.testing.assert_array_equal(offsets(panel), cloud.points[:, [across, up]])
+        np.testing.assert_allclose(panel.get_xlim(), middle[across] + np.array([-half, half]))
+        np.testing.assert_allclose(panel.get_ylim(), middle[up] + np.array([-half, half]))
+        normal, axis, hinge = (np.array(line.get_xydata()) for line in panel.lines)
+        tip = cloud.points[3] + [0, 0, 0.05 * half]
+        np.testing.assert_allclose(normal, [cloud.points[3, [across, up]], tip[[across, up]]])
+        ends = cloud.hinges[1] + np.outer([-1, 1], cloud.axes[1]) * 0.12 * half
+        np.testing.assert_allclose(axis, ends[:, [across, up]])
+        np.testing.assert_allclose(hinge, [cloud.hinges[1, [across, up]]])
+        body, rotor = panel.collections[0].get_facecolors()[[0, -1]]
+        assert not np.allclose(body, rotor)
+        arrows = [(np.array(text.xyann), np.array(text.xy)) for text in panel.texts]
+        assert len(arrows) == (1 in (across, up))
+        for start, tip in arrows:
+            # The arrow points along y, is as long as 40 % of the panel, and stays inside of it.
+            along = np.array([across == 1, up == 1])
+            np.testing.assert_allclose(tip - start, 0.8 * half * along)
+            assert (abs(np.array([start, tip]) - middle[[across, up]]) < half).all()
+    assert figure.get_suptitle().startswith("DJI Mini 2 (UAV, test): 20 points, 2 parts, ")
+
+
+def test_decibels_end_at_the_floor_and_silence_is_the_floor():
+    np.testing.assert_allclose(target._decibel(np.array([1.0, 10.0, 0.001])), [-20, 0, -40])
+    np.testing.assert_array_equal(target._decibel(np.zeros(2)), [-40, -40])
