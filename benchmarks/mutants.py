@@ -23,7 +23,7 @@ from queue import Queue
 import numpy as np
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, measure, shown_tests
-from mutation.forked import load
+from mutation.forked import LIBRARIES, TRAINING, load
 from mutation.kept import Kept
 from mutation.trials import Outcome, copy_of_tree, trial
 
@@ -35,7 +35,10 @@ COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_t
 """`survived_first`: before tests were added; `equivalent`: survivors that change no result, by their verdict;
 `killed_percent`: of the faults tried except these; `low_percent`, `high_percent`: its 95 % interval."""
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
-_COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "plan", "portable", "splits", "turns")
+_COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "noise", "plan",
+           "portable", "splits", "turns", "workflow_board")  # fmt: skip
+_MEASURE = ("measure", "limits", "report_cost", "report_effects", "report_scale", "physics", "echo_hard",
+            "recognition_price")  # fmt: skip
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
@@ -43,8 +46,8 @@ NEAR = {
     "shards": ("shards", "dataset"),
     "targets": _TARGETS,
     "common": _COMMON,
-    "commands": ("command",),
-    "measure": ("measure", "limits", "report_cost", "physics"),
+    "commands": ("command", "gallery", "records_own"),
+    "measure": _MEASURE,
     "motion": ("motion", "laws", "limits", "plan"),
     "noise": ("noise", "laws"),
     "tiles": ("tiles", "spectra"),
@@ -174,7 +177,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin nothing new after this time")
     asked = parser.parse_args(argv)
     os.nice(asked.nice)
-    load()
+    load(LIBRARIES + TRAINING if "recognition" in (asked.rooms or ["recognition"]) else LIBRARIES)
     until = time.monotonic() + 60 * asked.minutes
     names = near(ROOT, asked.rooms) if asked.near else sorted(path.name for path in (ROOT / "tests").glob("test_*.py"))
     found = measure(ROOT, names, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)

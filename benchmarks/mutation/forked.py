@@ -14,6 +14,7 @@ from numba.core import caching
 
 LIBRARIES = ("numpy", "numba.core.compiler", "scipy.signal", "scipy.stats", "scipy.linalg", "scipy.special", "yaml",
              "jsonschema", "PIL.Image", "hypothesis.strategies", "hypothesis.extra.numpy", "pandas")  # fmt: skip
+TRAINING = ("torch", "timm")
 
 
 def load(names: tuple[str, ...] = LIBRARIES) -> None:
