@@ -37,8 +37,8 @@ COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_t
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
 _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "noise", "plan",
            "portable", "splits", "turns", "workflow_board")  # fmt: skip
-_MEASURE = ("measure", "limits", "report_cost", "report_effects", "report_scale", "physics", "echo_hard",
-            "recognition_price")  # fmt: skip
+_MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "physics", "echo_command", "echo_hard",
+            "recognition_price", "recognition_stream")  # fmt: skip
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),

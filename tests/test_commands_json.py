@@ -10,11 +10,12 @@ import pytest
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.commands import workflow
+from lowalt.commands import spectra, workflow
 from lowalt.commands.for_programs import as_json
 from lowalt.common.config import load, plain
 from lowalt.common.files import replacing
 from lowalt.report.figures import inspection, target
+from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
 from test_targets_own import craft
@@ -86,11 +87,27 @@ def test_explain_answers_for_a_link_with_its_geometry(answer):
 
 def test_spectra_answers_with_the_size_of_each(answer):
     found, status = answer("spectra")
+    text = spectra.described(found["spectra"], "here").splitlines()
+    assert len(text) == 2 * len(found["spectra"]) + 1 and text[-1] == "medians of 5; here"
+    for one, first, second in zip(found["spectra"], text[::2], text[1::2], strict=False):
+        said = f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, zero at index "
+        assert first.startswith(f"{said}{one['zero_index']}, ") and second == f"  {one['source']}"
+        assert first.endswith(", ".join(f"{key} {value}" for key, value in one["settings"].items()))
     assert status == 0
     assert [(one["name"], one["rows"], one["windows"]) for one in found["spectra"]] == [
         ("vrp", 256, 144), ("trp", 1024, 392), ("vt", 123, 392),
     ]  # fmt: skip
     assert all(one["image_ms"] > 0 for one in found["spectra"])
+
+
+def test_a_spectrum_that_knows_its_gaps_is_timed_with_some(monkeypatch):
+    given = []
+    monkeypatch.setattr(Renderer, "image", lambda self, signal, *rest: given.append(signal))
+    config = load([ROOT / "config/default.yaml"], SCHEMA)
+    for times in ("even", "known"):
+        spectra.facts({**config, "spectra": {**config["spectra"], "times": times}})
+        assert len(given[-1]) == 400 and (given[-1][3::4] == 0).all() == (times == "known")
+        assert (abs(np.delete(given[-1], np.s_[3::4])) > 0).all()
 
 
 def test_targets_answer_from_mesh_to_picture(answer, tmp_path, monkeypatch):
