@@ -1,5 +1,6 @@
 """The built-in pedestrians: what the published model says, rigid bones, a seamless cycle, people who differ."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.common.yaml_files import load_yaml
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
+from lowalt.targets.make import make
 from lowalt.targets.records import load_table, merge, read_records
 from lowalt.targets.skeleton import FEET, NODES, PARENTS, rotation, stature_m
 
@@ -90,6 +94,16 @@ def test_cycle_closes_in_position_and_velocity(people):
         change = np.linalg.norm(turns, axis=2).max(axis=1)
         assert steps[-1].max() < 1.2 * steps[:-1].max()
         assert change[-2:].max() <= 1.2 * change[:-2].max()
+
+
+def test_clouds_are_the_default_s_to_the_byte(tmp_path):
+    """Each bone, angle and time of the built-in walks and runs is that of the kept run."""
+    kept = dict(line.split()[::-1] for line in (ROOT / "results/reference/default.sha256").read_text().splitlines())
+    seed = load_yaml(ROOT / "config/default.yaml")["seed"]
+    for name in RECORDS:
+        clouds.write(tmp_path / "cloud.npz", make(merge(TABLE[name], RECORDS[name], name), None, seed))
+        found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
+        assert found == kept[f"clouds/{slug(name)}.npz"], name
 
 
 def test_left_side_is_the_right_side_half_a_cycle_later():

@@ -3,6 +3,7 @@
 import hashlib
 import itertools
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from builtin_records import BIRDS, CARS, NAMES, RECORDS, TABLE, UAVS, WRITTEN
+from lowalt.common.files import slug
+from lowalt.common.yaml_files import load_yaml
 from lowalt.targets.assemble import turn
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES
@@ -17,11 +20,14 @@ from lowalt.targets.cloud import check, write
 from lowalt.targets.dimensions import rows as dimension_rows
 from lowalt.targets.surfaces import inside
 
+REFERENCE = Path(__file__).parents[1] / "results/reference/default.sha256"
+SEED = load_yaml("config/default.yaml")["seed"]
+
 
 @pytest.fixture(scope="module")
 def clouds():
-    """All thirty clouds of seed 1, by name."""
-    return {name: builtin_cloud(RECORDS[name], 1) for name in NAMES}
+    """All thirty clouds of the default's seed, by name."""
+    return {name: builtin_cloud(RECORDS[name], SEED) for name in NAMES}
 
 
 def rotated(cloud, part, angle):
@@ -196,9 +202,18 @@ def test_names_and_hinges_are_where_they_belong(clouds):
 def test_equal_seeds_give_equal_bytes_and_other_seeds_other_points(tmp_path, clouds):
     for name in ("DJI Avata", "Owl", "NIO ET5T 2023"):
         write(tmp_path / "first.npz", clouds[name])
-        write(tmp_path / "again.npz", builtin_cloud(RECORDS[name], 1))
+        write(tmp_path / "again.npz", builtin_cloud(RECORDS[name], SEED))
         assert (tmp_path / "first.npz").read_bytes() == (tmp_path / "again.npz").read_bytes()
         assert not np.array_equal(builtin_cloud(RECORDS[name], 2).points, clouds[name].points)
+
+
+def test_clouds_are_the_default_s_to_the_byte(tmp_path, clouds):
+    """Each length, angle and count of a built-in model, and each draw, is that of the kept run."""
+    kept = dict(line.split()[::-1] for line in REFERENCE.read_text().splitlines())
+    for name, cloud in clouds.items():
+        write(tmp_path / "cloud.npz", cloud)
+        found = hashlib.sha256((tmp_path / "cloud.npz").read_bytes()).hexdigest()
+        assert found == kept[f"clouds/{slug(name)}.npz"], name
 
 
 def test_subtypes_differ_physically():
