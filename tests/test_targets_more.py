@@ -1,5 +1,6 @@
 """Targets beyond the published forty: their records alone add them, and they move as their kind does."""
 
+import hashlib
 import io
 from pathlib import Path
 
@@ -10,12 +11,14 @@ from PIL import Image
 from lowalt.common import portable
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
+from lowalt.common.files import slug
 from lowalt.common.streams import stream
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw
 from lowalt.report.figures.motion_strip import motion_strip, view_of
 from lowalt.report.figures.target import target_animation
 from lowalt.targets import cyclist, quadruped
+from lowalt.targets.cloud import write
 from lowalt.targets.dimensions import estimates, own_cells, rows
 from lowalt.targets.gallery import bones
 from lowalt.targets.limbs import circle, joint
@@ -67,6 +70,15 @@ def test_each_is_as_large_as_its_row_says(clouds):
     counts = tail.record["points_by_part"]
     # Points go by the area of the blades: 4 x 10.97 x 0.335 and 2 x 1.89 x 0.199.
     assert counts["main rotor"] / counts["tail rotor"] == pytest.approx(14.70 / 0.75, rel=0.3)
+
+
+def test_clouds_are_the_kept_ones_to_the_byte(tmp_path, clouds):
+    """Each length, angle and count of the ten models; where a change is wanted, the sums found here are kept."""
+    for name, cloud in clouds.items():
+        write(tmp_path / f"{slug(name)}.npz", cloud)
+    found = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in tmp_path.iterdir()}
+    kept = (ROOT / "tests/data/more_clouds.sha256").read_text()
+    assert "".join(f"{found[name]}  {name}\n" for name in sorted(found)) == kept
 
 
 def test_a_propeller_turns_about_the_axis_to_the_front(clouds):
