@@ -39,11 +39,15 @@ _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download",
            "portable", "splits", "turns", "workflow_board")  # fmt: skip
 _MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "physics", "echo_command", "echo_hard",
             "recognition_price", "recognition_stream")  # fmt: skip
+_RECOGNITION = ("own_backbone", *(f"recognition{name}" for name in (
+    ".py", "_augment", "_choose", "_classical", "_data", "_distances", "_faults", "_features", "_fusion", "_made",
+    "_rates", "_rotor", "_shards", "_sharing", "_signals", "_start", "_tables", "_training", "_transfer")))  # fmt: skip
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
     "spectra": ("spectra", "tiles_device"),
     "shards": ("shards", "dataset"),
+    "recognition": _RECOGNITION,
     "targets": _TARGETS,
     "common": _COMMON,
     "commands": ("command", "gallery", "records_own"),
