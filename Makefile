@@ -165,7 +165,7 @@ gallery: $(BASE)  ## a page that links all runs and compares any two: results/in
 hard-cases: $(BASE)  ## inputs on which a naive formula fails, its error, ours and the bound: results/default/hard_cases.csv
 	$(BIN)/python -m lowalt.measure.hard_cases --out results/default/hard_cases.csv
 
-accuracy-cost: $(SETUP)  ## recognition accuracy over time: results/default/accuracy_cost.csv and .png
+accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .png
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
 	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
 	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost

@@ -36,7 +36,7 @@ def test_points_without_a_cost_are_on_no_front():
     assert statistics.pareto(np.array([np.nan, 2.0]), np.array([9.0, 1.0])).tolist() == [False, True]
 
 
-def run_of(folder, name, wrong, count=40):
+def run_of(folder, name, wrong, count=40, seed=0, took=12.5):
     """Predictions of 40 motion models of unseen and 40 of seen subtypes, the first `wrong` of each called wrong."""
     columns = {"group": np.repeat(["unseen", "seen"], 2 * count), "fold": np.full(4 * count, "test")}
     model = np.tile(np.arange(count).repeat(2), 2)
@@ -47,11 +47,11 @@ def run_of(folder, name, wrong, count=40):
         aspect_rad=np.ones((4 * count, 3)), **columns,
     )  # fmt: skip
     guess = np.where(model < wrong, (label + 1) % 4, label)
-    path = folder / f"{name}.csv"
+    path = folder / f"{name}-{seed}.csv"
     predictions.write(path, predictions.from_facts(facts, (0,), np.eye(4)[guess]))
     path.with_suffix(".json").write_text(json.dumps(
-        {"protocol": "unseen", "scheme": name, "seed": 0, "hardware": "here", "steps": 30, "train_samples": 77,
-         "train_processor_s": 12.5}))  # fmt: skip
+        {"protocol": "unseen", "scheme": name, "seed": seed, "hardware": "here", "steps": 30, "train_samples": 77,
+         "train_processor_s": took}))  # fmt: skip
     return Evaluated(path)
 
 
@@ -71,7 +71,15 @@ def table(tmp_path):
         "seeds,spread_points\nseen,ABC,rough,avg,50,60,-10,-12,-8,80,here,2,0.4\n"
         "unseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here,2,0.3\n"
     )
-    runs = [run_of(tmp_path, "small", 10), run_of(tmp_path, "base", 4)]
+    runs = [
+        run_of(tmp_path, name, wrong, seed=seed, took=took)
+        for name, wrong, seed, took in (
+            ("small", 9, 5, 12.0),
+            ("base", 4, 0, 1.0),
+            ("small", 11, 2, 13.0),
+            ("base", 4, 1, 1.0),
+        )
+    ]
     speeds = accuracy_cost.read_speeds(
         [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
     )
@@ -89,7 +97,11 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert (float(base["unseen_percent"]), float(small["unseen_percent"])) == (90.0, 75.0)
     assert (float(base["seen_percent"]), float(small["seen_percent"])) == (90.0, 75.0)
     assert (float(base["difference_points"]), float(small["difference_points"])) == (0.0, -15.0)
-    assert -30 < float(small["low"]) < -15 < float(small["high"]) < 0
+    assert -40 < float(small["low"]) < -15 < float(small["high"]) < 5
+    assert [row["seeds"] for row in (base, small)] == ["2", "2"]
+    # 72.5 and 77.5 % of the two trainings.
+    assert (base["spread_points"], float(small["spread_points"])) == ("0", pytest.approx(12.5**0.5, rel=1e-5))
+    assert (base["low"], base["high"]) == ("0", "0")
     assert (small["stations"], small["spectra"], small["network_bytes"]) == ("A", "VT", str(24**2))
     assert (small["steps"], small["train_samples"], float(small["core_s_training"])) == ("30", "77", 12.5)
     assert [float(row["train_ms"]) for row in (base, small, large)] == [3.0] * 3
@@ -98,7 +110,7 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert float(large["core_s_training"]) == pytest.approx(24.0)
     assert large["unseen_percent"] == large["seen_percent"] == large["front"] == ""
     assert (rough["scheme"], float(rough["high"])) == ("ABC trained on rough", 0.5)
-    assert (rough["seeds"], rough["spread_points"], base["spread_points"]) == ("2", "0.3", "")
+    assert (rough["seeds"], rough["spread_points"]) == ("2", "0.3")
     assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
 
 
@@ -108,6 +120,9 @@ def test_runs_without_speed_or_row_are_refused(table, tmp_path):
         accuracy_cost.write([run], order, {}, [], tmp_path / "out.csv", 1)
     with pytest.raises(InputError, match="stranger"):
         accuracy_cost.write([run_of(tmp_path, "stranger", 0)], order, {}, [], tmp_path / "out.csv", 1)
+    several = [run_of(tmp_path, "base", 0, seed=seed) for seed in (0, 1)] + [run_of(tmp_path, "small", 0)]
+    with pytest.raises(InputError, match=r"'base': 2, 'small': 1.*expected as many seeds of each"):
+        accuracy_cost.write(several, order, {"base": None, "small": None}, [], tmp_path / "out.csv", 1)
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match=r"bad\.json: not a record of speed"):
         accuracy_cost.read_speeds([tmp_path / "bad.json"])

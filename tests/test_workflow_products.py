@@ -31,7 +31,7 @@ def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
     assert run.trainings == [
         f"unseen/{scheme}/{seed}" for scheme in ("a-vrp-trp-vt", "abc-vrp-trp-vt") for seed in (4, 5)
     ]
-    assert run.priced == ["unseen/a-vrp-trp-vt/4", "unseen/abc-vrp-trp-vt/4"]
+    assert run.priced == run.trainings
     assert len(run.subtypes) == len(run.records) == 40
     assert run.data == run.name == "default"
 

@@ -8,15 +8,16 @@ Settings: seed. accuracy_cost.csv, one row a scheme and SNR ("avg": mean over th
                          accuracy, its core_s_training extrapolated from the time of one step; fidelity: the first
                          scheme trained on echoes at a tolerance and tested on exact ones
     backbone, pixels, stations, spectra, steps, train_samples, parameters    of the scheme
-    seen_percent         held-out motion models of the trained subtypes, unseen_percent: subtypes never trained on
-    difference_points    unseen less that of the first scheme (fidelity: of training on exact echoes), paired
-    low, high            its 95 % interval, which resamples whole motion models
+    seen_percent         held-out motion models of the trained subtypes, mean over the training seeds
+    unseen_percent       subtypes never trained on, likewise
+    difference_points    unseen less that of the first scheme (fidelity: of training on exact echoes)
+    low, high            its 95 % interval, which resamples training seeds, subtypes and motion models
     inference_ms_1, inference_ms_64    of one sample on one core in batches of 1 and 64, images in memory
     train_ms             of one sample of a training step on one core, images in memory
-    core_s_training      processor time of the whole training, validation included
+    core_s_training      processor time of the whole training, validation included; mean over the seeds
     network_bytes        bytes of images, signals or features a sample that the network takes in; shard_bytes: bytes a
                          sample in the shards
-    seeds, spread_points fidelity: training seeds, and the standard deviation of accuracy between a model's seeds
+    seeds, spread_points training seeds, and the standard deviation of unseen accuracy between them
     front                the rows of an SNR that no other beats in unseen accuracy at equal or less inference_ms_64
 """
 
@@ -34,8 +35,8 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
 from lowalt.common.network import station_names
 from lowalt.common.streams import stream
+from lowalt.recognition.compared import difference, spread_points
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names
 from lowalt.recognition.statistics import accuracy_by, pareto
 from lowalt.recognition.tables import snr_text
@@ -121,25 +122,27 @@ def _shares(run: Evaluated, part: str) -> dict[str, float]:
     return {**table, "avg": float(np.mean(list(table.values())))} if table else {}
 
 
-def trained_rows(run: Evaluated, base: Evaluated, entry: Entry, seed: int) -> list[dict]:
-    """Return one row an SNR and one for their average of a trained scheme, compared with `base` on the same samples."""
-    if not np.array_equal(run.test.key, base.test.key):
-        raise InputError(f"{run.scheme} and {base.scheme} were tested on different samples")
+def trained_rows(runs: list[Evaluated], base: list[Evaluated], entry: Entry, seed: int) -> list[dict]:
+    """Return one row an SNR and one for their average of a trained scheme, compared with `base` on the same samples.
+
+    runs, base: trainings of the scheme and of the first scheme, one a seed. Raises: as `compared.difference`.
+    """
+    about = runs[0].about
     same = {
-        **_what(entry), "kind": "trained", "steps": run.about["steps"],
-        "train_samples": run.about["train_samples"], "core_s_training": run.about["train_processor_s"],
+        **_what(entry), "kind": "trained", "steps": about["steps"], "train_samples": about["train_samples"],
+        "core_s_training": float(np.mean([run.about["train_processor_s"] for run in runs])), "seeds": len(runs),
     }  # fmt: skip
-    seen, unseen = _shares(run, "seen_test"), _shares(run, "test")
+    seen, unseen = ([_shares(run, part) for run in runs] for part in ("seen_test", "test"))
     rows = []
-    for snr in unseen:
-        chosen = slice(None) if snr == "avg" else run.test.snr_db == float(snr)
-        interval = paired_difference(
-            run.test.motion[chosen], run.test.correct[chosen], base.test.correct[chosen],
-            stream(seed, "price", run.scheme, snr),
-        )  # fmt: skip
-        difference, low, high = (100 * value for value in interval)
-        found = {"snr_db": snr, "seen_percent": seen.get(snr), "unseen_percent": unseen[snr]}
-        rows.append({**same, **found, "difference_points": difference, "low": low, "high": high})
+    for snr in unseen[0]:
+        generator = stream(seed, "price", runs[0].scheme, snr)
+        interval = difference(runs, base, generator, None if snr == "avg" else float(snr))
+        points, low, high = (100 * value for value in interval)
+        reached = [shares[snr] for shares in unseen]
+        found = {"snr_db": snr, "unseen_percent": float(np.mean(reached)), "spread_points": spread_points(reached)}
+        if snr in seen[0]:
+            found["seen_percent"] = float(np.mean([shares[snr] for shares in seen]))
+        rows.append({**same, **found, "difference_points": points, "low": low, "high": high})
     return rows
 
 
@@ -186,12 +189,17 @@ def write(
     order: names of the table of schemes; timed: as `entries` gives it.
     Raises: InputError for a run without a scheme or a speed.
     """
-    by_name = {run.scheme: run for run in runs}
+    by_name: dict[str, list[Evaluated]] = {}
+    for one in sorted(runs, key=lambda one: one.seed):
+        by_name.setdefault(one.scheme, []).append(one)
     order = [name for name in order if name in by_name]
     lacking = sorted(set(by_name) - set(order)) or sorted(set(order) - set(timed))
     if lacking or not order:
         raise InputError(f"{lacking}: no row in the table of schemes, or no record of speed")
     base = by_name[order[0]]
+    counts = {name: len(by_name[name]) for name in order}
+    if len(set(counts.values())) > 1:
+        raise InputError(f"trainings a scheme: {counts}, expected as many seeds of each")
     rows: list[dict] = []
     for name in order:
         rows += trained_rows(by_name[name], base, timed[name], seed)
@@ -203,7 +211,9 @@ def write(
 def main(arguments: list[str]) -> None:
     """Write the table from predictions and measured speeds."""
     options = parser("lowalt.measure.accuracy_cost", __doc__.splitlines()[0])
-    options.add_argument("--predictions", nargs="+", required=True, help="predictions of the unseen protocol (.csv)")
+    options.add_argument(
+        "--predictions", nargs="+", required=True, help="predictions of the unseen protocol, all seeds (.csv)"
+    )
     options.add_argument("--speeds", nargs="+", required=True, help="files of lowalt.measure.network_speed (.json)")
     options.add_argument("--index", required=True, help="index of the shards: bytes a sample")
     options.add_argument("--fidelity", help="transfer.csv of models trained on echoes at a tolerance")

@@ -30,9 +30,9 @@ from lowalt.common.classes import word
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
+from lowalt.recognition import compared
 from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent, reliability_rows
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.macro_f1 import f1_by_snr
 from lowalt.recognition.orderings import CLAIMS, ordering_rows
 from lowalt.recognition.predictions import Predictions
@@ -119,15 +119,10 @@ def comparison_rows(first: list[Evaluated], second: list[Evaluated], seed: int) 
     Difference in percentage points, mean over the seeds; seeds: the fewer of the two schemes' trainings.
     Raises: InputError where the schemes were tested on different samples.
     """
-    one, other = first[0].test, second[0].test
-    if not np.array_equal(one.key, other.key):
-        raise InputError(f"{first[0].scheme} and {second[0].scheme} were tested on different samples")
-    shares = [model_shares(one.motion, [run.test.correct for run in runs]) for runs in (first, second)]
-    (place, count, ours), (*_, theirs) = shares
-    whole, seeds = first[0].protocol == "unseen", min(len(first), len(second))
+    seeds = min(len(first), len(second))
     generator = stream(seed, "bootstrap", first[0].protocol, first[0].scheme, second[0].scheme)
-    interval = strict_difference(ours, theirs, count, one.subtype[place], whole, generator)
-    levels = ["seeds"] * (seeds > 1) + ["subtypes"] * whole + ["motion models"]
+    interval = compared.difference(first, second, generator)
+    levels = ["seeds"] * (seeds > 1) + ["subtypes"] * compared.whole_subtypes(first) + ["motion models"]
     yield [", ".join(levels), seeds, *map(percent, interval)]
 
 

@@ -6,11 +6,11 @@ transfer.csv, one row a protocol, scheme, other run and SNR ("avg": mean over th
     trained_on                   the other run
     accuracy_percent             of the other run's model on this run's test samples, several seeds averaged
     own_percent                  of this run's own model
-    difference_points, low, high other less own, with the 95 % interval that resamples whole motion models
+    difference_points, low, high other less own, with the 95 % interval that resamples training seeds, in the unseen
+                                 protocol subtypes, and motion models
     samples, hardware            of this run's test part
     seeds, spread_points         training seeds of the other's model, and the standard deviation of accuracy between the
-                                 seeds of a model, pooled over both models (empty for one seed): the effect of another
-                                 training, which the interval leaves out
+                                 seeds of a model, pooled over both models (empty for one seed)
 """
 
 from collections.abc import Iterable
@@ -21,8 +21,8 @@ import numpy as np
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
+from lowalt.recognition import compared
 from lowalt.recognition.evaluated import Evaluated
-from lowalt.recognition.intervals import paired_difference
 from lowalt.recognition.tables import snr_text
 
 COLUMNS = (
@@ -64,19 +64,12 @@ def comparison(own: list[Evaluated], other: list[Evaluated], name: str, seed: in
         rows = slice(None) if snr is None else test.snr_db == snr
         word = "avg" if snr is None else snr_text(snr)
         generator = stream(seed, "transfer-bootstrap", own[0].protocol, own[0].scheme, name, word)
-        interval = paired_difference(test.motion[rows], theirs[rows], mine[rows], generator)
+        interval = compared.difference(other, own, generator, snr)
         numbers = [f"{100 * value:.4f}" for value in (theirs[rows].mean(), mine[rows].mean(), *interval)]
-        accuracies = [[run.test.correct[rows].mean() for run in runs] for runs in (own, other)]
-        yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), _spread(accuracies)]
-
-
-def _spread(groups: list[list[float]]) -> str:
-    """Pooled standard deviation of accuracies between seeds in points; empty where no model has two seeds."""
-    several = [100 * np.array(group) for group in groups if len(group) > 1]
-    if not several:
-        return ""
-    freedom = sum(len(group) - 1 for group in several)
-    return f"{np.sqrt(sum(((group - group.mean()) ** 2).sum() for group in several) / freedom):.4f}"
+        spread = compared.spread_points(
+            *([100 * run.test.correct[rows].mean() for run in runs] for runs in (own, other))
+        )
+        yield [word, *numbers, len(mine[rows]), own[0].hardware, len(other), "" if spread is None else f"{spread:.4f}"]
 
 
 def write(own: list[Evaluated], other: list[Evaluated], order: list[str], out: str | Path, seed: int) -> None:

@@ -199,8 +199,9 @@ class Run:
 
     @cached_property
     def priced(self) -> list[str]:
-        """The trainings whose accuracy is set against their cost: the unseen protocol, the first training seed."""
-        return [f"unseen/{scheme.slug}/{self.config['recognition']['seeds'][0]}" for scheme in self.trained]
+        """The trainings whose accuracy is set against their cost: the unseen protocol, all training seeds."""
+        seeds = self.config["recognition"]["seeds"]
+        return [f"unseen/{scheme.slug}/{seed}" for scheme in self.trained for seed in seeds]
 
     @cached_property
     def asked(self) -> Scheme:
