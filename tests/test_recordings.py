@@ -29,7 +29,7 @@ def entry(folder: Path, file: str, channel: str, **more):
 def test_every_format_gives_the_same_complex_samples(tmp_path):
     values = tone(200.0)
     pair = np.stack([values.real, values.imag], axis=1)
-    savemat(tmp_path / "a.mat", {"Sig": pair})
+    savemat(tmp_path / "a.mat", {"Sig": pair, "rate": RATE})
     np.savetxt(tmp_path / "b.csv", pair, delimiter=",", header="i,q", comments="", fmt="%.18g")
     np.save(tmp_path / "c.npy", values)
     wavfile.write(tmp_path / "d.wav", int(RATE), pair)

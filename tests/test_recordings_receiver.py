@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lowalt.common.errors import InputError
-from lowalt.recordings import ablate, kinds
+from lowalt.recordings import ablate, kinds, reality
 from lowalt.recordings.library import Library
 from lowalt.recordings.presence import ENOUGH, noise_floor, present
 from lowalt.recordings.receiver import Receiver, clipped, highpassed, received
@@ -69,6 +69,36 @@ def test_the_floor_is_the_mean_of_the_noise_whatever_its_colour_and_number():
         # neighbours counts, which lies higher.
         wanted = {1: np.log(2), 3: np.log(2), 40: 1.46}[count]
         assert np.mean(floor[300:-300] / colour[300:-300]) == pytest.approx(wanted, rel=0.05)
+
+
+def test_the_floor_follows_a_hill_and_not_a_line():
+    power = np.ones((1, 1000))
+    # The median reaches 0.5 m/s to either side: a hill of 0.6 m/s is floor, a line of 0.4 m/s is none.
+    power[:, 200:260] = 5.0
+    power[:, 600:640] = 7.0
+    np.testing.assert_array_equal(noise_floor(power, 0.01), np.where(power[0] == 5.0, 5.0, 1.0))
+
+
+def test_balanced_accuracy_counts_every_class_alike_and_every_file_once():
+    def row(radar, seed, folder, half, file, label, windows, right):
+        return [radar, seed, folder, half, file, label, windows, 0, 0, 0, 0, right]
+
+    test = "test"
+    rows = [
+        row("cw", "mean", "one", test, "a", "Bird", 10, 40.0), row("cw", "mean", "two", test, "a", "Bird", 20, 80.0),
+        row("cw", "mean", "one", test, "b", "UAV", 5, 90.0), row("cw", 0, "one", test, "b", "UAV", 5, 0.0),
+        row("fm", "mean", "one", test, "c", "UAV", 7, 30.0), row("cw", "mean", "one", "tuning", "d", "UAV", 3, 10.0),
+    ]  # fmt: skip
+    found = {tuple(line[:3]): line[3:] for line in reality.accuracy(rows, 1)}
+    assert {key: line[:3] for key, line in found.items()} == {
+        ("cw", "tuning", "UAV"): [1, 3, 10.0], ("all", "tuning", "balanced"): [1, 3, 10.0],
+        ("cw", "test", "Bird"): [2, 30, 60.0], ("cw", "test", "UAV"): [1, 5, 90.0],
+        ("cw", "test", "balanced"): [3, 35, 75.0], ("fm", "test", "UAV"): [1, 7, 30.0],
+        ("all", "test", "balanced"): [4, 42, 60.0],
+    }  # fmt: skip
+    # Two files of a class are drawn with replacement: both bounds are reached, and a class of one file stays.
+    assert found["cw", "test", "Bird"][3:] == [40.0, 80.0, 25.0] and found["cw", "test", "UAV"][3:5] == [90.0, 90.0]
+    assert found["cw", "test", "balanced"][3:5] == [65.0, 85.0]
 
 
 def test_coloured_noise_and_a_line_that_stays_are_no_target():
@@ -172,6 +202,9 @@ def test_an_ablation_changes_what_it_names_and_pairs_its_differences(library):
     row = lambda seed, file, label, right: ["cw", seed, "set", "tuning", file, label, 10, 0, 0, 0, 0, right]  # noqa: E731
     rows = [row(s, f, "Bird", r) for f, s, r in (("a", 0, 50.0), ("a", 1, 70.0), ("b", 0, 90.0), ("b", 1, 90.0))]
     rows += [row("mean", "a", "Bird", 0.0), row(0, "c", "UAV", 40.0), row(1, "c", "UAV", 40.0)]
+    # A file of the same name in another set is another file.
+    elsewhere = [[*line[:2], "other", *line[3:]] for line in rows[:2]]
+    assert ablate.shares([*rows, *elsewhere])["Bird"].tolist() == [[50.0, 70.0], [90.0, 90.0], [50.0, 70.0]]
     full = ablate.shares(rows)
     np.testing.assert_array_equal(full["Bird"], [[50.0, 70.0], [90.0, 90.0]])
     own = {label: values - 10.0 for label, values in full.items()}
