@@ -35,8 +35,8 @@ COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_t
 """`survived_first`: before tests were added; `equivalent`: survivors that change no result, by their verdict;
 `killed_percent`: of the faults tried except these; `low_percent`, `high_percent`: its 95 % interval."""
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
-_COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "noise", "plan",
-           "portable", "splits", "turns", "workflow_board")  # fmt: skip
+_COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "hardware", "noise",
+           "plan", "portable", "splits", "turns", "workflow_board")  # fmt: skip
 _MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "physics", "echo_command", "echo_hard",
             "recognition_price", "recognition_stream")  # fmt: skip
 _RECOGNITION = ("own_backbone", *(f"recognition{name}" for name in (
