@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,7 @@ from lowalt.report.tables import by_scheme, confusion
 from pages import browsed, sound
 
 REFERENCE = "results/reference/default"
+LOOKS = Path(__file__).parent / "data/plots.jsonl"
 
 
 def table(name):
@@ -37,6 +39,19 @@ def one_of_each():
 @pytest.fixture(scope="module")
 def plots():
     return {plot.name: plot for plot in one_of_each()}
+
+
+def test_plots_look_as_kept(plots, tmp_path):
+    """Each mark, size, colour, scale and title; where a change is wanted, the file written here is kept."""
+    # Times and errors that are measured again leave the kept looks as they are.
+    measured = {"added_ms": "0.5", "relative_error": "1e-9", "seconds": "0.02", "points": "171"}
+    some = [cost_plots.echo([{**row, **measured} for row in table("cost")[:2]]),
+            cost_plots.effects([{**row, **measured} for row in table("effects")[:3]])]  # fmt: skip
+    found = {name: plot.spec for name, plot in (plots | {plot.name: plot for plot in some}).items()}
+    text = "".join(f"{json.dumps({name: spec}, sort_keys=True)}\n" for name, spec in found.items())
+    (tmp_path / "plots.jsonl").write_text(text)
+    for one, kept in zip(text.splitlines(), LOOKS.read_text().splitlines(), strict=True):
+        assert json.loads(one) == json.loads(kept)
 
 
 def test_every_accuracy_of_the_table_is_a_point(plots):
