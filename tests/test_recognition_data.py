@@ -60,6 +60,9 @@ def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
     assert small.settled(block) == {"size": 24, "training": {"steps": 70, "batch": 4}, "seed": 1}
     assert plain.settled(block) == block
     assert (small.share, plain.share) == (0.25, 1.0)
+    bare = schemes.Scheme("plain", (0,), (2,))
+    assert bare.settled(block) == block and (bare.share, bare.sees, bare.fusion) == (1.0, "images", "attention")
+    assert bare.protocols == ("seen", "unseen")
     for column, value in (("size", "4"), ("steps", "0"), ("share", "1.5"), ("share", "half")):
         path.write_text(f"{','.join((*schemes.COLUMNS, column))}\nx,A,VT,mean,,seen,{value}\n")
         with pytest.raises(InputError, match=f"{column} '{value}'"):
