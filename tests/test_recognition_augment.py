@@ -33,6 +33,36 @@ def test_all_views_of_a_sample_move_together_and_samples_apart():
     assert len(np.unique(moved[:, 0].reshape(30, -1), axis=0)) > 20
 
 
+def test_every_shift_and_mask_up_to_its_share_occurs_and_none_beyond():
+    """500 images of 20 rows and 10 columns: shifts by up to a fifth, masks of up to half, anywhere."""
+    dot = np.zeros((500, 1, 20, 10), np.uint8)
+    dot[:, :, 10, 5] = 200
+    for key, axis, reach in (("shift_doppler", 0, 4), ("shift_time", 1, 2)):
+        moved = np.argwhere(augment(dot, [0], block(**{key: 0.2}), stream(5, key))[:, 0] == 200)[:, 1:] - [10, 5]
+        assert (moved[:, 1 - axis] == 0).all() and sorted(set(moved[:, axis].tolist())) == list(
+            range(-reach, reach + 1)
+        )
+        # All shifts are equally probable but the two ends, which are half as probable.
+        assert abs(moved[:, axis].mean()) < 0.2 * reach and (moved[:, axis] == reach).sum() < 0.75 * 500 / 2 / reach
+    full = np.full_like(dot, 77)
+    for key, axis, size in (("mask_doppler", 0, 20), ("mask_time", 1, 10)):
+        blank = (augment(full, [0], block(**{key: 0.5}), stream(5, key))[:, 0] == 0).all(2 - axis)
+        found = {(int(line.argmax()), int(line.sum())) for line in blank if line.any()}
+        assert {count for _, count in found} == set(range(1, size // 2))
+        assert min(first for first, _ in found) == 0 and max(sum(one) for one in found) == size
+        # A mask is one band, and half of the places are in the upper half.
+        assert all(line.sum() == 1 + np.ptp(np.flatnonzero(line)) for line in blank if line.any())
+        assert blank[:, : size // 2].sum() == pytest.approx(blank[:, size // 2 :].sum(), rel=0.2)
+
+
+def test_contrast_raises_to_powers_between_a_half_and_two_and_each_sample_has_its_own():
+    grey = np.full((300, 1, 1, 1), 64, np.uint8)
+    found = augment(grey, [0], block(contrast=1.0), stream(6, "a")).ravel()
+    # 255 (64 / 255)^2 = 16 and 255 (64 / 255)^0.5 = 128.
+    assert 16 <= found.min() < 18 and 124 < found.max() <= 128 and len(set(found.tolist())) > 80
+    assert np.median(found) == pytest.approx(64, abs=6)
+
+
 def test_mirror_turns_doppler_and_never_time():
     ramp = np.zeros((1, 2, 8, 8), np.uint8)
     ramp[..., 1, 2] = 200
