@@ -1,5 +1,7 @@
 """Augmentation: one draw for all views of a sample, along Doppler but never turned in time, blank at the zero index."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,14 @@ def test_every_shift_and_mask_up_to_its_share_occurs_and_none_beyond():
         # A mask is one band, and half of the places are in the upper half.
         assert all(line.sum() == 1 + np.ptp(np.flatnonzero(line)) for line in blank if line.any())
         assert blank[:, : size // 2].sum() == pytest.approx(blank[:, size // 2 :].sum(), rel=0.2)
+
+
+@pytest.mark.parametrize(("key", "axis", "masked"), [("mask_doppler", 0, 9), ("mask_time", 1, 4)])
+def test_the_last_place_of_the_widest_mask_is_the_edge(key, axis, masked):
+    largest = SimpleNamespace(random=lambda shape: np.full(shape, np.nextafter(1, 0)))
+    blank = augment(np.full((1, 1, 20, 10), 77, np.uint8), [0], block(**{key: 0.5}), largest)[0, 0] == 0
+    size = (20, 10)[axis]
+    assert np.flatnonzero(blank.all(1 - axis)).tolist() == list(range(size - masked, size))
 
 
 def test_contrast_raises_to_powers_between_a_half_and_two_and_each_sample_has_its_own():
