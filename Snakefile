@@ -27,6 +27,7 @@ include: "workflow/rules/report.smk"
 
 onstart:
     print(RUN.sources, file=sys.stderr)
+    RUN.launch.before(workflow)
     space_check.before(workflow, RUN.plan, config)
 
 

@@ -94,15 +94,6 @@ def test_trainings_of_more_images_start_first():
     assert places == {"a-vrp-trp-vt": 3, "abc-vrp-trp-vt": 9}
 
 
-def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_is_not():
-    assert (run_of().launcher, run_of().processes) == ("", 1)
-    run = run_of({"recognition": {"processes": 4}})
-    assert run.launcher == "lowalt.recognition.gpus 4 torch.distributed.run --standalone --nproc-per-node 4 -m"
-    assert run.gpus == 0 and run_of({"recognition": {"processes": 4, "gpu": True}}).gpus == 4
-    with pytest.raises(InputError, match=r"recognition\.processes: value 0"):
-        run_of({"recognition": {"processes": 0}})
-
-
 def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
     _, products, _ = parts({"shards": {"kind": "signal"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
     assert products.shard_content(CHUNK) == {"signals": "results/default/noisy/seen-00001.npy"}

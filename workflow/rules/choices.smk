@@ -23,7 +23,7 @@ rule trial:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"]
     resources:
-        gpu=min(1, RUN.gpus),
+        gpu=int(RUN.launch.gpu),
     params:
         settings=settings.trial,
         stations=RUN.stations,

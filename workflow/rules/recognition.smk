@@ -104,12 +104,12 @@ rule train:
     priority: scheduling.by_job(RUN.images_of_job)
     conda:
         "../../envs/environment.yaml"
-    threads: config["recognition"]["training"]["threads"] * RUN.processes
+    threads: config["recognition"]["training"]["threads"] * RUN.launch.per_node
     resources:
-        gpu=RUN.gpus,
+        **RUN.launch.training,
     params:
         settings=settings.training,
-        launcher=RUN.launcher,
+        launcher=RUN.launch.words,
         source=options.samples,
         extra=options.extra,
         stream=options.stream,
@@ -142,7 +142,7 @@ rule evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        gpu=min(1, RUN.gpus),
+        **RUN.launch.evaluation,
     params:
         settings=settings.evaluation,
         source=options.samples,
@@ -196,7 +196,7 @@ rule transfer_evaluate:
         "../../envs/environment.yaml"
     threads: config["recognition"]["evaluation"]["threads"]
     resources:
-        gpu=min(1, RUN.gpus),
+        **RUN.launch.evaluation,
     params:
         settings=settings.evaluation,
         source=options.samples,

@@ -1,6 +1,7 @@
 """Class probabilities from a network, on one machine or over ranks: every rank count gives the same bits."""
 
 import contextlib
+import hashlib
 import os
 from dataclasses import dataclass
 
@@ -9,6 +10,7 @@ import torch
 from torch import distributed, nn
 
 from lowalt.common.command import pick
+from lowalt.common.errors import InputError
 from lowalt.recognition import gpus
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.samples import ViewSamples
@@ -64,6 +66,23 @@ class Machine:
     def parallel(self, model: nn.Module) -> nn.Module:
         """Return the model, wrapped for gradient exchange where there are several ranks."""
         return model if self.ranks == 1 else nn.parallel.DistributedDataParallel(model)
+
+    def agree(self, identity: str, steps: int) -> None:
+        """Refuse ranks that train unlike things, or from unlike steps, without a sign of it in any result.
+
+        identity: all that determines the weights; steps: those done before. Raises: InputError on every rank.
+        """
+        if self.ranks == 1:
+            return
+        number = int(hashlib.sha256(f"{steps} {identity}".encode()).hexdigest()[:12], 16)
+        bounds = torch.tensor([number, -number], device=self.device)
+        distributed.all_reduce(bounds, distributed.ReduceOp.MAX)
+        if int(bounds.sum()):
+            raise InputError(
+                f"training: rank {self.rank} computes in {self.precision} and stands at step {steps}, another rank "
+                "differs in that or in its samples; expected nodes of one kind that see the same files (a set "
+                "training.precision, not auto, makes unlike nodes compute alike)"
+            )
 
 
 def evaluation(block: dict) -> list:

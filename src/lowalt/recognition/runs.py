@@ -83,6 +83,7 @@ def train(
     # Weights that come from another training are a candidate as they are.
     trainer.validates_first = start is not None
     resumed = trainer.resume()
+    machine.agree(name, trainer.at.steps)
     if resumed and machine.rank == 0:
         print(f"{folder}: resumed at step {trainer.at.steps}", file=sys.stderr)
     if events and machine.rank == 0:

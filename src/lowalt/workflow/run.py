@@ -20,6 +20,7 @@ from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named as spectra_named
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.settings import Images
+from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
     refuse_data,
     refuse_extra,
@@ -93,6 +94,7 @@ class Run:
             # An overlay may train less; a name that no table has is a slip.
             named(block["table"], name.partition("/")[2], run.stations)
         refuse_starts(run.starts, run.pairs)
+        Launch.of(block)
         return run
 
     @property
@@ -178,24 +180,10 @@ class Run:
         folder = f"results/{wildcards.run}/models/{protocol}/{self.schemes[name].slug}"
         return {"start": f"{folder}/{wildcards.train_seed}/model.pt"}
 
-    @property
-    def processes(self) -> int:
-        """Processes that share one training."""
-        return self.config["recognition"].get("processes", 1)
-
-    @property
-    def launcher(self) -> str:
-        """The words between `python -m` and the training's module: GPUs and torchrun for several processes, none for
-        one, which chooses its GPU itself."""
-        count = self.processes
-        if count == 1:
-            return ""
-        return f"lowalt.recognition.gpus {count} torch.distributed.run --standalone --nproc-per-node {count} -m"
-
-    @property
-    def gpus(self) -> int:
-        """GPUs that the scheduler reserves for one training: one a process where the configuration asks for them."""
-        return self.processes if self.config["recognition"].get("gpu", False) else 0
+    @cached_property
+    def launch(self) -> Launch:
+        """How a training is launched."""
+        return Launch.of(self.config["recognition"])
 
     @cached_property
     def priced(self) -> list[str]:
