@@ -78,10 +78,12 @@ def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatc
     assert workflow.SNAKEFILE.is_file()
     assert main(["run", str(tmp_path / "none.yaml")]) == 2
     assert "configuration: no file at" in capsys.readouterr().err
-    monkeypatch.setattr(workflow.subprocess, "run", lambda line: given(returncode=7))
-    with pytest.raises(SystemExit) as ended:
-        main(["run"])
-    assert ended.value.code == 7
+    # 137 is how shells name the end by SIGKILL.
+    for code, seen in ((7, 7), (-9, 137)):
+        monkeypatch.setattr(workflow.subprocess, "run", lambda line, code=code: given(returncode=code))
+        with pytest.raises(SystemExit) as ended:
+            main(["run"])
+        assert ended.value.code == seen
     monkeypatch.setattr(workflow, "SNAKEFILE", tmp_path / "Snakefile")
     assert main(["run"]) == 2 and "has no workflow" in capsys.readouterr().err
 

@@ -152,7 +152,8 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
         )  # fmt: skip
     handler.emit(record("Finished", event="job_finished", job_id=1))
     handler.emit(record("error", logging.ERROR, event="job_error", jobid=2, rule_name="echo", log=["job.log"]))
-    handler.emit(record("CalledProcessError ...", logging.ERROR, event="error", exception="CalledProcessError"))
+    for name, said in (("CalledProcessError", "C"), ("RuleException", "RuleException:\nC")):
+        handler.emit(record(f"{said}alledProcessError in file x", logging.ERROR, event="error", exception=name))
     handler.emit(record("took over a lock", logging.WARNING))
     handler.close()
     lines = handler._stream.getvalue().splitlines()
@@ -162,6 +163,30 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
     assert lines[18] == "took over a lock" and lines[19].startswith("all  1/3 jobs") and len(lines) == 20
     (kept,) = status.read()
     assert kept["state"] == "failed"
+
+
+def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    wrong = record("WorkflowError:\nno room", logging.ERROR, event="error", exception="WorkflowError")
+    ctrl_c = record("Terminating processes on user request, this might take some time.")
+    for records, state in (([], "ended"), ([wrong], "failed"), ([ctrl_c, wrong], "interrupted")):
+        handler = handler_of()
+        handler.emit(record("run", event="run_info", stats={"echo": 2, "total": 2}))
+        for one in records:
+            handler.emit(one)
+        handler.close()
+        assert status.read()[-1]["state"] == state
+
+
+def test_a_run_on_another_machine_lives_while_its_file_is_fresh(tmp_path):
+    folder = tmp_path / "status"
+    folder.mkdir()
+    status.write(board_of(), "running", folder)
+    (kept,) = status.read(folder)
+    there = kept | {"host": "login-2", "pid": 2**22 + 1}
+    assert status.alive(there) and not status.alive(there | {"written": kept["written"] - 2 * status.FRESH_S})
+    assert not status.alive(there | {"state": "ended"})
+    assert status.describe(there, kept["written"]).startswith(f"process {2**22 + 1} of login-2: running, 0:00 ago")
 
 
 def test_a_full_disk_is_named_once_where_the_logs_of_jobs_have_no_room(monkeypatch, capsys):

@@ -40,6 +40,9 @@ NOISE = (
 )  # fmt: skip
 """Beginnings of messages that say nothing about this run."""
 
+INTERRUPTED = "on user request"
+"""Part of the message with which Snakemake answers Ctrl-C and SIGTERM."""
+
 
 def quiet_on_a_full_disk(file: logging.FileHandler, record: logging.LogRecord) -> None:
     """Report that a line could not be written to a log file, unless its disk is full: then the run itself says so.
@@ -72,7 +75,7 @@ class LogHandler(LogHandlerBase):
         self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
-        self._full = False
+        self._full, self._outcome = False, "ended"
         # Snakemake keeps its own log on the run's disk.
         logging.FileHandler.handleError = quiet_on_a_full_disk
         self._guard, self._stop = threading.RLock(), threading.Event()
@@ -97,7 +100,7 @@ class LogHandler(LogHandlerBase):
         with self._guard:
             if self._board:
                 self._erase()
-                self._keep("failed" if any(stage.failed for stage in self._board.stages.values()) else "ended")
+                self._keep(self._outcome)
                 print(self._board.total(time.time()), file=self._stream, flush=True)
                 self._board = None
         super().close()
@@ -126,7 +129,10 @@ class LogHandler(LogHandlerBase):
             self._fail(record)
         elif event not in QUIET and not self._noise(record):
             self._say(self._plain.format(record))
+        if INTERRUPTED in str(record.msg):
+            self._outcome = "interrupted"
         if event == LogEvent.JOB_ERROR or record.levelno >= logging.ERROR:
+            self._outcome = "failed" if self._outcome == "ended" else self._outcome
             self._say_full(str(record.msg))
 
     def _say_full(self, text: str) -> None:
@@ -142,9 +148,9 @@ class LogHandler(LogHandlerBase):
     @staticmethod
     def _noise(record: logging.LogRecord) -> bool:
         """Whether a record says nothing that the display does not say."""
-        # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
-        failed = getattr(record, "exception", None) == "CalledProcessError"
         text = record.getMessage() if record.msg is not None else ""
+        # The command of a failed job stands in Snakemake's own log; its error is shown by `_fail`.
+        failed = hasattr(record, "exception") and "CalledProcessError" in text[:200]
         return failed or (record.levelno <= logging.INFO and (not text or text == "None" or text.startswith(NOISE)))
 
     def _start(self, record: logging.LogRecord) -> None:

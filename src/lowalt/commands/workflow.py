@@ -50,7 +50,7 @@ def command(given: argparse.Namespace) -> list[str]:
     overlays = [*given.overlay, *given.configfile]
     for path in overlays:
         if not path.is_file():
-            raise InputError(f"configuration: no file at {path}")
+            raise InputError(f"configuration: no file at {path} (a rule or file to make is named by --target)")
         load_yaml(path)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
     cores = given.cores or (None if given.profile else "all")
@@ -62,6 +62,11 @@ def command(given: argparse.Namespace) -> list[str]:
     return [*line, "--", *given.target] if given.target else line
 
 
+def exit_status(code: int) -> int:
+    """Return a status as shells give it: 128 and the signal's number for a process that a signal ended."""
+    return code if code >= 0 else 128 - code
+
+
 def ended(given: argparse.Namespace) -> dict:
     """Run Snakemake in this folder and return its exit status, and with `given.json` what happened.
 
@@ -71,13 +76,13 @@ def ended(given: argparse.Namespace) -> dict:
     """
     line = command(given)
     if not given.json:
-        return {"status": subprocess.run(line).returncode}
+        return {"status": exit_status(subprocess.run(line).returncode)}
     begun = time.time()
     with tempfile.TemporaryDirectory() as folder:
         jobs = Path(folder, "jobs")
-        status_code = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)}).returncode
+        ran = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)})
         planned = [json.loads(text) for text in jobs.read_text().splitlines()] if jobs.exists() else []
-    answer = {"status": status_code, "command": line, "seconds": time.time() - begun}
+    answer = {"status": exit_status(ran.returncode), "command": line, "seconds": time.time() - begun}
     if given.dry_run:
         return answer | {"jobs": planned}
     kept = [entry for entry in status.read() if entry["written"] >= begun]

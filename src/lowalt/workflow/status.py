@@ -6,6 +6,7 @@ the next run starts there; the command shows runs that live, else the one that e
 
 import json
 import os
+import socket
 import sys
 import time
 from pathlib import Path
@@ -19,11 +20,17 @@ FOLDER = Path(".snakemake/status")
 PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
 """Variable of the environment with the file to which a dry run adds each job that would run, a JSON object a line."""
 
+FRESH_S = 60.0
+"""A run writes its state every second; clocks and caches of machines that share a disk may differ by more."""
+
 
 def write(board: Board, state: str, folder: Path = FOLDER) -> None:
-    """Keep the state of this process's run: "running", "ended" or "failed"."""
+    """Keep the state of this process's run: "running", "ended", "failed" or "interrupted"."""
     pid = os.getpid()
-    kept = {"pid": pid, "process": started(pid), "state": state, "written": time.time(), "board": board.kept()}
+    kept = {
+        "pid": pid, "process": started(pid), "host": socket.gethostname(), "state": state, "written": time.time(),
+        "board": board.kept(),
+    }  # fmt: skip
     path = folder / f"{pid}.json"
     if not path.exists():
         _sweep(folder)
@@ -32,7 +39,9 @@ def write(board: Board, state: str, folder: Path = FOLDER) -> None:
 
 
 def alive(kept: dict) -> bool:
-    """Return whether the process of a run lives on this machine."""
+    """Return whether the process of a run lives; of one on another machine, whether it wrote within FRESH_S."""
+    if kept.get("host", socket.gethostname()) != socket.gethostname():
+        return kept["state"] == "running" and time.time() - kept["written"] < FRESH_S
     return kept["process"] is not None and started(kept["pid"]) == kept["process"]
 
 
@@ -58,7 +67,9 @@ def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
     board, living = Board.read(kept["board"]), alive(kept)
     state = kept["state"] if living or kept["state"] != "running" else "stopped without a word, killed perhaps"
-    head = f"process {kept['pid']}: {state}, {span(now - kept['written'])} ago"
+    host = kept.get("host", socket.gethostname())
+    place = "" if host == socket.gethostname() else f" of {host}"
+    head = f"process {kept['pid']}{place}: {state}, {span(now - kept['written'])} ago"
     moment = now if living else kept["written"]
     lines = [board.line(name, moment, progress.last) for name in board.stages]
     return "\n".join([head, *lines, board.total(moment)])
