@@ -180,6 +180,8 @@ def test_a_gpu_is_asked_for_by_name(refusing, tmp_path):
     assert int(re.search(r"-t (\d+)", line)[1]) >= 1440
 
 
+LITTLE = ["train:runtime=20", "train:mem_mb=2000", "evaluate:runtime=20", "evaluate:mem_mb=2000"]
+"""A small queue lets no job run for the profile's four hours of a training."""
 # A training over two nodes with two processes and GPUs each, and its evaluation in the same job.
 OVER_NODES = """
 from lowalt.workflow.launch import Launch
@@ -234,18 +236,17 @@ def test_a_training_over_two_nodes_has_the_bytes_of_two_processes_here(tmp_path)
     for count in (1, 2):
         overlay["recognition"]["nodes"] = count
         (tmp_path / "overlay.yaml").write_text(yaml.safe_dump(overlay))
-        where = (
-            ["--workflow-profile", "profiles/slurm", "--slurm-status-command", "squeue"]
-            if count == 2
-            else ["--cores", "2"]
-        )
+        queue = ["--workflow-profile", "profiles/slurm", "--slurm-status-command", "squeue", "--set-resources", *LITTLE]
+        where = queue if count == 2 else ["--cores", "2"]
         command = [sys.executable, "-m", "snakemake", *where, "--configfile", "overlay.yaml", "--", "models"]
         run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
         said = run.stdout + run.stderr
         assert run.returncode == 0, said[-3000:]
         assert json.loads((made / "run.json").read_text())["ranks"] == 2
         found[count] = [(made / name).read_bytes() for name in ("model.pt", "history.csv")]
-    (job,) = [job for job, path in re.findall(r"SLURM jobid (\d+) \(log: (\S+)/\d+\.log\)", said) if "training" in path]
+    # The path of a log begins with this test's folder, whose name holds the same word.
+    jobs = re.findall(r"SLURM jobid (\d+) \(log: \S+/\.snakemake/(\S+)/\d+\.log\)", said)
+    (job,) = [job for job, path in jobs if "training" in path]
     assert re.search(r"NumNodes=2\b.* NumTasks=2\b", ask("scontrol", "show", "job", job))
     assert found[1] == found[2]
 

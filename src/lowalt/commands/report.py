@@ -11,7 +11,7 @@ from lowalt.commands.compare import facts
 from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
-from lowalt.common.shipped import located, shipped
+from lowalt.common.shipped import as_named, shipped
 from lowalt.common.yaml_files import load_yaml
 
 BASE = "config/default.yaml"
@@ -56,7 +56,7 @@ def page(given: argparse.Namespace) -> str:
     if not isinstance(name, str) or given.run.resolve() != Path(written).parent.resolve():
         raise InputError(f"{given.run}: its config.yaml is of the run {name!r}, expected to stand in results/{name}")
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as overlay:
-        yaml.safe_dump({"run": name, **changes(located(load_yaml(shipped(BASE))), config)}, overlay)
+        yaml.safe_dump({"run": name, **changes(load_yaml(shipped(BASE)), as_named(config))}, overlay)
         overlay.flush()
         answer = workflow.ended(argparse.Namespace(
             overlay=[Path(overlay.name)], configfile=[], target=[written], cores=given.cores,

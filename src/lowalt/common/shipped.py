@@ -3,6 +3,7 @@
 In a checkout they stand at its root. An installation from a wheel has them inside the package.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,20 +31,44 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
 
     A run in another folder, or another workflow that uses this one as a module, finds config/targets.csv that way.
     """
+
+    def found(name: str) -> str:
+        return str(folder / name) if not Path(name).exists() and (folder / name).exists() else name
+
+    return _renamed(config, found)
+
+
+def as_named(config: dict, folder: Path = SHIPPED) -> dict:
+    """Return the configuration with each file of `folder` named relative to it: what `located` undoes.
+
+    Files that a run keeps or shares are then the same wherever the package is installed. A file whose relative name
+    means another one in the working directory keeps its path.
+    """
+
+    def named(name: str) -> str:
+        path = Path(name)
+        if not path.is_absolute() or not path.is_relative_to(folder):
+            return name
+        relative = path.relative_to(folder)
+        return name if relative.exists() and not relative.samefile(path) else str(relative)
+
+    return _renamed(config, named)
+
+
+def _renamed(config: dict, rename: Callable[[str], str]) -> dict:
+    """The configuration with the names under KEYS changed by `rename`."""
     result = dict(config)
     for block, key in KEYS:
         held = result.get(block)
         if isinstance(held, dict) and key in held:
-            result[block] = {**held, key: _found(held[key], folder)}
+            result[block] = {**held, key: _each(held[key], rename)}
     return result
 
 
-def _found(value: Any, folder: Path) -> Any:
-    """The value with every text in it that names a file of `folder` alone replaced by that file's path."""
+def _each(value: Any, rename: Callable[[str], str]) -> Any:
+    """The value with every text in it changed by `rename`."""
     if isinstance(value, dict):
-        return {name: _found(item, folder) for name, item in value.items()}
+        return {name: _each(item, rename) for name, item in value.items()}
     if isinstance(value, list):
-        return [_found(item, folder) for item in value]
-    if isinstance(value, str) and not Path(value).exists() and (folder / value).exists():
-        return str(folder / value)
-    return value
+        return [_each(item, rename) for item in value]
+    return rename(value) if isinstance(value, str) else value

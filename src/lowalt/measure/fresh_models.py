@@ -17,6 +17,7 @@ from lowalt.common.command import parser, run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.files import slug
 from lowalt.common.hardware import describe
+from lowalt.common.shipped import located
 from lowalt.common.streams import stream as generator_of
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition import choose, predictions, runs
@@ -118,7 +119,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", required=True, help="table to write (.csv)")
     given = line.parse_args(arguments)
     folder = Path(given.run)
-    rows = measure(load_yaml(folder / "config.yaml"), folder, choose.read(given.candidates), Path(given.work))
+    rows = measure(located(load_yaml(folder / "config.yaml")), folder, choose.read(given.candidates), Path(given.work))
     write_csv(given.out, COLUMNS, rows)
 
 

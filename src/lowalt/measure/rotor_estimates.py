@@ -19,6 +19,7 @@ from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
+from lowalt.common.shipped import located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion import read_table
 from lowalt.recognition.rotor import LEAST_HZ, folded, passing
@@ -35,7 +36,7 @@ def estimates(folder: Path, models: int) -> dict[tuple, list[tuple[float, float]
 
     Raises: InputError naming a file of the run that is missing or damaged.
     """
-    config = load_yaml(folder / "config.yaml")
+    config = located(load_yaml(folder / "config.yaml"))
     network = Network.from_settings(config["network"])
     figures = {name: item.get("figures", {}) for name, item in records_of(config["targets"]).items()}
     snrs = [float(snr) for snr in config["noise"]["snr_db"]]

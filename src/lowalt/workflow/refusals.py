@@ -8,6 +8,7 @@ from pathlib import Path
 from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
+from lowalt.common.shipped import as_named, located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import Scheme
@@ -80,11 +81,11 @@ def refuse_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
         raise InputError(f"recognition.extra: {name!r}, expected another, finished run; no {made} or it is this run")
     if not config["recognition"]["cache"]:
         raise InputError("recognition.extra: given without recognition.cache, expected true")
-    own, other = plain(config), plain(load_yaml(made))
+    own, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
     differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
     if differ:
         raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
-    others = classes_of({name: record["published"] for name, record in records_of(other["targets"]).items()})
+    others = classes_of({name: record["published"] for name, record in records_of(located(other)["targets"]).items()})
     if others != classes:
         raise InputError(f"recognition.extra: run {name!r} has the classes {others}, expected {classes}")
     if own["seed"] == other["seed"]:
@@ -120,7 +121,7 @@ def refuse_data(config: dict) -> None:
     made = Path("results") / name / "config.yaml"
     if not made.is_file():
         raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
-    own, other = plain(config), plain(load_yaml(made))
+    own, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
     differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
     if differ:
         raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")

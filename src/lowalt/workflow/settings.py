@@ -9,6 +9,7 @@ from typing import Any
 from lowalt.common.config import canonical
 from lowalt.common.network import as_far_as, masts_m
 from lowalt.common.plan import Chunk
+from lowalt.common.shipped import as_named
 from lowalt.effects.lateness import timed
 from lowalt.effects.set_noise import in_all_cells
 from lowalt.motion.sample import masts_in_reach
@@ -54,7 +55,7 @@ class Settings:
 
     def configuration(self, wildcards: Any) -> str:
         """The whole configuration."""
-        return self._text("configuration", **self._config)
+        return self._text("configuration", **as_named(self._config))
 
     def cloud(self, wildcards: Any) -> str:
         """Seed and the merged record of one subtype; occluders read the same."""
@@ -192,4 +193,4 @@ class Settings:
 
     def report(self, wildcards: Any) -> str:
         """The whole configuration, and the published values of each subtype."""
-        return self._text("report", config=self._config, published=self._published)
+        return self._text("report", config=as_named(self._config), published=self._published)

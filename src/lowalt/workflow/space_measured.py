@@ -16,6 +16,7 @@ from lowalt.common.config import load_yaml
 from lowalt.common.csv_tables import read_csv, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.plan import Plan
+from lowalt.common.shipped import located
 from lowalt.common.splits import FOLDS
 from lowalt.targets.records import records_of
 from lowalt.workflow.space import COLUMNS, units
@@ -65,7 +66,7 @@ def jobs(folder: Path) -> list[tuple[str, float, float, float]]:
 
     Raises: InputError naming the folder where it holds no benchmarks.
     """
-    config = load_yaml(folder / "config.yaml")
+    config = located(load_yaml(folder / "config.yaml"))
     plan, found = _plan(config), []
     for path in sorted((folder / "benchmarks").rglob("*.jsonl")):
         row = json.loads(path.read_text().splitlines()[-1])

@@ -6,7 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 import yaml
 
 from lowalt.common.hardware import describe
-from lowalt.common.shipped import located, shipped
+from lowalt.common.shipped import as_named, shipped
 from lowalt.common.yaml_files import load_yaml
 from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
 from lowalt.report.run import ReportedRun
@@ -42,7 +42,7 @@ def machines(run: ReportedRun) -> list[tuple[str, str]]:
 def values(run: ReportedRun) -> dict:
     """Return the revision, the seeds, machines, versions, checksums, the configuration and the commands again."""
     commit = revision()
-    lines, overlay = commands(commit, changes(located(load_yaml(shipped(BASE))), run.config))
+    lines, overlay = commands(commit, changes(load_yaml(shipped(BASE)), as_named(run.config)))
     return {
         "commit": commit, "code": code_sum(), "seed": run.config["seed"], "seeds": run.config["recognition"]["seeds"],
         "machines": machines(run), "versions": versions(), "files": checksums(run.inputs.files), "commands": lines,
