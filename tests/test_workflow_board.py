@@ -102,24 +102,6 @@ def test_items_pass_through_unchanged():
     assert list(progress.reported("abc", 3, "letters")) == ["a", "b", "c"]
 
 
-def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so(tmp_path):
-    folder = tmp_path / "status"
-    folder.mkdir()
-    (folder / "1.json").write_text("{damaged")
-    status.write(board_of(), "running", folder)
-    (kept,) = status.read(folder)
-    assert status.alive(kept)
-    text = status.describe(kept, kept["written"])
-    assert text.startswith(f"process {os.getpid()}: running, 0:00 ago\necho  2/10") and "all   2/12 jobs" in text
-    dead = kept | {"pid": 2**22 + 1}
-    assert "killed" in status.describe(dead, kept["written"])
-    # The next run sweeps what dead ones left.
-    (folder / f"{dead['pid']}.json").write_text(json.dumps(dead))
-    (folder / f"{os.getpid()}.json").unlink()
-    status.write(board_of(), "running", folder)
-    assert [found["pid"] for found in status.read(folder)] == [os.getpid()]
-
-
 def handler_of(**given):
     """The plugin's handler on a stream that is no terminal."""
     pytest.importorskip("snakemake")
@@ -163,30 +145,6 @@ def test_a_log_has_a_line_when_a_stage_starts_and_ends_and_a_failure_its_log(tmp
     assert lines[18] == "took over a lock" and lines[19].startswith("all  1/3 jobs") and len(lines) == 20
     (kept,) = status.read()
     assert kept["state"] == "failed"
-
-
-def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    wrong = record("WorkflowError:\nno room", logging.ERROR, event="error", exception="WorkflowError")
-    ctrl_c = record("Terminating processes on user request, this might take some time.")
-    for records, state in (([], "ended"), ([wrong], "failed"), ([ctrl_c, wrong], "interrupted")):
-        handler = handler_of()
-        handler.emit(record("run", event="run_info", stats={"echo": 2, "total": 2}))
-        for one in records:
-            handler.emit(one)
-        handler.close()
-        assert status.read()[-1]["state"] == state
-
-
-def test_a_run_on_another_machine_lives_while_its_file_is_fresh(tmp_path):
-    folder = tmp_path / "status"
-    folder.mkdir()
-    status.write(board_of(), "running", folder)
-    (kept,) = status.read(folder)
-    there = kept | {"host": "login-2", "pid": 2**22 + 1}
-    assert status.alive(there) and not status.alive(there | {"written": kept["written"] - 2 * status.FRESH_S})
-    assert not status.alive(there | {"state": "ended"})
-    assert status.describe(there, kept["written"]).startswith(f"process {2**22 + 1} of login-2: running, 0:00 ago")
 
 
 def test_a_full_disk_is_named_once_where_the_logs_of_jobs_have_no_room(monkeypatch, capsys):

@@ -33,6 +33,7 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
     """
 
     def found(name: str) -> str:
+        """The path in `folder` of a file that only it has, else the name."""
         return str(folder / name) if not Path(name).exists() and (folder / name).exists() else name
 
     return _renamed(config, found)
@@ -46,6 +47,7 @@ def as_named(config: dict, folder: Path = SHIPPED) -> dict:
     """
 
     def named(name: str) -> str:
+        """The name relative to `folder` of a file there, unless it means another file here."""
         path = Path(name)
         if not path.is_absolute() or not path.is_relative_to(folder):
             return name
