@@ -101,7 +101,7 @@ test-slow: $(TESTING)  ## the slow checks
 	$(BIN)/python -m pytest -m slow
 
 # One process a reader; some ten minutes.
-fuzz: $(TESTING)  ## 2000 damaged files for every reader of files: results/benchmarks/fuzz.csv
+fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
 # At the lowest priority; the same command goes on where the last one stopped: make mutants MINUTES=45

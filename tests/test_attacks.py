@@ -26,15 +26,13 @@ from lowalt.tiles.png import SIGNATURE, _chunk, decode
 READERS = {reader.name: reader for reader in fuzzed_readers.readers()}
 LACKING = ("checksums", "recipe")
 """Good files that name others which are not there."""
-SLOW_STARTS = ("recording .mat",)
-"""Read in a process of its own, so a few inputs take seconds."""
 
 
 @pytest.mark.parametrize("name", READERS)
 def test_a_good_file_is_accepted_and_damaged_ones_are_accepted_or_refused_by_name(name, tmp_path):
     reader = READERS[name]
     assert reader.outcome(reader.data, tmp_path) == ("refused" if name in LACKING else "accepted")
-    found = fuzzing.attack(reader, 2 if name in SLOW_STARTS else 8, 3, tmp_path)
+    found = fuzzing.attack(reader, 8 if reader.share == 1 else 2, 3, tmp_path)
     assert not found["faults"], found["first_fault"]
 
 

@@ -44,7 +44,11 @@ def _recordings() -> list[Reader]:
         ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
         ".csv": text.encode(),
     }
-    return [Reader(f"recording {kind}", f"a{kind}", data, _recording(kind)) for kind, data in files.items()]
+    shares = {".mat": 0.1}
+    return [
+        Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), shares.get(kind, 1.0))
+        for kind, data in files.items()
+    ]
 
 
 def _meshes() -> list[Reader]:

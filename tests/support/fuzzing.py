@@ -73,10 +73,13 @@ def _words(data: bytes) -> list[tuple[int, int]]:
 
 
 class Reader:
-    """One reader of files: its name, a good file's name and bytes, and the function that reads a path."""
+    """One reader of files: its name, a good file's name and bytes, and the function that reads a path.
 
-    def __init__(self, name: str, file: str, data: bytes, read: Callable[[Path], object]) -> None:
-        self.name, self.file, self.data, self.read = name, file, data, read
+    share: of the damaged files of a run; a reader that starts a process for each file gets fewer.
+    """
+
+    def __init__(self, name: str, file: str, data: bytes, read: Callable[[Path], object], share: float = 1.0) -> None:
+        self.name, self.file, self.data, self.read, self.share = name, file, data, read, share
 
     def outcome(self, data: bytes, folder: Path) -> str:
         """Return "accepted", "refused" or the fault that reading these bytes ends with."""
@@ -127,7 +130,7 @@ def _apart(name: str, count: int, seed: int, queue) -> None:
         from fuzzed_readers import readers
 
         (reader,) = [reader for reader in readers() if reader.name == name]
-        queue.put(attack(reader, count, seed, Path(folder)))
+        queue.put(attack(reader, max(1, round(count * reader.share)), seed, Path(folder)))
 
 
 def main() -> None:
