@@ -11,7 +11,7 @@ TESTING := .venv/set-up-tests
 KERNELS := .venv/set-up-kernels
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings distances seeds ranges aspects
+TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings seeds ranges aspects
 # The oldest and the newest NumPy that pyproject.toml allows.
 NUMPYS := 2.0.0 2.4.6
 OLDEST_SNAKEMAKE := 9.23.0
