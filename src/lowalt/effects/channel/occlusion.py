@@ -12,7 +12,6 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects.channel.capsules import capsules
 from lowalt.effects.channel.shadow_rays import cast_rays
-from lowalt.effects.channel.shadows import GRID, balls_of, triangles
 from lowalt.effects.channel.surface_tree import whole_tree
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
@@ -20,8 +19,7 @@ from lowalt.targets.cloud import Cloud
 SOURCE = (
     "blades: Born & Wolf, Principles of Optics, 7th ed. 1999, 8.3.2 (Babinet's principle) and 8.7.3 (Fresnel's "
     "integrals); the rest, geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5; "
-    "visible points by their depth on a screen: Catmull, A Subdivision Algorithm for Computer Display of Curved "
-    "Surfaces, 1974, computed here at the points themselves"
+    "rays and triangles: Moeller & Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2, 1997"
 )
 DEFAULTS = {"strength": 1.0, "blades": "bent"}
 
@@ -76,8 +74,8 @@ def hidden(view: View, by: str = "all", known: np.ndarray | None = None) -> np.n
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
     surfaces, cloud, place = _surfaces(view), view.cloud, np.asarray(view.station.position_m, float)
-    result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
     if view.nodes:
+        result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
         capsules(place, np.ascontiguousarray(view.places), surfaces["bones"], surfaces["radius_m"], result)
         return result
     has_normal = np.isfinite(cloud.normals).all(axis=1)
@@ -85,22 +83,9 @@ def hidden(view: View, by: str = "all", known: np.ndarray | None = None) -> np.n
     start = cloud.points + np.where(has_normal[:, None], offset[:, None] * cloud.normals, 0.0)
     toward = np.where(has_normal, 0.0, offset / np.linalg.norm(view.aim_m - place))
     motion = view.motion._replace(points=start)
-    # Rotors turn too far from symbol to symbol for lists of directions to pay.
-    if not cloud.parts_of("rotor") and by != "blades":
-        return cast_rays(place, motion, toward, surfaces["vertices"], whole_tree(surfaces)) | result
-    owner = surfaces["vertex_part"]
-    blade = np.isin(owner[surfaces["faces"][:, 0]], cloud.parts_of("rotor"))
-    faces = surfaces["faces"][{"all": np.ones_like(blade), "blades": blade, "rest": ~blade}[by]]
-    # Project only the corners of the surfaces that count.
-    wanted = np.zeros(len(owner), np.bool_)
-    wanted[faces] = True
-    balls = balls_of(surfaces["vertices"], np.asarray(owner, np.int64), len(cloud.kinds))
-    triangles(
-        place, np.ascontiguousarray(motion.rotation), np.ascontiguousarray(motion.translation),
-        np.asarray(motion.part, np.int64), start, toward, surfaces["vertices"][wanted], owner[wanted],
-        (np.cumsum(wanted) - 1)[faces], surfaces["closed"][owner[faces[:, 0]]], balls, GRID, result,
-    )  # fmt: skip
-    return result
+    rotors = cloud.parts_of("rotor")
+    asked = {"all": range(len(cloud.kinds)), "blades": rotors, "rest": set(range(len(cloud.kinds))) - set(rotors)}[by]
+    return cast_rays(place, motion, toward, surfaces["vertices"], whole_tree(surfaces), rotors, list(asked), known)
 
 
 def _surfaces(view: View) -> dict:

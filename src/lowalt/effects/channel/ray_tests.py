@@ -19,6 +19,18 @@ def met(tree, node, x, y, z, a, b, c, spread):
 
 
 @INLINED
+def crosses(tree, node, x, y, z, u, v, w):
+    """Whether the ray from x, y, z along u, v, w can meet the box around a node's triangles, by separating axes."""
+    a, b, c = tree.centre[node, 0] - x, tree.centre[node, 1] - y, tree.centre[node, 2] - z
+    i, j, k = tree.half[node, 0], tree.half[node, 1], tree.half[node, 2]
+    l, m, n = abs(u), abs(v), abs(w)  # noqa: E741
+    return (
+        abs(b * w - c * v) <= j * n + k * m and abs(c * u - a * w) <= k * l + i * n
+        and abs(a * v - b * u) <= i * m + j * l and a * u + b * v + c * w >= -(i * l + j * m + k * n)
+    )  # fmt: skip
+
+
+@INLINED
 def hit(vertices, tree, f, x, y, z, u, v, w):
     """Whether the ray from x, y, z along u, v, w meets triangle f before its end; Moeller & Trumbore 1997."""
     i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]

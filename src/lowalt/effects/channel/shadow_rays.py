@@ -1,122 +1,36 @@
 """Which points of a target a station cannot see: exact ray casting in the frames of the target's own parts.
 
 In a part's frame its triangles stand still, and the ray from a point to the station turns slowly, or along the same
-circle turn by turn. So directions are sorted into cells: the triangles of its own part that any ray of a cell can meet
-are found once for a point, by a tree of balls (`surface_tree`), and kept; each ray is then compared with these few.
-Other parts' triangles are found by their tree ray by ray. A point is compared first with the triangle that hid it a
-symbol ago.
+circle turn by turn. The rays of all points that meet the body, whose frame turns slowly, find their few triangles in a
+grid (`ray_grid`). In parts that swing or roll, directions are sorted into cells: the triangles of its own part that any
+ray of a cell can meet are found once for a point, by a tree of balls (`surface_tree`), and kept; each ray is then
+compared with these few. Rotors turn too far from symbol to symbol for that. Their triangles, and those of other parts
+than the point's, are found by the tree ray by ray. A point is compared first with the triangle that hid it a symbol
+ago.
 """
-
-import math
-from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo import Rigid
-from lowalt.effects.channel.ray_tests import hit, met, reached
+from lowalt.effects.channel import ray_grid
+from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid, cell_of
+from lowalt.effects.channel.ray_lists import Lists, kept
+from lowalt.effects.channel.ray_tests import crosses, hit
 from lowalt.effects.channel.surface_tree import Tree
 
-SLOTS = 1 << 14
-"""Lists of triangles that are kept at a time; a power of two."""
-POOL = 1 << 18
-"""Triangles in all kept lists together."""
 STEPS, FINEST, COARSEST = 3.0, 0.02, 0.15
 """Cells of direction along a part's way through them, and their least and largest size (rad)."""
-CODES = 1 << 19
-"""Larger than the number of any cell of direction."""
-
-
-class Lists(NamedTuple):
-    """Kept lists: key (SLOTS,), -1 where free; begin, size (SLOTS,) in `pool`; used: (2,) lists and triangles."""
-
-    key: np.ndarray
-    begin: np.ndarray
-    size: np.ndarray
-    pool: np.ndarray
-    used: np.ndarray
-
-    @classmethod
-    def empty(cls, nodes: int) -> "Lists":
-        """Return room for the lists, all free, of triangles in a tree of so many nodes."""
-        whole = (np.empty(SLOTS, np.int64) for _ in range(2))
-        return cls(np.full(SLOTS, -1), *whole, np.empty(POOL + nodes, np.int64), np.zeros(2, np.int64))
+SLOW = 8e-3
+"""Largest mean turn of the direction to the station, from symbol to symbol (rad), at which a part gets a grid."""
 
 
 @INLINED
-def _cell(a, b, c, cells):
-    """The cell of a direction on a cube's faces, `cells` along each side, and the direction of its middle."""
-    p, q, r = abs(a), abs(b), abs(c)
-    side, main, i, j = 0, a, b, c
-    if q >= p and q >= r:
-        side, main, i, j = 1, b, c, a
-    elif r >= p and r >= q:
-        side, main, i, j = 2, c, a, b
-    length = abs(main)
-    step = 2.0 / cells
-    m, n = min(int((i / length + 1.0) / step), cells - 1), min(int((j / length + 1.0) / step), cells - 1)
-    i, j, main = (m + 0.5) * step - 1.0, (n + 0.5) * step - 1.0, 1.0 if main > 0.0 else -1.0
-    a, b, c = (main, i, j) if side == 0 else ((j, main, i) if side == 1 else (i, j, main))
-    size = 1.0 / math.sqrt(1.0 + i * i + j * j)
-    code = ((2 * side + (main > 0.0)) * cells + m) * cells + n
-    return code, a * size, b * size, c * size
-
-
-@INLINED
-def _slot(keys, key):
-    """The slot of the list `key`, or a free one where it is not kept."""
-    mask = len(keys) - 1
-    slot = np.int64(np.uint64(key) * np.uint64(0x9E3779B97F4A7C15) >> np.uint64(40)) & mask
-    while keys[slot] != -1 and keys[slot] != key:
-        slot = (slot + 1) & mask
-    return slot
-
-
-@LEAN
-def _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, spread):
-    """Fill the free slot of the list `key` with the triangles of part p that the rays of `met` can meet; return it."""
-    mask = len(lists.key) - 1
-    end = tree.skip[tree.root[p]]
-    # A list has at most the part's triangles; without room for them, all lists are dropped.
-    if 2 * lists.used[0] > mask or lists.used[1] + end - tree.root[p] > len(lists.pool):
-        lists.key[:] = -1
-        lists.used[:] = 0
-        slot = _slot(lists.key, key)
-    first = lists.used[1]
-    past, node = first, tree.root[p]
+def _through(vertices, tree, p, x, y, z, u, v, w):
+    """A triangle of part p that the ray from x, y, z along u, v, w meets, -1 without one."""
+    node, end = tree.root[p], tree.skip[tree.root[p]]
     while node < end:
-        if not met(tree, node, x, y, z, a, b, c, spread):
-            node = tree.skip[node]
-            continue
-        f = tree.face[node]
-        if f >= 0 and reached(vertices, tree, f, x, y, z, a, b, c, spread):
-            lists.pool[past] = f
-            past += 1
-        node += 1
-    lists.key[slot], lists.begin[slot], lists.size[slot] = key, first, past - first
-    lists.used[0] += 1
-    lists.used[1] = past
-    return slot
-
-
-@INLINED
-def _first_of(vertices, tree, lists, first, past, x, y, z, u, v, w):
-    """The first triangle of a list that the ray from x, y, z along u, v, w meets, -1 without one."""
-    for at in range(first, past):
-        if hit(vertices, tree, lists.pool[at], x, y, z, u, v, w):
-            return lists.pool[at]
-    return -1
-
-
-@INLINED
-def _through(vertices, tree, p, x, y, z, u, v, w, size):
-    """A triangle of part p that the ray from x, y, z along u, v, w meets, -1 without one; size: 1 / its length."""
-    node, end = tree.root[p] + 1, tree.skip[tree.root[p]]
-    a, b, c = u * size, v * size, w * size
-    if tree.face[node - 1] >= 0:
-        node -= 1
-    while node < end:
-        if not met(tree, node, x, y, z, a, b, c, 0.0):
+        if not crosses(tree, node, x, y, z, u, v, w):
             node = tree.skip[node]
             continue
         f = tree.face[node]
@@ -126,17 +40,62 @@ def _through(vertices, tree, p, x, y, z, u, v, w, size):
     return -1
 
 
-@LEAN
-def cast(station, rotation, translation, part, points, toward, vertices, tree, order, cells, lists, work, found):
-    """Set found (N, L) where one of the parts `order` hides the point.
+@INLINED
+def _ball_ahead(centre, radius, x, y, z, a, b, c, square):
+    """Whether the ray from x, y, z along a, b, c, `square` the square of its length, can meet a ball."""
+    u, v, w = centre[0] - x, centre[1] - y, centre[2] - z
+    along, rest = u * a + v * b + w * c, u * u + v * v + w * w - radius * radius
+    return rest <= 0.0 or (along >= 0.0 and rest * square <= along * along * (1.0 + 1e-9))
 
-    station (N, P, 3) m, in each part's frame; rotation (N, P, 3, 3), translation (N, P, 3); points (L, 3) m, in their
-    part's frame; toward (L,): share of the way to the station by which a point is moved; cells (P,): cells of direction
-    along a cube's side; work: (L,) int64, filled with -1.
+
+@INLINED
+def _in_part(rotation, translation, x, y, z):
+    """A place of the global frame in a part's frame."""
+    a, b, c = x - translation[0], y - translation[1], z - translation[2]
+    return (
+        rotation[0, 0] * a + rotation[1, 0] * b + rotation[2, 0] * c,
+        rotation[0, 1] * a + rotation[1, 1] * b + rotation[2, 1] * c,
+        rotation[0, 2] * a + rotation[1, 2] * b + rotation[2, 2] * c,
+    )
+
+
+@LEAN
+def _balls(rotation, translation, tree, order, balls):
+    """Fill balls (P, 3) with the places of the balls around all triangles of the parts `order`, in the global frame."""
+    for turn in range(len(order)):
+        p = order[turn]
+        x, y, z = tree.centre[tree.root[p], 0], tree.centre[tree.root[p], 1], tree.centre[tree.root[p], 2]
+        for i in range(3):
+            balls[p, i] = rotation[p, i, 0] * x + rotation[p, i, 1] * y + rotation[p, i, 2] * z + translation[p, i]
+
+
+@INLINED
+def _in_cell(vertices, tree, grid, k, cell, x, y, z, u, v, w):
+    """The first triangle of a grid's cell that the ray from x, y, z along u, v, w meets, -1 without one."""
+    for at in range(grid.start[k, cell], grid.start[k, cell + 1]):
+        if hit(vertices, tree, grid.pool[k, at], x, y, z, u, v, w):
+            return grid.pool[k, at]
+    return -1
+
+
+@LEAN
+def cast(
+    place, station, rotation, translation, part, points, toward, vertices, tree, order, gridded, grid, listed, cells,
+    lists, work, balls, found,
+):  # fmt: skip
+    """Set found (N, L) where one of the parts `order` hides the point; points found already are not asked.
+
+    place (3,) m: the station, and station (N, P, 3) m: the same in each part's frame; rotation (N, P, 3, 3),
+    translation (N, P, 3); points (L, 3) m, in their part's frame; toward (L,): share of the way to the station by which
+    a point is moved; gridded: the part of `grid`; listed (P,): whether a part's lists are kept for its own points;
+    cells (P,): cells of direction along a cube's side; work: (L,) int64, filled with -1; balls: work, (P, 3).
     """
     for n in range(rotation.shape[0]):
+        _balls(rotation[n], translation[n], tree, order, balls)
         for l in range(len(points)):  # noqa: E741
-            own, f = part[l], work[l]
+            if found[n, l]:
+                continue
+            own, last = part[l], work[l]
             x, y, z = points[l, 0], points[l, 1], points[l, 2]
             x += toward[l] * (station[n, own, 0] - x)
             y += toward[l] * (station[n, own, 1] - y)
@@ -145,35 +104,33 @@ def cast(station, rotation, translation, part, points, toward, vertices, tree, o
             g1 = rotation[n, own, 1, 0] * x + rotation[n, own, 1, 1] * y + rotation[n, own, 1, 2] * z
             g2 = rotation[n, own, 2, 0] * x + rotation[n, own, 2, 1] * y + rotation[n, own, 2, 2] * z
             g0, g1, g2 = g0 + translation[n, own, 0], g1 + translation[n, own, 1], g2 + translation[n, own, 2]
+            d0, d1, d2 = place[0] - g0, place[1] - g1, place[2] - g2
+            square = d0 * d0 + d1 * d1 + d2 * d2
             for turn in range(-1, len(order)):
-                if turn < 0 and f < 0:
+                if turn < 0 and last < 0:
                     continue
-                p = tree.owner[f] if turn < 0 else order[turn]
+                p = tree.owner[last] if turn < 0 else order[turn]
                 i, j, k = x, y, z
                 if p != own:
-                    t0, t1, t2 = g0 - translation[n, p, 0], g1 - translation[n, p, 1], g2 - translation[n, p, 2]
-                    i = rotation[n, p, 0, 0] * t0 + rotation[n, p, 1, 0] * t1 + rotation[n, p, 2, 0] * t2
-                    j = rotation[n, p, 0, 1] * t0 + rotation[n, p, 1, 1] * t1 + rotation[n, p, 2, 1] * t2
-                    k = rotation[n, p, 0, 2] * t0 + rotation[n, p, 1, 2] * t1 + rotation[n, p, 2, 2] * t2
+                    radius = tree.radius_m[tree.root[p]]
+                    if turn >= 0 and not _ball_ahead(balls[p], radius, g0, g1, g2, d0, d1, d2, square):
+                        continue
+                    i, j, k = _in_part(rotation[n, p], translation[n, p], g0, g1, g2)
                 u, v, w = station[n, p, 0] - i, station[n, p, 1] - j, station[n, p, 2] - k
                 if turn < 0:
-                    if hit(vertices, tree, f, i, j, k, u, v, w):
+                    if hit(vertices, tree, last, i, j, k, u, v, w):
                         found[n, l] = True
                         break
                     continue
-                size = 1.0 / math.sqrt(u * u + v * v + w * w)
-                if not met(tree, tree.root[p], i, j, k, u * size, v * size, w * size, 0.0):
+                cell = cell_of(grid, n // SYMBOLS, i, j, k, u, v, w) if p == gridded else -2
+                if cell == -1 or (cell == -2 and not crosses(tree, tree.root[p], i, j, k, u, v, w)):
                     continue
-                if p == own:
-                    code, a, b, c = _cell(u, v, w, cells[p])
-                    key = l * CODES + code
-                    slot = _slot(lists.key, key)
-                    if lists.key[slot] == -1:
-                        slot = _listed(vertices, tree, lists, p, key, slot, i, j, k, a, b, c, 1.4143 / cells[p])
-                    first = lists.begin[slot]
-                    f = _first_of(vertices, tree, lists, first, first + lists.size[slot], i, j, k, u, v, w)
+                if cell >= 0:
+                    f = _in_cell(vertices, tree, grid, n // SYMBOLS, cell, i, j, k, u, v, w)
+                elif p == own and listed[p]:
+                    f = kept(vertices, tree, lists, p, l, cells[p], i, j, k, u, v, w)
                 else:
-                    f = _through(vertices, tree, p, i, j, k, u, v, w, size)
+                    f = _through(vertices, tree, p, i, j, k, u, v, w)
                 if f >= 0:
                     found[n, l] = True
                     work[l] = f
@@ -181,25 +138,48 @@ def cast(station, rotation, translation, part, points, toward, vertices, tree, o
 
 
 def cast_rays(
-    place_m: np.ndarray, motion: Rigid, toward: np.ndarray, vertices: np.ndarray, tree: Tree
+    place_m: np.ndarray, motion: Rigid, toward: np.ndarray, vertices: np.ndarray, tree: Tree, rotors: list[int],
+    asked: np.ndarray | None = None, known: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return whether a triangle hides each point from the station at `place_m` (3,), (N, L) bool.
 
     motion: poses, and points off their own surface (L, 3), each in its part's frame (m); toward (L,): share of the way
-    to the station by which a point is moved instead, where it has no normal; vertices (V, 3) m. Of a closed surface
-    with outward normals, the side turned to the station alone hides all.
+    to the station by which a point is moved instead, where it has no normal; vertices (V, 3) m; rotors: parts that turn
+    far from symbol to symbol; asked: parts whose triangles count, None for all; known: points (N, L) bool that are
+    hidden already. Of a closed surface with outward normals, the side turned to the station alone hides all.
     """
     rotation, translation, points, part = motion
+    rotation, translation = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
+    points, vertices, part = np.ascontiguousarray(points), np.ascontiguousarray(vertices), np.asarray(part, np.int64)
     away = place_m - translation
     # The poses' matrices are rotations: their inverses are their transposes.
     station = sum((rotation[:, :, row, :] * away[:, :, row, None] for row in range(3)), np.zeros(away.shape))
     ahead = station / np.sqrt((station * station).sum(axis=2))[..., None]
     turned = np.sqrt((np.ptp(ahead, axis=0) ** 2).sum(axis=1))
     cells = np.ceil(2.0 / np.clip(turned / STEPS, FINEST, COARSEST)).astype(np.int64)
-    found = np.zeros((len(rotation), len(points)), np.bool_)
+    order = np.flatnonzero(tree.root >= 0)
+    order = order if asked is None else order[np.isin(order, asked)]
+    listed = ~np.isin(np.arange(len(tree.root)), rotors)
+    gridded, grid = _grid(ahead, station, vertices, tree, order[listed[order]])
+    found = np.zeros((len(rotation), len(points)), np.bool_) if known is None else known.copy()
     cast(
-        station, np.ascontiguousarray(rotation), np.ascontiguousarray(translation), np.asarray(part, np.int64),
-        np.ascontiguousarray(points), toward, np.ascontiguousarray(vertices), tree, np.flatnonzero(tree.root >= 0),
-        cells, Lists.empty(len(tree.skip)), np.full(len(points), -1), found,
+        np.asarray(place_m, np.float64), station, rotation, translation, part, points, toward, vertices, tree, order,
+        gridded, grid, listed, cells, Lists.empty(len(tree.skip)), np.full(len(points), -1), np.empty((len(listed), 3)),
+        found,
     )  # fmt: skip
     return found
+
+
+def _grid(
+    ahead: np.ndarray, station: np.ndarray, vertices: np.ndarray, tree: Tree, parts: np.ndarray
+) -> tuple[int, RayGrid]:
+    """The part of `parts` that gets a grid, and the grid: the one of most triangles that turns slowly; -1 for none.
+
+    ahead (N, P, 3): directions to the station in each part's frame.
+    """
+    steps = np.sqrt((np.diff(ahead, axis=0) ** 2).sum(axis=2))
+    slow = [int(p) for p in parts if len(steps) and steps[:, p].mean() <= SLOW]
+    if not slow:
+        return -1, ray_grid.NONE
+    p = max(slow, key=lambda one: int(tree.count[one]))
+    return p, ray_grid.grids(np.ascontiguousarray(station[:, p]), vertices, tree, p)

@@ -24,7 +24,8 @@ class Tree(NamedTuple):
 
     faces (F, 3): corners, in the tree's order; closed (F,): whether each is of a closed surface; centre (K, 3) m and
     radius_m (K,) of the balls, in their parts' frames; skip (K,): next node after a node's contents; face (K,): a
-    leaf's triangle, -1 for other nodes; root (P,): each part's first node, -1 without triangles; owner (F,): parts.
+    leaf's triangle, -1 for other nodes; root (P,): each part's first node, -1 without triangles; owner (F,): parts;
+    half (K, 3) m: half the sides of boxes about the same centres; first, count (P,): each part's triangles.
     """
 
     faces: np.ndarray
@@ -35,6 +36,9 @@ class Tree(NamedTuple):
     face: np.ndarray
     root: np.ndarray
     owner: np.ndarray
+    half: np.ndarray
+    first: np.ndarray
+    count: np.ndarray
 
 
 def curve(place: np.ndarray) -> np.ndarray:
@@ -48,7 +52,7 @@ def curve(place: np.ndarray) -> np.ndarray:
 
 
 @LOOPS
-def fill(low, high, begin, end, node, centre, radius_m, skip, face):
+def fill(low, high, begin, end, node, centre, half, radius_m, skip, face):
     """Fill the nodes of one part, from `node` on, with triangles begin to end - 1; return the next free node.
 
     low, high: (F, 3) m, the triangles' boxes.
@@ -74,8 +78,9 @@ def fill(low, high, begin, end, node, centre, radius_m, skip, face):
                 for f in range(begin + leaf, min(begin + leaf + wide, end)):
                     least, most = min(least, low[f, i]), max(most, high[f, i])
                 centre[at, i] = 0.5 * (least + most)
+                half[at, i] = 0.5 * (most - least) * (1.0 + 1e-6) + 1e-9
                 square += 0.25 * (most - least) ** 2
-            # A little room for rounding where rays are compared with the ball.
+            # A little room for rounding where rays are compared with the ball, as with the box.
             radius_m[at] = np.sqrt(square) * (1.0 + 1e-6) + 1e-9
             skip[at] = start[min(leaf + wide, leaves)]
             face[at] = begin + leaf if wide == 1 else -1
@@ -111,12 +116,16 @@ def tree(surfaces: dict, faces: np.ndarray) -> Tree:
     order = np.argsort((owner << (3 * BITS)) | curve(place), kind="stable")
     faces, owner, low, high = np.ascontiguousarray(faces[order], np.int64), owner[order], low[order], high[order]
     room = 2 * len(faces) + len(closed)
-    centre, radius_m = np.empty((room, 3)), np.empty(room)
+    centre, radius_m, half = np.empty((room, 3)), np.empty(room), np.empty((room, 3))
     skip, face, root = np.empty(room, np.int64), np.empty(room, np.int64), np.full(len(closed), -1)
     node = 0
     for part in np.unique(owner):
         begin, end = np.searchsorted(owner, [part, part + 1])
         root[part] = node
-        node = fill(low, high, begin, end, node, centre, radius_m, skip, face)
+        node = fill(low, high, begin, end, node, centre, half, radius_m, skip, face)
     sides = np.asarray(closed, np.bool_)[owner]
-    return Tree(faces, sides, centre[:node], radius_m[:node], skip[:node], face[:node], root, owner)
+    first = np.searchsorted(owner, np.arange(len(closed)))
+    count = np.bincount(owner, minlength=len(closed))
+    return Tree(
+        faces, sides, centre[:node], radius_m[:node], skip[:node], face[:node], root, owner, half[:node], first, count
+    )  # fmt: skip

@@ -1,0 +1,175 @@
+"""A part's triangles sorted by where a narrow cone of rays can meet them, for parts that turn slowly.
+
+Take a plane through the part's middle, across the direction to the station. Seen from the station, every triangle has
+an image on it. In the part's frame the station moves a little during some symbols, by up to d from the place from which
+images are taken, R away. A ray to it that crosses the plane at q, less than twice the part's radius from the middle, is
+at height h at most |h| d (1 + |q| / R) R / ((R - d) (R - |h|)) away from q, as seen from that place. Rays that cross
+it farther out pass by the part. So the plane is divided into cells, each with the triangles whose images, widened by as
+much, reach into it. A ray is compared with those of its cell.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.jit import INLINED, LEAN
+from lowalt.effects.channel.surface_tree import Tree
+
+SYMBOLS = 64
+"""Symbols whose rays share a grid."""
+SIDES = 16, 64
+"""Fewest and most cells along each side."""
+ROOM = 12
+"""Entries of a grid for each triangle; where that is too few, rays are asked by the tree."""
+NEAREST = 4.0
+"""Least distance of the station for a grid, in the part's radius and the station's way together."""
+
+
+class RayGrid(NamedTuple):
+    """Grids of a part, one for every SYMBOLS symbols.
+
+    axes (K, 3, 3): to the station, and two across; middle (3,) and radius_m of the part; far (K,) m: the station's
+    distance; way (K,) m: how far it moves, negative where the tree is to be asked; low (K, 2) m, wide (K, 2) 1/m: edges
+    and cells a metre; cells: along each side; start (K, cells^2 + 1): where each begins in pool (K, ...), of triangles.
+    """
+
+    axes: np.ndarray
+    middle: np.ndarray
+    radius_m: float
+    far: np.ndarray
+    way: np.ndarray
+    low: np.ndarray
+    wide: np.ndarray
+    cells: int
+    start: np.ndarray
+    pool: np.ndarray
+
+
+NONE = RayGrid(
+    np.zeros((1, 3, 3)), np.zeros(3), 0.0, np.zeros(1), np.full(1, -1.0), np.zeros((1, 2)), np.zeros((1, 2)), 0,
+    np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int64),
+)  # fmt: skip
+"""No grid at all."""
+
+
+@LEAN
+def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
+    """Fill out (4,) with the edges of triangle f's widened image, low and high; return whether any ray can meet it."""
+    i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
+    if tree.closed[f]:
+        d0, d1, d2 = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
+        e0, e1, e2 = vertices[k, 0] - vertices[i, 0], vertices[k, 1] - vertices[i, 1], vertices[k, 2] - vertices[i, 2]
+        u, v, w = d1 * e2 - d2 * e1, d2 * e0 - d0 * e2, d0 * e1 - d1 * e0
+        a, b, c = middle[0] - vertices[i, 0], middle[1] - vertices[i, 1], middle[2] - vertices[i, 2]
+        facing = u * (a + far * axes[0, 0]) + v * (b + far * axes[0, 1]) + w * (c + far * axes[0, 2])
+        # A closed surface hides nothing with the side turned away.
+        if facing < 0.0 and facing * facing > (u * u + v * v + w * w) * (way + 1e-9 * far) ** 2:
+            return False
+    off = 0.0
+    out[0], out[1], out[2], out[3] = np.inf, np.inf, -np.inf, -np.inf
+    for corner in range(3):
+        at = tree.faces[f, corner]
+        x, y, z = vertices[at, 0] - middle[0], vertices[at, 1] - middle[1], vertices[at, 2] - middle[2]
+        height = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
+        off = max(off, abs(height))
+        larger = far / (far - height)
+        for side in range(2):
+            place = (x * axes[1 + side, 0] + y * axes[1 + side, 1] + z * axes[1 + side, 2]) * larger
+            out[side], out[2 + side] = min(out[side], place), max(out[2 + side], place)
+    room = off * way * (1.0 + 2.0 * radius_m / far) * far / ((far - way) * (far - off)) + 1e-9 * far
+    out[0], out[1], out[2], out[3] = out[0] - room, out[1] - room, out[2] + room, out[3] + room
+    return True
+
+
+@LEAN
+def _filled(vertices, tree, p, axes, middle, radius_m, far, way, images, shown, low, wide, cells, start, pool):
+    """Fill one grid of part p; images (F, 4) and shown (F,) are work. Return whether there is room for it."""
+    first, count = tree.first[p], tree.count[p]
+    low[:] = np.inf
+    wide[:] = -np.inf
+    for f in range(count):
+        shown[f] = _image(vertices, tree, first + f, axes, middle, radius_m, far, way, images[f])
+        if shown[f]:
+            for side in range(2):
+                low[side], wide[side] = min(low[side], images[f, side]), max(wide[side], images[f, 2 + side])
+    for side in range(2):
+        wide[side] = cells * (1.0 - 1e-9) / max(wide[side] - low[side], 1e-9)
+    start[:] = 0
+    # Count the entries of each cell, then place them.
+    for turn in range(2):
+        for f in range(count):
+            if not shown[f]:
+                continue
+            i0, i1 = int((images[f, 0] - low[0]) * wide[0]), int((images[f, 2] - low[0]) * wide[0])
+            j0, j1 = int((images[f, 1] - low[1]) * wide[1]), int((images[f, 3] - low[1]) * wide[1])
+            for i in range(max(i0, 0), min(i1, cells - 1) + 1):
+                for j in range(max(j0, 0), min(j1, cells - 1) + 1):
+                    k = i * cells + j
+                    if turn == 0:
+                        start[k + 1] += 1
+                    else:
+                        pool[start[k]] = first + f
+                        start[k] += 1
+        if turn == 0:
+            for k in range(cells * cells):
+                start[k + 1] += start[k]
+            if start[cells * cells] > len(pool):
+                return False
+    for k in range(cells * cells, 0, -1):
+        start[k] = start[k - 1]
+    start[0] = 0
+    return True
+
+
+@LEAN
+def _fill(vertices, tree, p, grid, images, shown):
+    """Fill every grid of part p."""
+    for k in range(len(grid.way)):
+        if grid.way[k] >= 0.0 and not _filled(
+            vertices, tree, p, grid.axes[k], grid.middle, grid.radius_m, grid.far[k], grid.way[k], images, shown,
+            grid.low[k], grid.wide[k], grid.cells, grid.start[k], grid.pool[k],
+        ):  # fmt: skip
+            grid.way[k] = -1.0
+
+
+@INLINED
+def cell_of(grid, k, x, y, z, u, v, w):
+    """The cell of grid k that a ray from x, y, z along u, v, w crosses; -1 where it meets nothing, -2 for no answer."""
+    axes, cells = grid.axes[k], grid.cells
+    ahead = u * axes[0, 0] + v * axes[0, 1] + w * axes[0, 2]
+    if grid.way[k] < 0.0 or ahead < 0.5 * grid.far[k]:
+        return -2
+    a, b, c = x - grid.middle[0], y - grid.middle[1], z - grid.middle[2]
+    share = (a * axes[0, 0] + b * axes[0, 1] + c * axes[0, 2]) / ahead
+    a, b, c = a - share * u, b - share * v, c - share * w
+    right, up = a * axes[1, 0] + b * axes[1, 1] + c * axes[1, 2], a * axes[2, 0] + b * axes[2, 1] + c * axes[2, 2]
+    if right * right + up * up >= 4.0 * grid.radius_m * grid.radius_m:
+        return -1
+    i, j = (right - grid.low[k, 0]) * grid.wide[k, 0], (up - grid.low[k, 1]) * grid.wide[k, 1]
+    if i < 0.0 or j < 0.0 or i >= cells or j >= cells:
+        return -1
+    return int(i) * cells + int(j)
+
+
+def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> RayGrid:
+    """Return the grids of a part; station (N, 3) m, in the part's frame; vertices (V, 3) m."""
+    count, faces = -(-len(station) // SYMBOLS), int(tree.count[part])
+    cells = int(np.clip(math.isqrt(faces), *SIDES))
+    middle, radius_m = tree.centre[tree.root[part]].copy(), float(tree.radius_m[tree.root[part]])
+    axes, far, way = np.empty((count, 3, 3)), np.empty(count), np.empty(count)
+    for k in range(count):
+        some = station[k * SYMBOLS : (k + 1) * SYMBOLS] - middle
+        ahead = some[len(some) // 2]
+        far[k] = np.linalg.norm(ahead)
+        way[k] = np.linalg.norm(some - ahead, axis=1).max()
+        right = np.cross(ahead, np.eye(3)[abs(ahead).argmin()])
+        right /= np.linalg.norm(right)
+        axes[k] = ahead / far[k], right, np.cross(ahead / far[k], right)
+    way[far < NEAREST * (radius_m + way)] = -1.0
+    grid = RayGrid(
+        axes, middle, radius_m, far, way, np.empty((count, 2)), np.empty((count, 2)), cells,
+        np.empty((count, cells * cells + 1), np.int64), np.empty((count, ROOM * faces + cells * cells), np.int64),
+    )  # fmt: skip
+    _fill(vertices, tree, part, grid, np.empty((faces, 4)), np.empty(faces, np.bool_))
+    return grid
