@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from lowalt.__main__ import main
 from lowalt.common.errors import InputError
 from lowalt.recognition import checkpoint, eight_bits, model_file, runs, upload, zoo
 from lowalt.recognition.export import export
+from made_predictions import facts
 from trainings import SCHEME, SETTINGS, equal, sources
 
 ROOT = Path(__file__).parent.parent
@@ -113,6 +115,20 @@ def test_eight_bits_move_a_weight_by_at_most_half_a_step_of_its_row():
     assert (error <= 1.001 * largest / 254).all() and error[1] > largest[1] / 1000
     layer = {"gamma": torch.ones(3, 3), "gamma.scale": torch.ones(3)}
     assert equal(eight_bits.restored(eight_bits.rounded(layer, set())), layer)
+
+
+def test_an_entry_is_held_against_the_weights_as_trained_sample_by_sample(monkeypatch):
+    told = {"exact": np.eye(2)[[0, 1, 1, 1]], "entry": np.array([[0.9, 0.1], [0.7, 0.3], [0.4, 0.6], [0.8, 0.2]])}
+    monkeypatch.setattr(zoo, "probabilities", lambda model, *rest: told[model])
+    exact, entry = SimpleNamespace(model="exact"), SimpleNamespace(model="entry")
+    samples = SimpleNamespace(facts=facts(models=1).take(np.array([0, 6, 7, 1])))
+    assert samples.facts.label.tolist() == [0, 1, 1, 0]
+    found = zoo.held_against(exact, entry, samples)
+    assert found == {
+        "samples": 4, "exact_percent": 75.0, "percent": 75.0, "changed": 2, "largest_change": pytest.approx(0.8)
+    }  # fmt: skip
+    told["entry"][1] = [0.2, 0.8]
+    assert zoo.held_against(exact, entry, samples)["percent"] == 100.0
 
 
 def test_an_entry_of_the_zoo_is_small_measured_and_predicts_by_name(finished, views, tmp_path, monkeypatch, capsys):
