@@ -10,7 +10,7 @@ from lowalt.recordings import ablate, kinds, reality
 from lowalt.recordings.library import Library
 from lowalt.recordings.presence import ENOUGH, noise_floor, present
 from lowalt.recordings.receiver import Receiver, clipped, highpassed, received
-from lowalt.recordings.scenes import clouds_of, intervals
+from lowalt.recordings.scenes import MARGIN, clouds_of, intervals, samples, stretch
 from lowalt.recordings.twin import Twin, radii, sized, strengthened
 
 QUIET = {
@@ -114,6 +114,25 @@ def test_coloured_noise_and_a_line_that_stays_are_no_target():
     # Where the noise is known, a recording of one window is enough.
     assert not present(coloured[:1], LOOKING, coloured[1:2]).any()
     assert present(stays[5:6], LOOKING, coloured[1:2]).all()
+
+
+def test_a_real_channel_records_the_real_part_and_a_complex_one_both():
+    wave = np.exp(2j * np.pi * 300.0 * np.arange(4000) / 6000.0)
+    heard = {}
+    for channel in ("real", "complex"):
+        twin = replace(LOOKING, channel=channel)
+        heard[channel] = samples(twin, QUIET, wave, np.random.default_rng(0))
+        assert abs(samples(twin, QUIET, wave, np.random.default_rng(0), target=False)).max() < 2e-3
+    assert np.isrealobj(heard["real"]) and np.iscomplexobj(heard["complex"])
+    np.testing.assert_allclose(heard["complex"], wave, atol=2e-3)
+    np.testing.assert_allclose(heard["real"], wave.real, atol=2e-3)
+
+
+def test_a_stretch_is_as_long_as_asked_and_begins_behind_the_margin():
+    twin = replace(LOOKING, channel="complex", sampling="bare")
+    found = stretch(np.arange(2000.0) + 0j, twin, 0.2)
+    # Two samples a symbol: symbol n of the stretch is sample 2 (n + MARGIN).
+    np.testing.assert_allclose(found, 2 * (np.arange(600) + MARGIN), atol=1e-6)
 
 
 def test_simulated_windows_hold_a_target_where_a_receiver_can_hear_it(library):
