@@ -67,11 +67,12 @@ def _in_orders(
         moving = echo.by_need["symbol_motion"].module
         times, farther = view.times_s + moving.nodes_s(view, count)[:, None], moving.farther_m(view)
     found: list[list[time_series.Moments]] = [[] for _ in groups]
-    first = None
+    first, paired = None, []
     for rays in _rays(echo, view, on, times, farther):
-        first = first or rays
-        for mine, (_, strength, _) in zip(found, groups, strict=True):
-            mine.append(rays.moments(strength))
+        if first is None:
+            first, paired = rays, [rays.paired(strength) for _, strength, _ in groups]
+        for mine, own in zip(found, paired, strict=True):
+            mine.append(rays.moments(own))
     series = [time_series.orders(mine) for mine in found]
     samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
     now = echo.sending.aired[rows] if turned is not None or count > 1 else None
@@ -87,7 +88,9 @@ def _in_orders(
         if order == 0:
             still = whole
         else:
-            samples += shape * waveform.transmit(whole, now)
+            heard = waveform.transmit(whole, now)
+            heard *= shape
+            samples += heard
         for (cut, _, lit), spectrum in zip(groups, spectra, strict=True):
             if cut:
                 samples[lit, :cut] += shape[:cut] * waveform.transmit(spectrum[lit], other[lit])[:, :cut]

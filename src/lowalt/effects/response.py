@@ -95,30 +95,36 @@ class OneWayFactors:
     def summed(self, strength: np.ndarray) -> np.ndarray:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
 
-        strength: as in `moments`. Symbols without any strength are zero.
+        strength: as in `paired`. Symbols without any strength are zero.
         """
-        return self.spectrum(self.moments(strength))
+        return self.spectrum(self.moments(self.paired(strength)))
 
-    def moments(self, strength: np.ndarray) -> list[np.ndarray]:
-        """Return real and imaginary parts (N, 2, P) of each pair of paths' coefficients, from which `spectrum` follows.
+    def paired(self, strength: np.ndarray) -> list[np.ndarray]:
+        """Return the amplitudes (N or 1, L) of each pair of paths, the same at all instants of the symbols.
 
         strength: factors (N or 1, L) on the points' unit two-way amplitudes, also (R, N, L), factors of their own for
         each path there and back; for a way out by path a and back by path b, the factor is the geometric mean of those
         of a and b; or (R, R, N, L), the factors of every way out and way back.
         """
         strength = self.radio.scale * np.atleast_2d(strength)
+        if strength.ndim == 4:
+            return [strength[a, b] for a, b, _ in self.pairs]
+        if strength.ndim == 3:
+            return [strength[a] if a == b else np.sqrt(strength[a] * strength[b]) for a, b, _ in self.pairs]
+        return [strength for _ in self.pairs]
+
+    def moments(self, paired: list[np.ndarray]) -> list[np.ndarray]:
+        """Return real and imaginary parts (N, 2, P) of each pair of paths' coefficients, from which `spectrum` follows.
+
+        paired: the amplitudes that `paired` gives.
+        """
         half_cells, result = 0.5 * self.radio.cells, []
-        for (a, b, times), (middle, reach) in zip(self.pairs, self.frames, strict=True):
+        for (a, b, times), (middle, reach), own in zip(self.pairs, self.frames, paired, strict=True):
             there, home = self.out[a], self.back[b]
             orders = len(tables.table(reach, self.radio.subcarriers, self.rest))
             found = np.empty((len(self.refs), 2, len(self.nodes), orders))
-            paired = strength
-            if strength.ndim == 4:
-                paired = strength[a, b]
-            elif strength.ndim == 3:
-                paired = strength[a] if a == b else np.sqrt(strength[a] * strength[b])
             moment_loops.moments(
-                paired, there.factors, home.factors, times, there.excess, home.excess, middle, half_cells, reach, found,
+                own, there.factors, home.factors, times, there.excess, home.excess, middle, half_cells, reach, found,
             )  # fmt: skip
             planes = found.reshape(2 * len(self.refs), -1)
             if len(self.nodes) > 1:

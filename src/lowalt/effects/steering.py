@@ -63,12 +63,19 @@ class Steered:
 
         Symbols in which the factor is zero for all points are zero.
         """
-        return self.spectrum(self.moments(factor))
+        return self.spectrum(self.moments(self.paired(factor)))
 
-    def moments(self, factor: np.ndarray | float = 1.0) -> list[list[np.ndarray]]:
-        """Return the moments (`response.OneWayFactors.moments`) of every beam, with `factor` on every amplitude."""
+    def paired(self, factor: np.ndarray | float = 1.0) -> list[list[np.ndarray]]:
+        """Return every beam's amplitudes (`response.OneWayFactors.paired`), with `factor` on every point's amplitude.
+
+        They serve all instants of the same symbols.
+        """
         roots = np.sqrt(self.view.cloud.rcs_m2)
-        return [rays.moments(roots * _rows_of(factor, rows)) for rows, _, rays in self.beams]
+        return [rays.paired(roots * _rows_of(factor, rows)) for rows, _, rays in self.beams]
+
+    def moments(self, paired: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
+        """Return the moments (`response.OneWayFactors.moments`) of every beam, with the amplitudes of `paired`."""
+        return [rays.moments(mine) for (_, _, rays), mine in zip(self.beams, paired, strict=True)]
 
     def spectrum(self, moments: list[list[np.ndarray]]) -> np.ndarray:
         """Return the subcarriers (N, M) of every beam's moments, or of sums of such of instants alike."""
