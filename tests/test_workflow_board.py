@@ -32,7 +32,7 @@ def board_of(done: int = 2, running: int = 1) -> Board:
 
 
 def test_a_line_has_done_of_all_rate_time_left_and_what_runs_now():
-    assert board_of().line("echo", 112.0, lambda log: None) == "echo  2/10, 10.0/min, 0:48 left; seen/2"
+    assert board_of().line("echo", 112.0, lambda log, since: None) == "echo  2/10, 10.0/min, 0:48 left; seen/2"
     assert board_of().total(112.0) == "all   2/12 jobs, 0:12 since the start"
 
 
@@ -40,7 +40,7 @@ def test_progress_of_a_running_job_counts_as_its_part():
     halfway = {"2.log": progress.Progress(30, 60, "models")}.get
     # 2.5 jobs in 15 s, so 7.5 jobs take 45 s.
     assert board_of().line("echo", 115.0, halfway) == "echo  2/10, 8.0/min, 0:45 left; seen/2 30/60 models"
-    assert "left" not in board_of(done=0).line("echo", 115.0, lambda log: None)
+    assert "left" not in board_of(done=0).line("echo", 115.0, lambda log, since: None)
 
 
 def test_no_time_left_is_named_before_a_tenth_of_a_job_is_done():
@@ -59,13 +59,13 @@ def test_the_last_job_of_a_stage_says_so_and_an_unknown_job_nothing():
     assert board.finish(1, 5.0) is None and board.finish(7, 5.0) is None
     assert board.running() == ["echo"]
     assert board.finish(2, 66.0) == "echo" and board.running() == []
-    assert board.line("echo", 99.0, lambda log: None) == "echo 2/2, done in 1:05"
+    assert board.line("echo", 99.0, lambda log, since: None) == "echo 2/2, done in 1:05"
 
 
 def test_failed_jobs_are_counted_and_not_done():
     board = board_of(done=0, running=2)
     board.finish(0, 105.0, good=False)
-    assert board.line("echo", 106.0, lambda log: None).startswith("echo  0/10, 1 failed")
+    assert board.line("echo", 106.0, lambda log, since: None).startswith("echo  0/10, 1 failed")
 
 
 @pytest.mark.parametrize(("seconds", "text"), [(-1, "0:00"), (59.6, "1:00"), (3599, "59:59"), (7384, "2:03:04")])
@@ -81,7 +81,9 @@ def test_rates_are_in_the_unit_that_reads_best(rate, text):
 def test_a_board_survives_its_file():
     board = board_of()
     again = Board.read(json.loads(json.dumps(board.kept())))
-    assert again == board and again.line("echo", 112.0, lambda log: None) == board.line("echo", 112.0, lambda log: None)
+    assert again == board and again.line("echo", 112.0, lambda log, since: None) == board.line(
+        "echo", 112.0, lambda log, since: None
+    )
 
 
 def test_progress_is_written_now_and_then_and_its_last_line_read(tmp_path):
@@ -94,6 +96,9 @@ def test_progress_is_written_now_and_then_and_its_last_line_read(tmp_path):
     log = tmp_path / "train.log"
     log.write_text("x" * 9000 + "\nprogress 8/40 steps\nloss 0.4\n" + text.getvalue()[:40] + "progress 9/4")
     assert progress.last(log) == (8, 40, "steps")
+    # A job in a queue has the log of an earlier run until it starts.
+    written = log.stat().st_mtime
+    assert progress.last(log, written) == (8, 40, "steps") and progress.last(log, written + 2) is None
     log.write_text("no such line")
     assert progress.last(log) is None and progress.last(tmp_path / "none") is None
 

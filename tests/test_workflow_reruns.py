@@ -90,6 +90,7 @@ CHANGES = {
     "training steps": Change(TRAIN, overlay=TRAINING),
     "network": Change(TRAIN, overlay={"recognition": {"network": {"heads": 2}}}),
     "augmentation": Change(TRAIN, overlay={"recognition": {"augmentation": {"mirror": 0.0}}}),
+    "nodes": Change(TRAIN, ("lowalt.recognition.nodes 2 1",), overlay={"recognition": {"processes": 2, "nodes": 2}}),
     "evaluation batch": Change(EVALUATE, overlay={"recognition": {"evaluation": {"batch": 32}}}),
     "protocol": Change(
         TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"protocols": ["unseen"]}}

@@ -4,6 +4,7 @@ A line is `progress 340/2000 steps`; the last one counts. Commands write to thei
 seconds, so short ones write none.
 """
 
+import os
 import re
 import sys
 import time
@@ -51,10 +52,16 @@ def reported(items: Iterable[Item], total: int, unit: str) -> Iterator[Item]:
         report(done)
 
 
-def last(log: str | Path) -> Progress | None:
-    """Return the last progress in a log file, or None where it has none in its last lines or is not there."""
+def last(log: str | Path, since: float = 0.0) -> Progress | None:
+    """Return the last progress in a log file, or None where it has none in its last lines or is not there.
+
+    since: seconds since the epoch; a file last written more than a second before is of an earlier run.
+    """
     try:
         with Path(log).open("rb") as file:
+            # File systems may keep whole seconds.
+            if os.fstat(file.fileno()).st_mtime < since - 1:
+                return None
             file.seek(max(0, file.seek(0, 2) - TAIL_BYTES))
             found = LINE.findall(file.read())
     except OSError:

@@ -8,8 +8,8 @@ from dataclasses import asdict, dataclass, field
 
 from lowalt.common.progress import Progress
 
-Reader = Callable[[str], Progress | None]
-"""Reads from a job's log how much of the job is done."""
+Reader = Callable[[str, float], Progress | None]
+"""Reads from a job's log how much of the job is done; the log may still be that of a run before the job's start (s)."""
 
 LEAST_PART = 0.1
 """Part of a job that must be done before the first estimate: a job starts with modules and machine code to compile."""
@@ -97,7 +97,7 @@ class Board:
         now_running = {key: job for key, job in self.jobs.items() if job.stage == name}
         if not now_running and stage.done >= stage.total:
             return f"{head}, done in {span(stage.ended - stage.started)}"
-        found = {key: read(job.log) for key, job in now_running.items()}
+        found = {key: read(job.log, job.started) for key, job in now_running.items()}
         parts = sum(progress.done / progress.total for progress in found.values() if progress and progress.total)
         done, spent = stage.done + parts, now - stage.started
         if spent > 0 and (stage.done or parts >= LEAST_PART):
