@@ -11,17 +11,25 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, text_file
 
 
-def read_csv(path: str | Path, *needed: str) -> list[dict[str, str]]:
-    """Return a CSV file's rows as dicts of text.
+def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
+    """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
 
-    Raises: InputError naming the file and the columns it lacks.
+    Raises: InputError naming the file and the columns it lacks, or the line that has not a cell for every column.
     """
-    with text_file(path, "table") as file:
+    with text_file(path, what) as file:
         reader = csv.DictReader(file)
-        missing = set(needed) - set(reader.fieldnames or ())
+        columns = reader.fieldnames or ()
+        missing = set(needed) - set(columns)
         if missing:
             raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
-        return list(reader)
+        rows = []
+        for row in reader:
+            # The reader fills a short row with None, and keeps the cells beyond the last column under the key None.
+            if None in row or None in row.values():
+                count = sum(value is not None for value in row.values()) + len(row.get(None, [0])) - 1
+                raise InputError(f"{path} line {reader.line_num}: {count} cells, expected {len(columns)}")
+            rows.append(row)
+        return rows
 
 
 def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:

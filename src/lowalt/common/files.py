@@ -101,10 +101,14 @@ def sha256(path: str | Path) -> str:
 def existing(path: str | Path, what: str) -> Path:
     """Return `path` as a Path.
 
-    Raises: InputError naming `what` and the path where there is no such file.
+    Raises: InputError naming `what` and the path where there is no such file, or where no file can have this name.
     """
     path = Path(path)
-    if not path.is_file():
+    try:
+        found = path.is_file()
+    except OSError as error:
+        raise InputError(f"{what}: no file at {path} ({error.strerror})") from error
+    if not found:
         raise InputError(f"{what}: no file at {path}")
     return path
 

@@ -59,9 +59,10 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
         text = row[name]
         try:
             row[name] = int(text) if name == "model" else float(text) if text else math.nan
-        except ValueError:
+            infinite = math.isinf(row[name])
+        except (ValueError, OverflowError):
             raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a number") from None
-        if math.isinf(row[name]):
+        if infinite:
             raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a finite number")
     if SCALE in row and not row[SCALE] > 0:
         raise InputError(f"{path}, line {line}, column {SCALE}: {row[SCALE]}, expected a positive number")

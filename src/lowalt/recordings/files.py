@@ -46,7 +46,11 @@ def _wav(path: Path, record: Record) -> _Table:
     """Read a WAV file, which states its rate."""
     from scipy.io import wavfile
 
-    rate, values = wavfile.read(path)
+    try:
+        rate, values = wavfile.read(path)
+    except UnboundLocalError as error:
+        # scipy's reader ends so where a file states no format or holds no data.
+        raise InputError(f"{path}: a .wav file without a format or without samples") from error
     values = values[:, None] if values.ndim == 1 else values
     return _Table(values, (), float(rate))
 

@@ -6,15 +6,14 @@ row in the table of targets or make a new row: one file is then a whole new targ
 unit, the frames of a recording) are checked by that source's own `check_record`.
 """
 
-import csv
 import math
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from lowalt.common.classes import AIRBORNE, classes_of, like
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import text_file
 from lowalt.common.yaml_files import load_yaml
 from lowalt.targets import record_schema
 
@@ -38,13 +37,13 @@ def load_table(path: str | Path) -> dict[str, dict]:
 
     Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive number.
     """
-    with text_file(path, "table of published targets") as file:
-        reader = csv.DictReader(file)
-        columns, rows = reader.fieldnames or [], list(reader)
-    expected = {*_WORDS, *_WHOLE, *_NUMBERS}
+    rows = read_csv(path, what="table of published targets")
+    if not rows:
+        raise InputError(f"{path}: no row, expected one row a subtype")
+    columns, expected = list(rows[0]), {*_WORDS, *_WHOLE, *_NUMBERS}
     if set(columns) != expected:
         raise InputError(f"{path}: columns {sorted(set(columns) ^ expected)} missing or unknown")
-    table = {}
+    table: dict[str, dict] = {}
     for row in rows:
         name, where = row["name"], f"{path}: {row['name']}"
         if name in table:
@@ -52,8 +51,6 @@ def load_table(path: str | Path) -> dict[str, dict]:
         if row["unseen_protocol"] not in ("seen", "unseen"):
             raise InputError(f"{where}: unseen_protocol {row['unseen_protocol']!r}, expected seen or unseen")
         table[name] = {column: _cell(where, column, row[column]) for column in columns}
-    if not table:
-        raise InputError(f"{path}: no row, expected one row a subtype")
     try:
         classes_of(table)
     except InputError as error:

@@ -1,0 +1,69 @@
+"""Damaged files on which the fuzzer (`make fuzz`) once saw a reader end with a traceback: each is refused by name."""
+
+import struct
+import zipfile
+
+import numpy as np
+import pytest
+import torch
+
+from lowalt.common.csv_tables import read_csv
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.motion.table import COLUMNS, read_table
+from lowalt.recognition import checkpoint, schemes
+from lowalt.recordings.files import read
+from lowalt.recordings.record import Record
+from lowalt.targets.records import load_table
+from lowalt.tiles.files import Tiles
+from lowalt.tiles.files import write as write_tiles
+
+
+@pytest.mark.parametrize("reads", [read_csv, lambda path: schemes.read(path, "ABC"), load_table])
+@pytest.mark.parametrize(("cells", "count"), [("1", 1), ("1,2,3,4", 4)])
+def test_a_line_of_a_table_with_other_cells_than_columns_is_refused(reads, cells, count, tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text(f"scheme,name,note\nx,y,z\n{cells}\n")
+    with pytest.raises(InputError, match=rf"table\.csv line 3: {count} cells, expected 3"):
+        reads(path)
+
+
+def test_a_number_of_a_motion_model_beyond_floating_point_is_refused(tmp_path):
+    path = tmp_path / "motion.csv"
+    cells = ["9" * 400 if name == "model" else "1" for name in COLUMNS]
+    path.write_text(f"{','.join(COLUMNS)}\n{','.join(cells)}\n")
+    with pytest.raises(InputError, match=r"line 2, column model: '9+', expected a number"):
+        read_table(path)
+
+
+def test_a_name_that_no_file_can_have_is_that_of_no_file(tmp_path):
+    with pytest.raises(InputError, match=r"frozen file: no file at .*too long"):
+        existing(tmp_path / ("9" * 5000), "frozen file")
+
+
+@pytest.mark.parametrize("offsets", [[0, 9, 4, 6], [0, 2, 4, 7], [1, 2, 4, 6], [0, -2, 4, 6], []])
+def test_offsets_that_do_not_part_the_tiles_are_refused(offsets, tmp_path):
+    path = tmp_path / "tiles.npz"
+    write_tiles(path, [b"ab", b"cd", b"ef"])
+    assert [Tiles(path)[number] for number in range(3)] == [b"ab", b"cd", b"ef"]
+    np.savez(path, data=np.frombuffer(b"abcdef", np.uint8), offsets=np.array(offsets, "<i8"))
+    with pytest.raises(InputError, match=r"tiles\.npz: offsets\.npy does not part"):
+        Tiles(path)
+
+
+def test_a_checkpoint_whose_pickle_ends_early_is_refused(tmp_path):
+    whole, path = tmp_path / "whole.pt", tmp_path / "cut.pt"
+    checkpoint.save(whole, "{}", {"weights": {"a": torch.ones(5)}})
+    with zipfile.ZipFile(whole) as old, zipfile.ZipFile(path, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, b"\x80\x02." if name.endswith("data.pkl") else old.read(name))
+    with pytest.raises(InputError, match=r"cut\.pt: not a checkpoint"):
+        checkpoint.load(path)
+
+
+@pytest.mark.parametrize("chunk", [b"", b"fmt " + struct.pack("<IHHIIHH", 16, 1, 1, 800, 1600, 2, 16)])
+def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
+    path = tmp_path / "a.wav"
+    path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
+    with pytest.raises(InputError, match=r"a\.wav: a \.wav file without a format or without samples"):
+        read(Record(file=path, carrier_hz=24e9, channel="real", source="test", licence="none"))
