@@ -41,7 +41,7 @@ def test_a_name_that_no_file_can_have_is_that_of_no_file(tmp_path):
         existing(tmp_path / ("9" * 5000), "frozen file")
 
 
-@pytest.mark.parametrize("offsets", [[0, 9, 4, 6], [0, 2, 4, 7], [1, 2, 4, 6], [0, -2, 4, 6], []])
+@pytest.mark.parametrize("offsets", [[0, 9, 4, 6], [0, 2, 4, 7], [0, -2, 4, 6], []])
 def test_offsets_that_do_not_part_the_tiles_are_refused(offsets, tmp_path):
     path = tmp_path / "tiles.npz"
     write_tiles(path, [b"ab", b"cd", b"ef"])

@@ -95,9 +95,9 @@ class Tiles:
         Raises: InputError naming the file where it is missing or not a tiles file.
         """
         self.path = existing(path, "tiles")
-        self.offsets = np.array(map_array(self.path, "offsets.npy"))
+        self.offsets = ends = np.array(map_array(self.path, "offsets.npy"))
         _, size, self._start = stored_array(self.path, "data.npy")
-        if not len(self.offsets) or self.offsets[0] or (np.diff(self.offsets) < 0).any() or self.offsets[-1] != size:
+        if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
             raise InputError(f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged")
         # Plain reads, not a map: mapped pages of gigabytes would count as this process's memory.
         self._file = self.path.open("rb")
