@@ -11,7 +11,7 @@ import yaml
 from dataset import RENDER, SEED, SNRS, SPLIT, build
 from lowalt.common.errors import InputError
 from lowalt.shards import ShardSet
-from lowalt.shards.card import main
+from lowalt.shards.card import main, readme, write_samples
 
 CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
 
@@ -52,6 +52,22 @@ def test_samples_are_all_listed(published):
             (300.0, False) if row["snr_db"] == "inf" else (float(row["snr_db"]), True)
         )
         assert row["key"].encode() in (published / row["shard"]).read_bytes()
+
+
+def test_tables_are_held_one_at_a_time_by_the_card_too(published, monkeypatch):
+    shards = ShardSet(published / "index.json")
+    keys, held = [], []
+    for entry, table in shards.tables():
+        assert len(table) == entry["samples"]
+        keys += table["key"].tolist()
+        held.append(len(shards._tables))
+    assert held == [1] * len(shards.shards) and len(held) > 1 and not shards._tables
+    assert keys == shards.keys.tolist()
+    monkeypatch.setattr(ShardSet, "_column", lambda *_: pytest.fail("a column of all samples was read"))
+    readme(ShardSet(published / "index.json"), "run: x", "x", "MIT")
+    write_samples(ShardSet(published / "index.json"), published / "again.csv")
+    assert (published / "again.csv").read_bytes() == (published / "samples.csv").read_bytes()
+    (published / "again.csv").unlink()
 
 
 def test_checksums_of_the_description_are_right(published):

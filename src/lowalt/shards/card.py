@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-import numpy as np
 import yaml
 
 from lowalt import __version__
@@ -68,11 +67,20 @@ def _slug(key: str) -> str:
     return found[1]
 
 
-def _subtypes(shards: ShardSet) -> tuple[np.ndarray, list[dict]]:
-    """Return the number of every sample's subtype, and one record of each subtype."""
-    slugs = [_slug(key.decode()) for key in shards.keys.tolist()]
-    _, first, numbers = np.unique(slugs, return_index=True, return_inverse=True)
-    return numbers, [shards.record(int(place)) for place in first]
+def _census(shards: ShardSet) -> tuple[dict[str, dict], Counter, Counter]:
+    """Return a record of each subtype by its slug, and the counts of samples by slug and by SNR (dB)."""
+    first: dict[str, int] = {}
+    subtypes: Counter = Counter()
+    snrs: Counter = Counter()
+    start = 0
+    for _, table in shards.tables():
+        slugs = [_slug(key.decode()) for key in table["key"].tolist()]
+        for place, slug in enumerate(slugs, start):
+            first.setdefault(slug, place)
+        subtypes.update(slugs)
+        snrs.update(table["snr_db"].astype(float).tolist())
+        start += len(table)
+    return {slug: shards.record(place) for slug, place in sorted(first.items())}, subtypes, snrs
 
 
 def _counts(shards: ShardSet) -> str:
@@ -81,13 +89,10 @@ def _counts(shards: ShardSet) -> str:
     for entry in shards.shards:
         places[entry["group"], entry["fold"]] += entry["samples"]
     parts = [_table(("subtypes", "fold", "samples"), [(*place, number) for place, number in sorted(places.items())])]
-    numbers, records = _subtypes(shards)
-    counts = np.bincount(numbers, minlength=len(records))
-    rows = [(record["category"], record["subtype"], record["group"], count)
-            for record, count in zip(records, counts, strict=True)]  # fmt: skip
+    records, counts, snrs = _census(shards)
+    rows = [(record["category"], record["subtype"], record["group"], counts[slug]) for slug, record in records.items()]
     parts.append(_table(("category", "subtype", "group", "samples"), sorted(rows)))
-    snrs = sorted(Counter(shards.snrs_db.tolist()).items())
-    parts.append(_table(("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in snrs]))
+    parts.append(_table(("SNR (dB)", "samples"), [(f"{snr:g}", number) for snr, number in sorted(snrs.items())]))
     sizes = [entry["bytes"] / 1e6 for entry in shards.shards]
     parts.append(
         f"{len(sizes)} shards of {min(sizes):.1f} to {max(sizes):.1f} MB, {sum(sizes) / 1e3:.3f} GB in all, "
@@ -98,16 +103,16 @@ def _counts(shards: ShardSet) -> str:
 
 def write_samples(shards: ShardSet, path: Path) -> None:
     """Write the table of all samples (CSV, columns FIELDS), in the order of the index."""
-    numbers, records = _subtypes(shards)
-    columns = (shards.keys, shards.labels, numbers, shards.models, shards.snrs_db)
-    owners = np.repeat(np.arange(len(shards.shards)), [entry["samples"] for entry in shards.shards])
+    records, _, _ = _census(shards)
 
     def rows() -> Iterator[tuple]:
         """One row of the table for each sample."""
-        for key, label, number, model, snr_db, owner in zip(*columns, owners, strict=True):
-            entry, record = shards.shards[owner], records[number]
-            row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
-            yield (*row, model, f"{snr_db:g}", entry["name"])
+        for entry, table in shards.tables():
+            columns = (table[name].tolist() for name in ("key", "label", "model", "snr_db"))
+            for key, label, model, snr_db in zip(*columns, strict=True):
+                record = records[_slug(key.decode())]
+                row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
+                yield (*row, model, f"{snr_db:g}", entry["name"])
 
     write_csv(path, tuple(FIELDS), rows())
 

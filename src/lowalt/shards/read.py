@@ -7,7 +7,7 @@ import functools
 import hashlib
 import io
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +74,15 @@ class ShardSet:
                 raise InputError(f"{path.name}: the table is damaged or another one (SHA-256 differs)")
             self._tables[shard] = samples
         return self._tables[shard]
+
+    def tables(self) -> Iterator[tuple[dict, np.ndarray]]:
+        """Yield each shard's entry of the index and its rows (`samples.map_samples`), of one shard at a time.
+
+        Memory does not grow with the number of shards. Raises: InputError naming a table that is missing or damaged.
+        """
+        for shard, entry in enumerate(self.shards):
+            yield entry, self._table(shard)
+            self._tables.pop(shard, None)
 
     def _locate(self, number: int) -> tuple[int, int]:
         """A sample's shard and its row in the table of that shard."""
