@@ -137,5 +137,5 @@ def test_an_ordering_holds_only_where_its_interval_lies_above_zero(low, high, or
 def test_published_accuracies_are_read_as_averages_and_others_refused(tmp_path):
     assert PUBLISHED["seen", "ABC:VRP+TRP+VT"] == 99.88
     (tmp_path / "other.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(InputError, match=r"other\.csv: not a table"):
+    with pytest.raises(InputError, match=r"other\.csv: lacks the columns"):
         orderings.read_published(tmp_path / "other.csv")

@@ -1,4 +1,4 @@
-"""How a training is launched: the words of its command, what its job asks the queue for, and what is refused."""
+"""A training's launch: its command, the resources that its job requests from the queue, and refused settings."""
 
 import os
 import socket

@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 from lowalt.commands.for_programs import as_json, json_option
+from lowalt.common.command import exit_status
 from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED, shipped
 from lowalt.common.yaml_files import load_yaml
@@ -60,11 +61,6 @@ def command(given: argparse.Namespace) -> list[str]:
     line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
     line += ["--dry-run"] if given.dry_run else []
     return [*line, "--", *given.target] if given.target else line
-
-
-def exit_status(code: int) -> int:
-    """Return a status as shells give it: 128 and the signal's number for a process that a signal ended."""
-    return code if code >= 0 else 128 - code
 
 
 def ended(given: argparse.Namespace) -> dict:

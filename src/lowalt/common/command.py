@@ -18,6 +18,14 @@ from lowalt.common.files import text_of
 from lowalt.common.memory import keep_freed_memory
 
 
+def exit_status(code: int) -> int:
+    """Return the status of an ended process as shells give it: 128 and the signal's number where a signal ended it.
+
+    code: as `subprocess` gives it, a signal's number negative.
+    """
+    return code if code >= 0 else 128 - code
+
+
 def parser(module: str, description: str) -> argparse.ArgumentParser:
     """Return an argument parser for `python -m {module}` that already has `--settings`."""
     result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)

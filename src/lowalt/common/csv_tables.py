@@ -17,18 +17,16 @@ def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[s
     Raises: InputError naming the file and the columns it lacks, or the line that has not a cell for every column.
     """
     with text_file(path, what) as file:
-        reader = csv.DictReader(file)
-        columns = reader.fieldnames or ()
+        reader = csv.reader(file)
+        columns = next(reader, [])
         missing = set(needed) - set(columns)
         if missing:
-            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
+            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {columns}")
         rows = []
-        for row in reader:
-            # The reader fills a short row with None, and keeps the cells beyond the last column under the key None.
-            if None in row or None in row.values():
-                count = sum(value is not None for value in row.values()) + len(row.get(None, [0])) - 1
-                raise InputError(f"{path} line {reader.line_num}: {count} cells, expected {len(columns)}")
-            rows.append(row)
+        for cells in filter(None, reader):
+            if len(cells) != len(columns):
+                raise InputError(f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}")
+            rows.append(dict(zip(columns, cells, strict=True)))
         return rows
 
 

@@ -14,6 +14,7 @@ import socket
 import subprocess
 import sys
 
+from lowalt.common.command import exit_status
 from lowalt.common.errors import InputError
 
 NAMED = ["sh", "-c", 'export PET_LOCAL_ADDR="$(hostname)"; exec "$@"', "sh"]
@@ -73,7 +74,7 @@ def main(arguments: list[str]) -> None:
             f"training over {nodes} nodes: srun ended with status {status}; has the Slurm job {job} so many nodes, "
             "and do all see this folder?", file=sys.stderr,
         )  # fmt: skip
-        raise SystemExit(status if status > 0 else 128 - status)
+        raise SystemExit(exit_status(status))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
 """The paper's claims, and whether their orderings hold on a run's own data."""
 
-import csv
 from collections.abc import Iterable
 from pathlib import Path
 
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import text_file
 
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),
@@ -23,11 +22,12 @@ def read_published(path: str | Path) -> dict[tuple[str, str], float]:
 
     Raises: InputError for a file that is no such table.
     """
+    rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent", what="published accuracies")
     try:
-        with text_file(path, "published accuracies") as file:
-            rows = [row for row in csv.DictReader(file) if row["snr_db"] == "avg"]
-            return {(row["protocol"], row["scheme"]): float(row["accuracy_percent"]) for row in rows}
-    except (KeyError, ValueError, TypeError) as error:
+        return {
+            (row["protocol"], row["scheme"]): float(row["accuracy_percent"]) for row in rows if row["snr_db"] == "avg"
+        }
+    except ValueError as error:
         raise InputError(f"{path}: not a table of accuracies ({error!r})") from error
 
 

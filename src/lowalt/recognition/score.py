@@ -1,12 +1,11 @@
 """The scorer for other people's predictions: truth comes from the shards, never from the file that is scored."""
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
-from lowalt.common.files import text_file
 from lowalt.recognition.predictions import probability_columns
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
@@ -17,21 +16,16 @@ from lowalt.shards import ShardSet
 def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list[float]]:
     """Read and check the class probabilities of a prediction file: {key: probabilities}."""
     found: dict[str, list[float]] = {}
-    with text_file(path, "predictions") as file:
-        reader = csv.DictReader(file)
-        missing = {"key", *columns} - set(reader.fieldnames or ())
-        if missing:
-            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {reader.fieldnames}")
-        for line, row in enumerate(reader, start=2):
-            try:
-                values = [float(row[name]) for name in columns]
-            except (TypeError, ValueError) as error:
-                raise InputError(f"{path} line {line}: {error}") from error
-            if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
-                raise InputError(f"{path} line {line}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
-            if row["key"] in found:
-                raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
-            found[row["key"]] = values
+    for line, row in enumerate(read_csv(path, "key", *columns, what="predictions"), start=2):
+        try:
+            values = [float(row[name]) for name in columns]
+        except ValueError as error:
+            raise InputError(f"{path} line {line}: {error}") from error
+        if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
+            raise InputError(f"{path} line {line}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
+        if row["key"] in found:
+            raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
+        found[row["key"]] = values
     return found
 
 

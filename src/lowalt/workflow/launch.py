@@ -1,4 +1,4 @@
-"""How a training is launched: its processes, the nodes of a cluster that share it, and what the queue is asked for.
+"""The launch of a training: its processes, the nodes of a cluster that share it, and its requests to the queue.
 
 Several processes are started by torchrun. On one machine torchrun alone finds them; over several nodes
 `lowalt.recognition.nodes` starts a torchrun a node by srun, inside the Slurm job of the training. The job asks for one

@@ -38,9 +38,16 @@ def write(board: Board, state: str, folder: Path = FOLDER) -> None:
         temporary.write_text(json.dumps(kept))
 
 
+def elsewhere(kept: dict) -> str:
+    """Return the name of the other machine that a run is on, empty for this one."""
+    here = socket.gethostname()
+    host = kept.get("host", here)
+    return "" if host == here else host
+
+
 def alive(kept: dict) -> bool:
     """Return whether the process of a run lives; of one on another machine, whether it wrote within FRESH_S."""
-    if kept.get("host", socket.gethostname()) != socket.gethostname():
+    if elsewhere(kept):
         return kept["state"] == "running" and time.time() - kept["written"] < FRESH_S
     return kept["process"] is not None and started(kept["pid"]) == kept["process"]
 
@@ -67,9 +74,8 @@ def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
     board, living = Board.read(kept["board"]), alive(kept)
     state = kept["state"] if living or kept["state"] != "running" else "stopped without a word, killed perhaps"
-    host = kept.get("host", socket.gethostname())
-    place = "" if host == socket.gethostname() else f" of {host}"
-    head = f"process {kept['pid']}{place}: {state}, {span(now - kept['written'])} ago"
+    place = elsewhere(kept)
+    head = f"process {kept['pid']}{' of ' if place else ''}{place}: {state}, {span(now - kept['written'])} ago"
     moment = now if living else kept["written"]
     lines = [board.line(name, moment, progress.last) for name in board.stages]
     return "\n".join([head, *lines, board.total(moment)])

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
-from lowalt.effects.channel.ray_tests import hit, met, reached
+from lowalt.effects.channel.ray_tests import first_hit, met, reached
 
 SLOTS = 1 << 14
 """Lists of triangles that are kept at a time; a power of two."""
@@ -92,15 +92,6 @@ def _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, spread):
 
 
 @INLINED
-def _first_of(vertices, tree, lists, first, past, x, y, z, u, v, w):
-    """The first triangle of a list that the ray from x, y, z along u, v, w meets, -1 without one."""
-    for at in range(first, past):
-        if hit(vertices, tree, lists.pool[at], x, y, z, u, v, w):
-            return lists.pool[at]
-    return -1
-
-
-@INLINED
 def kept(vertices, tree, lists, p, point, cells, x, y, z, u, v, w):
     """A triangle of the point's own part p that its ray meets, found in the kept list of its direction; -1 for none."""
     code, a, b, c = _cell(u, v, w, cells)
@@ -109,4 +100,4 @@ def kept(vertices, tree, lists, p, point, cells, x, y, z, u, v, w):
     if lists.key[slot] == -1:
         slot = _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, 1.4143 / cells)
     first = lists.begin[slot]
-    return _first_of(vertices, tree, lists, first, first + lists.size[slot], x, y, z, u, v, w)
+    return first_hit(vertices, tree, lists.pool, first, first + lists.size[slot], x, y, z, u, v, w)

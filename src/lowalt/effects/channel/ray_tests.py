@@ -53,6 +53,15 @@ def hit(vertices, tree, f, x, y, z, u, v, w):
 
 
 @INLINED
+def first_hit(vertices, tree, pool, first, past, x, y, z, u, v, w):
+    """The first of the triangles pool[first] to pool[past - 1] that the ray of `hit` meets, -1 without one."""
+    for at in range(first, past):
+        if hit(vertices, tree, pool[at], x, y, z, u, v, w):
+            return pool[at]
+    return -1
+
+
+@INLINED
 def side(i, j, k, p, q, r, a, b, c, spread):
     """-1 or 1 where rays pass the edge between two corners on one side alone, else 0; corners from the rays' start.
 

@@ -16,7 +16,7 @@ from lowalt.echo import Rigid
 from lowalt.effects.channel import ray_grid
 from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid, cell_of
 from lowalt.effects.channel.ray_lists import Lists, kept
-from lowalt.effects.channel.ray_tests import crosses, hit
+from lowalt.effects.channel.ray_tests import crosses, first_hit, hit
 from lowalt.effects.channel.surface_tree import Tree
 
 STEPS, FINEST, COARSEST = 3.0, 0.02, 0.15
@@ -49,6 +49,16 @@ def _ball_ahead(centre, radius, x, y, z, a, b, c, square):
 
 
 @INLINED
+def _placed(rotation, translation, x, y, z):
+    """A place of a part's frame in the global frame."""
+    return (
+        rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0],
+        rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1],
+        rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2],
+    )
+
+
+@INLINED
 def _in_part(rotation, translation, x, y, z):
     """A place of the global frame in a part's frame."""
     a, b, c = x - translation[0], y - translation[1], z - translation[2]
@@ -64,18 +74,8 @@ def _balls(rotation, translation, tree, order, balls):
     """Fill balls (P, 3) with the places of the balls around all triangles of the parts `order`, in the global frame."""
     for turn in range(len(order)):
         p = order[turn]
-        x, y, z = tree.centre[tree.root[p], 0], tree.centre[tree.root[p], 1], tree.centre[tree.root[p], 2]
-        for i in range(3):
-            balls[p, i] = rotation[p, i, 0] * x + rotation[p, i, 1] * y + rotation[p, i, 2] * z + translation[p, i]
-
-
-@INLINED
-def _in_cell(vertices, tree, grid, k, cell, x, y, z, u, v, w):
-    """The first triangle of a grid's cell that the ray from x, y, z along u, v, w meets, -1 without one."""
-    for at in range(grid.start[k, cell], grid.start[k, cell + 1]):
-        if hit(vertices, tree, grid.pool[k, at], x, y, z, u, v, w):
-            return grid.pool[k, at]
-    return -1
+        at = tree.centre[tree.root[p]]
+        balls[p, 0], balls[p, 1], balls[p, 2] = _placed(rotation[p], translation[p], at[0], at[1], at[2])
 
 
 @LEAN
@@ -100,10 +100,7 @@ def cast(
             x += toward[l] * (station[n, own, 0] - x)
             y += toward[l] * (station[n, own, 1] - y)
             z += toward[l] * (station[n, own, 2] - z)
-            g0 = rotation[n, own, 0, 0] * x + rotation[n, own, 0, 1] * y + rotation[n, own, 0, 2] * z
-            g1 = rotation[n, own, 1, 0] * x + rotation[n, own, 1, 1] * y + rotation[n, own, 1, 2] * z
-            g2 = rotation[n, own, 2, 0] * x + rotation[n, own, 2, 1] * y + rotation[n, own, 2, 2] * z
-            g0, g1, g2 = g0 + translation[n, own, 0], g1 + translation[n, own, 1], g2 + translation[n, own, 2]
+            g0, g1, g2 = _placed(rotation[n, own], translation[n, own], x, y, z)
             d0, d1, d2 = place[0] - g0, place[1] - g1, place[2] - g2
             square = d0 * d0 + d1 * d1 + d2 * d2
             for turn in range(-1, len(order)):
@@ -122,11 +119,13 @@ def cast(
                         found[n, l] = True
                         break
                     continue
-                cell = cell_of(grid, n // SYMBOLS, i, j, k, u, v, w) if p == gridded else -2
+                m = n // SYMBOLS
+                cell = cell_of(grid, m, i, j, k, u, v, w) if p == gridded else -2
                 if cell == -1 or (cell == -2 and not crosses(tree, tree.root[p], i, j, k, u, v, w)):
                     continue
                 if cell >= 0:
-                    f = _in_cell(vertices, tree, grid, n // SYMBOLS, cell, i, j, k, u, v, w)
+                    first, past = grid.start[m, cell], grid.start[m, cell + 1]
+                    f = first_hit(vertices, tree, grid.pool[m], first, past, i, j, k, u, v, w)
                 elif p == own and listed[p]:
                     f = kept(vertices, tree, lists, p, l, cells[p], i, j, k, u, v, w)
                 else:
