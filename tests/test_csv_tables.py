@@ -15,6 +15,12 @@ def test_a_table_has_these_bytes_and_is_read_back_as_text(tmp_path):
     assert second["name"] == 'say "x"'
 
 
+def test_empty_lines_of_a_table_are_no_rows(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("a,b\n\n1,2\n\n")
+    assert read_csv(path) == [{"a": "1", "b": "2"}]
+
+
 def test_a_key_that_is_no_column_is_refused_and_leaves_the_old_table(tmp_path):
     path = tmp_path / "table.csv"
     write_csv(path, ["a"], [[1]])

@@ -48,3 +48,5 @@ def test_a_run_on_another_machine_lives_while_its_file_is_fresh(tmp_path):
     assert status.alive(there) and not status.alive(there | {"written": kept["written"] - 2 * status.FRESH_S})
     assert not status.alive(there | {"state": "ended"})
     assert status.describe(there, kept["written"]).startswith(f"process {2**22 + 1} of login-2: running, 0:00 ago")
+    unnamed = {key: value for key, value in kept.items() if key != "host"}
+    assert status.elsewhere(there) == "login-2" and status.elsewhere(kept) == status.elsewhere(unnamed) == ""
