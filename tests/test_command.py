@@ -10,6 +10,59 @@ from forks import ended
 from lowalt.common.command import pick, refusal, run, settings
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
+from needed_options import ask_for_nothing
+
+NEEDED = """
+common.config: --settings, --out
+echo.__main__: --settings, --motion, --clouds, --station, --out
+effects.__main__: --settings, --motion, --clouds, --station, --out, --power
+measure.accuracy_cost: --settings, --predictions, --speeds, --index, --out
+measure.echo_cost: --settings, --clouds, --out
+measure.echo_pixels: --settings, --table, --clouds, --out
+measure.effects_cost: --settings, --samples, --model, --out
+measure.effects_samples: --settings, --motion, --clouds, --out
+measure.hard_cases: --out
+measure.rotor_estimates: --run, --out
+measure.scale: --stages, --costs, --schema, --base, --overlays, --out
+motion.__main__: --settings, --clouds, --group, --first, --count, --out
+noise.__main__: --settings, --motion, --echoes, --out
+recordings.__main__ ablate: --out, --inputs, --models
+recordings.__main__ compare: --out, --inputs
+recordings.__main__ import: --out, --record, --radar
+recordings.__main__ pairs: --out, --inputs
+recordings.__main__ predict: --out, --record, --radar, --model
+recordings.__main__ recognise: --out, --inputs, --models
+recordings.download: --out
+report.__main__: --settings, --manifest, --stages, --figures, --out
+report.figures.accuracy_cost: --table, --figure
+report.figures.echo_cost: --table, --pixels, --figure
+report.figures.effects: --table, --samples, --figure
+report.figures.fresh_models: --table, --figure
+report.figures.house: --figure
+report.measured: --pairs, --tables, --page
+shards.__main__ index: --settings, --shards, --out
+shards.__main__ remake: --index, --sample
+shards.__main__ verify: --index
+shards.__main__ write: --settings, --motion, --fold, --out
+shards.build: --config, --out
+shards.card: --index, --config
+shards.manifest write: --run, --manifest
+shards.sigmf: --index, --out
+shards.size: --config, --subtypes
+shards.upload: --index, --repository
+targets.__main__: --settings, --out
+targets.dimensions: --table, --records, --out
+targets.download: --out
+targets.gallery: --clouds, --out
+targets.occluders: --settings, --out
+tiles.__main__: --settings, --signals, --out
+workflow.campaign: --out
+workflow.space_measured: --runs, --out
+"""
+
+
+def test_a_command_without_its_options_names_all_that_it_needs(capsys):
+    ask_for_nothing(NEEDED, capsys)
 
 
 def test_settings_come_as_json_or_as_a_file(tmp_path):
@@ -20,7 +73,14 @@ def test_settings_come_as_json_or_as_a_file(tmp_path):
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("{", "not JSON"), ("[1]", "list, expected a JSON object"), ("@none.json", "no file at none.json")],
+    [
+        ("{", "not JSON"),
+        # Of a long text the first 80 characters are shown.
+        ("{" + 90 * "a", rf"^--settings '{{{79 * 'a'}': not JSON"),
+        (f"[{90 * '1'}]", rf"^--settings '\[{79 * '1'}': list, expected"),
+        ("[1]", "list, expected a JSON object"),
+        ("@none.json", "no file at none.json"),
+    ],
 )
 def test_bad_settings_are_refused(text, words):
     with pytest.raises(InputError, match=words):

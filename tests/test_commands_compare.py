@@ -25,7 +25,25 @@ def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
     assert found["configuration"] == {"run": ["one", "other"], "seed": [1, 2]}
     assert found["accuracy_percent"] == {"seen A:VT": [81.0, 82.0]}
     assert found["processor_s"] == {"echo": [5.0, 2.5]} and found["data"] == {}
+    (one / "shards").mkdir()
+    (one / "shards/index.json").write_text(json.dumps({"samples": 30, "bytes": 4000}))
     assert main(["compare", str(one), str(other)]) == 0
-    assert "81.00 | 82.00   +1.00" in capsys.readouterr().out
+    assert (
+        capsys.readouterr().out
+        == f"""configuration: {one} | {other}
+  run   one | other
+  seed  1 | 2
+
+accuracy percent: {one} | {other}
+  seen A:VT  81.00 | 82.00   +1.00
+
+processor s: {one} | {other}
+  echo  5.00 | 2.50   -2.50
+
+data: {one} | {other}
+  samples  30 | -
+  bytes    4000 | -
+"""
+    )
     assert main(["compare", str(one), str(tmp_path)]) == 2
     assert f"{tmp_path}: has no config.yaml" in capsys.readouterr().err

@@ -79,6 +79,9 @@ def test_the_quickest_tests_of_a_line_come_first_until_time_is_up():
     near = Coverage({file: {7: ["t.py::quick", "tests/test_reach_far.py::slow"]}},
                     {"t.py::quick": 1.0, "tests/test_reach_far.py::slow": 9.0})  # fmt: skip
     assert shown_tests(Path(), near, file, 7, 10.0) == ["tests/test_reach_far.py::slow", "t.py::quick"]
+    # One that takes longer by itself is shown with those that do not.
+    assert shown_tests(Path(), near, file, 7, 5.0) == ["t.py::quick", "tests/test_reach_far.py::slow"]
+    assert shown_tests(Path(), found, file, 7, 0.5) == ["t.py::quick"]
     assert set(shown_tests(Path(), found, file, 5, 100.0)) == {"t.py::slow", "t.py::quick", "t.py::middle", "u.py::one"}
 
 

@@ -1,5 +1,7 @@
 """How far subtypes lie apart: laws of the distance, and a cloud against itself turned, moved and scaled."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,9 @@ from hypothesis import strategies as st
 
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition.distances import energy_distance, form
+from lowalt.motion import positions
+from lowalt.recognition.distances import cycle_s, energy_distance, form, swept
+from moving_clouds import rigid_cloud, row
 
 POINTS = st.integers(0, 10**6).map(lambda seed: stream(seed, "points").normal(size=(12, 3)))
 
@@ -41,3 +45,21 @@ def test_form_knows_neither_place_nor_size_and_the_radius_does(points, scale, sh
 def test_points_that_are_all_one_are_refused():
     with pytest.raises(InputError, match="no form"):
         form(np.ones((4, 3)))
+
+
+def test_a_cycle_is_a_turn_or_the_whole_recording_at_the_speed_of_its_playback():
+    cloud = rigid_cloud("rotor", "UAV")
+    assert cycle_s(cloud, row(rate_hz=40.0)) == 0.025
+    assert cycle_s(cloud, row(rate_hz=0.0)) == 1.0
+    recorded = replace(cloud, track=np.zeros((60, 1, 3)), record={**cloud.record, "track_rate_hz": 30.0})
+    assert cycle_s(recorded, row(playback=1.25, rate_hz=40.0)) == 1.6
+
+
+def test_swept_points_are_those_of_sixteen_instants_of_a_cycle_without_the_body_s_own_course():
+    cloud = rigid_cloud("rotor", "UAV")
+    moving = row(rate_hz=40.0, phase_0_rad=0.3, x_m=80.0, vx_mps=5.0, yaw_rad=1.0, pitch_rad=0.2, roll_rad=0.1)
+    still = row(rate_hz=40.0, phase_0_rad=0.3)
+    wanted = positions(cloud, still, np.arange(16) / 640).reshape(-1, 3)
+    np.testing.assert_allclose(swept(cloud, moving), wanted, atol=1e-12)
+    large = replace(cloud, points=np.repeat(cloud.points, 500, 0), part=np.repeat(cloud.part, 500))
+    assert len(swept(large, moving)) == 1200 < 16 * len(large.points)

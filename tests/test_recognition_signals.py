@@ -69,6 +69,34 @@ def test_a_cache_holds_the_shards_own_signals_and_features_whatever_the_kind_of_
 
 
 @torch.inference_mode()
+def test_a_complex_layer_is_its_formula_and_halves_the_symbols():
+    """Convolution, unit mean power, then modReLU: the magnitude less a tenth, none below zero, the phase kept."""
+    torch.manual_seed(2)
+    layer = signal_networks.ComplexConvolution(2, 3, 5, 2)
+    given = signals(2, stations=2, symbols=24)
+    found = layer(given).numpy()
+    assert found.shape == (2, 3, 12)
+    padded = np.pad(given.numpy(), ((0, 0), (0, 0), (2, 2)))
+    weight = layer.real.numpy() + 1j * layer.imaginary.numpy()
+    plain = np.stack([np.einsum("bck,ock->bo", padded[..., start : start + 5], weight) for start in range(0, 24, 2)], 2)
+    plain /= np.sqrt((abs(plain) ** 2).mean((1, 2), keepdims=True))
+    size = abs(plain)
+    np.testing.assert_allclose(found, plain * np.maximum(size - 0.1, 0) / size, atol=2e-5)
+    assert layer.real.numel() == 2 * 3 * 5
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize(("method", "numbers"), [("cnn", 55_272), ("complex", 53_856), ("transformer", 104_256)])
+def test_networks_of_signals_keep_their_size_and_every_convolution_halves_the_symbols(method, numbers):
+    """Kept trainings hold weights of just these sizes."""
+    backbone = signal_networks.BACKBONES[method](400)
+    assert sum(value.numel() for value in backbone.parameters()) == numbers
+    if method != "transformer":
+        given = signals(1)[:, :1] if method == "complex" else torch.zeros(1, 2, 400)
+        assert backbone.layers(given).shape == (1, backbone.width // 2, 400 / 2**4)
+
+
+@torch.inference_mode()
 @pytest.mark.parametrize("method", METHODS)
 def test_the_size_of_a_signal_changes_nothing_and_stations_may_be_swapped(method):
     model, given = network(method), signals(3)

@@ -15,6 +15,7 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.methods import built
 from lowalt.recognition.schemes import Scheme
 from lowalt.recognition.start import carry, opened
+from needed_options import ask_for_nothing
 from trainings import SCHEME, SETTINGS, Killed, equal, kill_at, with_training, write_views
 
 ONE = Scheme("A:VRP+VT", (0,), (0, 2))
@@ -153,3 +154,28 @@ def test_a_file_that_is_no_network_is_refused_by_name(tmp_path):
     checkpoint.save(tmp_path / "model.pt", "{}", {"twin": "x"})
     with pytest.raises(InputError, match=r"model\.pt is not a trained model"):
         opened(tmp_path / "model.pt")
+
+
+NEEDED = """
+measure.fresh_models: --settings, --run, --work, --out
+measure.network_speed: --settings, --scheme, --stations, --out
+recognition.__main__ distances: --settings, --clouds, --motion, --out
+recognition.__main__ evaluate: --settings, --model, --out
+recognition.__main__ export: --settings, --model, --out
+recognition.__main__ freeze: --settings, --out
+recognition.__main__ score: --settings, --predictions, --index, --protocol, --out
+recognition.__main__ tables: --settings, --predictions, --out
+recognition.__main__ train: --settings, --protocol, --scheme, --stations, --out
+recognition.__main__ transfer: --settings, --own, --other, --configs, --out
+recognition.__main__ views: --settings, --index, --shard, --out
+recognition.choose: --settings, --predictions, --out
+recognition.rates: --settings, --protocol, --scheme, --stations, --out
+recognition.slow_time: --settings, --index, --shard, --out
+recognition.trial: --settings, --views, --candidate, --fold, --stations, --out
+recognition.upload: --model, --repository
+recognition.zoo: --model, --name
+"""
+
+
+def test_a_command_without_its_options_names_all_that_it_needs(capsys):
+    ask_for_nothing(NEEDED, capsys)

@@ -26,8 +26,9 @@ def test_predictions_survive_writing_and_align_by_key(tmp_path):
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
-    [("0.7", "1.7", "sum 1"), ("0.7", "x", "line"), ("p_bird", "bird", "columns"), ("Mini-1-3,", "Mini-0-3,", "twice")],
-)
+    [("0.7", "1.7", "sum 1"), ("0.7", "0.702", "sum 1"), ("0.7", "x", "line"), ("p_bird", "bird", "columns"),
+     ("Mini-1-3,", "Mini-0-3,", "twice")],
+)  # fmt: skip
 def test_malformed_predictions_are_refused_by_line(tmp_path, old, new, words):
     path, *_ = run_files(tmp_path, "seen", "A:VT", 0.8)
     path.write_text(path.read_text().replace(old, new, 1))

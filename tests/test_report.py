@@ -9,6 +9,7 @@ from lowalt.common.config import load
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
+from lowalt.measure.scale import main as write_estimates
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
 from lowalt.report.sections import accuracy_cost, echo_cost, effects, hard_cases, measured, transfer
@@ -75,6 +76,23 @@ def test_an_estimate_scales_samples_and_bytes():
     assert row["noisy_gb"] == pytest.approx(1_440_000 * 9600 / 1e9, abs=0.05)
     with pytest.raises(InputError, match="index"):
         estimate(stages[:-1], [], config, "paper")
+
+
+def test_the_command_writes_a_row_of_every_overlay(tmp_path):
+    rules = ("motion", "echo", "noise", "tiles", "shard", "index")
+    (tmp_path / "stages.csv").write_text(
+        "rule,wall_s,samples,sample_bytes,hardware\n" + "".join(f"{rule},100,1000,250000,here\n" for rule in rules)
+    )
+    (tmp_path / "costs.csv").write_text("backbone,pixels,network_bytes,train_ms,hardware\n")
+    overlays = ["config/tiny.yaml", "config/paper.yaml"]
+    write_estimates([
+        "--stages", str(tmp_path / "stages.csv"), "--costs", str(tmp_path / "costs.csv"), "--out",
+        str(tmp_path / "scale.csv"), "--schema", "workflow/schemas/config.schema.yaml", "--base",
+        "config/default.yaml", "--overlays", *overlays,
+    ])  # fmt: skip
+    rows = read_csv(tmp_path / "scale.csv", "configuration", "samples", "measured_on")
+    assert [(row["configuration"], row["measured_on"]) for row in rows] == [("tiny", "here"), ("paper", "here")]
+    assert rows[1]["samples"] == "1440000"
 
 
 def test_training_scales_with_images_and_no_network_is_guessed_at():

@@ -67,3 +67,12 @@ def test_the_turn_of_a_killed_process_is_free_and_an_endless_one_is_not_waited_f
     assert turn._descriptor >= 0
     turn.give()
     assert turn._descriptor < 0
+
+
+def test_the_file_of_a_turn_is_for_every_user(tmp_path):
+    before = os.umask(0)
+    try:
+        Turn(tmp_path / "of/all.lock").take()
+    finally:
+        os.umask(before)
+    assert (tmp_path / "of/all.lock").stat().st_mode & 0o777 == 0o666

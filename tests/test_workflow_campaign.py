@@ -1,5 +1,6 @@
 """The campaign's own logic: disks that a run really fills, and files that two runs must share to the byte."""
 
+import contextlib
 import os
 import random
 import signal
@@ -13,6 +14,7 @@ import pytest
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.workflow import campaign as campaigns
 from lowalt.workflow import disturb as disturbances
 from lowalt.workflow.campaign import LARGE_MB, SMALL_MB, room_mb
 from lowalt.workflow.disturb import MemoryGroup, _kill, disturb, one_worker, workers
@@ -98,6 +100,54 @@ def test_a_memory_group_without_the_files_of_the_second_version_uses_those_of_th
              (group.limit, group.usage, group.events)]  # fmt: skip
     assert [*map(str, files)] == ["memory.limit_in_bytes", "memory.usage_in_bytes", "memory.oom_control"]
     assert group.none == "-1"
+    group.enter()
+    assert (group.folder / "cgroup.procs").read_text() == str(os.getpid())
+    (group.folder / "cgroup.procs").unlink()
+
+
+def test_a_campaign_numbers_its_trials_makes_all_disturbances_and_keeps_only_folders_that_differ(tmp_path, monkeypatch):
+    """One disk and five kills, at most two a run; the run of the third trial has a file of its own."""
+    left, rooms = [], []
+
+    class Made:
+        def __init__(self, project, folder, options, group):
+            self.folder, self.said = folder, ""
+            folder.mkdir(exist_ok=folder.name == "disk-1")
+            (folder / "kept").touch()
+
+        def start(self):
+            return None
+
+        def finish(self, main):
+            return 0
+
+        def whole(self):
+            return {"same": "1", "other": "2" if self.folder.name == "kill-3" else "1"}
+
+        def written_mb(self):
+            return 10.0
+
+    def killed(trial, kinds, length_s, most, choose):
+        left.append(most)
+        return [{"kind": next(kinds)} for _ in range(most)]
+
+    monkeypatch.setattr(campaigns, "Trial", Made)
+    monkeypatch.setattr(campaigns, "copy_project", lambda project, folder: None)
+    monkeypatch.setattr(campaigns, "killed", killed)
+    monkeypatch.setattr(campaigns, "filled", lambda trial, megabytes: rooms.append(megabytes) or [{"kind": "disk"}])
+    monkeypatch.setattr(campaigns, "_small_disk", lambda folder: contextlib.nullcontext(folder))
+    monkeypatch.setattr(campaigns.subprocess, "run", lambda line, check: rooms.append(line[:3]))
+    options = SimpleNamespace(seed=1, memory_group=None, configfile=["tiny.yaml"], targets=["data"], disks=1, kills=5,
+                              kills_per_run=2)  # fmt: skip
+    rows = list(campaigns.campaign(options, tmp_path))
+    assert [row["trial"] for row in rows] == [1, 2, 2, 3, 3, 4] and left == [2, 2, 1]
+    assert [row["identical"] for row in rows] == [*3 * ["yes"], *2 * ["no: 1 files, first other"], "yes"]
+    assert {row["configuration"] for row in rows} == {"tiny.yaml data"} and rows[0]["kind"] == "disk"
+    assert sorted(row["kind"] for row in rows[1:4]) == sorted({row["kind"] for row in rows[1:4]})
+    assert rooms[0][:2] == ["mount", "-o"] and 0 < rooms[1] < 10
+    assert {path.parent.name for path in tmp_path.glob("*/kept")} == {"undisturbed", "kill-3"}
+    assert {path.name for path in tmp_path.iterdir()} == {"project", "undisturbed", "disk-1", "kill-2", "kill-3",
+                                                          "kill-4"}  # fmt: skip
 
 
 @pytest.fixture

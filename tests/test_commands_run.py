@@ -1,0 +1,45 @@
+"""Where a run's configuration, profile and cores come from, and words of command lines that stand for numbers."""
+
+import argparse
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from lowalt.commands import explain, target, workflow
+from lowalt.common.shipped import SHIPPED
+
+
+def given(**changes):
+    return SimpleNamespace(
+        **{"overlay": [], "configfile": [], "target": [], "cores": None, "dry_run": False, "profile": None} | changes
+    )
+
+
+def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    head = [sys.executable, "-m", "snakemake", "--snakefile", str(workflow.SNAKEFILE)]
+    base = str(SHIPPED / "config/default.yaml")
+    profile = ["--workflow-profile", str(SHIPPED / "profiles/default")]
+    assert workflow.command(given()) == [*head, "--cores", "all", *profile, "--configfile", base]
+    (tmp_path / "profiles").mkdir()
+    (tmp_path / "mine.yaml").write_text("seed: 3")
+    line = workflow.command(given(configfile=[Path("mine.yaml")]))
+    assert line == [*head, "--cores", "all", "--configfile", base, "mine.yaml"]
+    # How many cores there are is the cluster's matter, unless it is said.
+    cluster = given(profile=Path("profiles/slurm"))
+    assert workflow.command(cluster) == [*head, "--workflow-profile", "profiles/slurm", "--configfile", base]
+    cluster.cores = "4"
+    assert workflow.command(cluster)[5:7] == ["--cores", "4"]
+
+
+def test_a_sample_to_explain_is_a_subtype_and_a_number_and_a_unit_a_name_or_metres():
+    assert explain._sample("Crow:3") == ("Crow", 3) and explain._sample("a:b:12") == ("a:b", 12)
+    for wrong in ("Crow", ":3", "Crow:", "Crow:-1", "Crow:1.5"):
+        with pytest.raises(argparse.ArgumentTypeError, match="expected SUBTYPE:MODEL"):
+            explain._sample(wrong)
+    assert [target._unit(text) for text in ("mm", "0.3048", "1e6")] == ["mm", 0.3048, 1e6]
+    for wrong in ("yard", "0", "-1", "1000001", "nan"):
+        with pytest.raises(argparse.ArgumentTypeError, match="or metres"):
+            target._unit(wrong)
