@@ -1,11 +1,11 @@
-"""Grids of triangles for rays: none is lost while the target moves on."""
+"""Grids and azimuths of triangles for rays: none is lost while the target moves on, and points judged at once agree."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from lowalt.effects.channel import occlusion, shadow_rays
+from lowalt.effects.channel import occlusion, shadow_rays, still_rays
 from lowalt.targets.surfaces import Surface
 from test_effects_occlusion import NETWORK, scene
 
@@ -27,3 +27,43 @@ def test_a_grid_loses_no_triangle_while_the_target_flies_on(range_m, monkeypatch
     assert (found == occlusion.hidden(view)).all()
     assert 0.05 < found.mean() < 0.9
     assert len(np.unique(found, axis=0)) > 5
+
+
+def loose(count: int, kinds: tuple[str, ...], closed: bool, **row):
+    """Points among small triangles, on one part or, of two parts, on the second, which turns about z."""
+    rng = np.random.default_rng(7)
+    corners = rng.uniform(-1.0, 1.0, (count, 1, 3)) * [1, 1, 0.3] + rng.normal(0, 0.1, (count, 3, 3))
+    surface = Surface(corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3))
+    points = rng.uniform(-1.0, 1.0, (40, 3)) * [1, 1, 0.3]
+    given = [surface] * len(kinds)
+    part = np.full(40, len(kinds) - 1)
+    return scene(points, rng.normal(0, 1, (40, 3)), given, part, kinds, closed=closed, **row)
+
+
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize(("kind", "z_m"), [("rotor", 25.0), ("rotor", 60.0), ("wheel", 5.0)])
+def test_azimuths_lose_no_triangle_of_a_part_that_turns(kind, z_m, closed, monkeypatch):
+    view = loose(150, ("body", kind), closed, x_m=60.0, y_m=20.0, z_m=z_m, vx_mps=10.0, rate_hz=70.0)
+    view = replace(view, times_s=NETWORK.times_s[:100])
+    asked, cast = [], shadow_rays.turning_rays.cast
+    monkeypatch.setattr(shadow_rays.turning_rays, "cast", lambda *given: (asked.append(cast(*given)), asked[0])[1])
+    found = occlusion.hidden(view)
+    assert asked[0].all()
+    monkeypatch.setattr(shadow_rays.turning_rays, "cast", lambda *given: np.zeros(40, np.bool_))
+    assert (found == occlusion.hidden(view)).all()
+    assert 0.1 < found.mean() < 0.95
+    assert len(np.unique(found, axis=0)) > 20
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_points_that_are_judged_for_many_symbols_are_hidden_in_all_or_none_of_them(closed, monkeypatch):
+    view = loose(200, ("body",), closed, x_m=40.0, y_m=30.0, z_m=45.0, vx_mps=6.0)
+    view = replace(view, times_s=NETWORK.times_s[:150])
+    given, judged = [], shadow_rays.judged
+    monkeypatch.setattr(shadow_rays, "judged", lambda *values: (given.append(judged(*values)), given[0])[1])
+    found = occlusion.hidden(view)
+    shares = [(given[0] == verdict).mean() for verdict in (still_rays.FREE, still_rays.HIDDEN, still_rays.OPEN)]
+    assert min(shares[:2]) > 0.03
+    assert 0.0 < shares[2] < 0.8
+    monkeypatch.setattr(shadow_rays, "judged", lambda *values: np.full(given[0].shape, still_rays.OPEN, np.int8))
+    assert (found == occlusion.hidden(view)).all()

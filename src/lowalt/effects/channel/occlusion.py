@@ -85,7 +85,8 @@ def hidden(view: View, by: str = "all", known: np.ndarray | None = None) -> np.n
     motion = view.motion._replace(points=start)
     rotors = cloud.parts_of("rotor")
     asked = {"all": range(len(cloud.kinds)), "blades": rotors, "rest": set(range(len(cloud.kinds))) - set(rotors)}[by]
-    return cast_rays(place, motion, toward, surfaces["vertices"], whole_tree(surfaces), rotors, list(asked), known)
+    given = place, motion, toward, surfaces["vertices"], whole_tree(surfaces), rotors, list(asked), known
+    return cast_rays(*given, cloud.axes)
 
 
 def _surfaces(view: View) -> dict:

@@ -17,7 +17,7 @@ from lowalt.common.jit import INLINED, LEAN
 from lowalt.effects.channel.surface_tree import Tree
 
 SYMBOLS = 64
-"""Symbols whose rays share a grid."""
+"""Symbols whose rays share a grid, at least."""
 SIDES = 16, 64
 """Fewest and most cells along each side."""
 ROOM = 12
@@ -27,7 +27,7 @@ NEAREST = 4.0
 
 
 class RayGrid(NamedTuple):
-    """Grids of a part, one for every SYMBOLS symbols.
+    """Grids of a part, one for every `symbols` symbols.
 
     axes (K, 3, 3): to the station, and two across; middle (3,) and radius_m of the part; far (K,) m: the station's
     distance; way (K,) m: how far it moves, negative where the tree is to be asked; low (K, 2) m, wide (K, 2) 1/m: edges
@@ -42,12 +42,13 @@ class RayGrid(NamedTuple):
     low: np.ndarray
     wide: np.ndarray
     cells: int
+    symbols: int
     start: np.ndarray
     pool: np.ndarray
 
 
 NONE = RayGrid(
-    np.zeros((1, 3, 3)), np.zeros(3), 0.0, np.zeros(1), np.full(1, -1.0), np.zeros((1, 2)), np.zeros((1, 2)), 0,
+    np.zeros((1, 3, 3)), np.zeros(3), 0.0, np.zeros(1), np.full(1, -1.0), np.zeros((1, 2)), np.zeros((1, 2)), 0, 1,
     np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int64),
 )  # fmt: skip
 """No grid at all."""
@@ -154,12 +155,17 @@ def cell_of(grid, k, x, y, z, u, v, w):
 
 def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> RayGrid:
     """Return the grids of a part; station (N, 3) m, in the part's frame; vertices (V, 3) m."""
-    count, faces = -(-len(station) // SYMBOLS), int(tree.count[part])
+    faces = int(tree.count[part])
     cells = int(np.clip(math.isqrt(faces), *SIDES))
     middle, radius_m = tree.centre[tree.root[part]].copy(), float(tree.radius_m[tree.root[part]])
+    away = station - middle
+    # As few grids as widen images by about half a cell at most.
+    moved = np.linalg.norm(away - away[len(away) // 2], axis=1).max() / np.linalg.norm(away[len(away) // 2])
+    symbols = max(SYMBOLS, math.ceil(len(away) / max(1.0, math.ceil(moved * cells))))
+    count = -(-len(station) // symbols)
     axes, far, way = np.empty((count, 3, 3)), np.empty(count), np.empty(count)
     for k in range(count):
-        some = station[k * SYMBOLS : (k + 1) * SYMBOLS] - middle
+        some = away[k * symbols : (k + 1) * symbols]
         ahead = some[len(some) // 2]
         far[k] = np.linalg.norm(ahead)
         way[k] = np.linalg.norm(some - ahead, axis=1).max()
@@ -168,7 +174,7 @@ def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> R
         axes[k] = ahead / far[k], right, np.cross(ahead / far[k], right)
     way[far < NEAREST * (radius_m + way)] = -1.0
     grid = RayGrid(
-        axes, middle, radius_m, far, way, np.empty((count, 2)), np.empty((count, 2)), cells,
+        axes, middle, radius_m, far, way, np.empty((count, 2)), np.empty((count, 2)), cells, symbols,
         np.empty((count, cells * cells + 1), np.int64), np.empty((count, ROOM * faces + cells * cells), np.int64),
     )  # fmt: skip
     _fill(vertices, tree, part, grid, np.empty((faces, 4)), np.empty(faces, np.bool_))

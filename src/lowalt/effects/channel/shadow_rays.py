@@ -2,21 +2,22 @@
 
 In a part's frame its triangles stand still, and the ray from a point to the station turns slowly, or along the same
 circle turn by turn. The rays of all points that meet the body, whose frame turns slowly, find their few triangles in a
-grid (`ray_grid`). In parts that swing or roll, directions are sorted into cells: the triangles of its own part that any
-ray of a cell can meet are found once for a point, by a tree of balls (`surface_tree`), and kept; each ray is then
-compared with these few. Rotors turn too far from symbol to symbol for that. Their triangles, and those of other parts
-than the point's, are found by the tree ray by ray. A point is compared first with the triangle that hid it a symbol
-ago.
+grid (`ray_grid`), and its own points are judged for many symbols at once (`still_rays`). Points of parts that turn,
+swing or roll are held against their own part in the order of its azimuths (`turning_rays`). Where neither can be done,
+directions are sorted into cells: the triangles of its own part that any ray of a cell can meet are found once for a
+point, by a tree of balls (`surface_tree`), and kept. Rotors turn too far from symbol to symbol for that. All other
+triangles are found by the tree ray by ray. A point is compared first with the triangle that hid it a symbol ago.
 """
 
 import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo import Rigid
-from lowalt.effects.channel import ray_grid
-from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid, cell_of
+from lowalt.effects.channel import ray_grid, turning_rays
+from lowalt.effects.channel.ray_grid import RayGrid, cell_of
 from lowalt.effects.channel.ray_lists import Lists, kept
 from lowalt.effects.channel.ray_tests import crosses, first_hit, hit
+from lowalt.effects.channel.still_rays import FREE, HIDDEN, SYMBOLS, judged
 from lowalt.effects.channel.surface_tree import Tree
 
 STEPS, FINEST, COARSEST = 3.0, 0.02, 0.15
@@ -81,19 +82,21 @@ def _balls(rotation, translation, tree, order, balls):
 @LEAN
 def cast(
     place, station, rotation, translation, part, points, toward, vertices, tree, order, gridded, grid, listed, cells,
-    lists, work, balls, found,
+    lists, work, balls, verdicts, done, found,
 ):  # fmt: skip
     """Set found (N, L) where one of the parts `order` hides the point; points found already are not asked.
 
     place (3,) m: the station, and station (N, P, 3) m: the same in each part's frame; rotation (N, P, 3, 3),
     translation (N, P, 3); points (L, 3) m, in their part's frame; toward (L,): share of the way to the station by which
     a point is moved; gridded: the part of `grid`; listed (P,): whether a part's lists are kept for its own points;
-    cells (P,): cells of direction along a cube's side; work: (L,) int64, filled with -1; balls: work, (P, 3).
+    cells (P,): cells of direction along a cube's side; work: (L,) int64, filled with -1; balls: work, (P, 3);
+    verdicts (B, L): those of `still_rays`; done (L,): points whose own part has been asked.
     """
     for n in range(rotation.shape[0]):
         _balls(rotation[n], translation[n], tree, order, balls)
         for l in range(len(points)):  # noqa: E741
-            if found[n, l]:
+            verdict = verdicts[n // SYMBOLS, l]
+            if found[n, l] or (verdict == FREE and len(order) == 1):
                 continue
             own, last = part[l], work[l]
             x, y, z = points[l, 0], points[l, 1], points[l, 2]
@@ -107,6 +110,8 @@ def cast(
                 if turn < 0 and last < 0:
                     continue
                 p = tree.owner[last] if turn < 0 else order[turn]
+                if p == own and (verdict == FREE or done[l]):
+                    continue
                 i, j, k = x, y, z
                 if p != own:
                     radius = tree.radius_m[tree.root[p]]
@@ -119,7 +124,7 @@ def cast(
                         found[n, l] = True
                         break
                     continue
-                m = n // SYMBOLS
+                m = n // grid.symbols
                 cell = cell_of(grid, m, i, j, k, u, v, w) if p == gridded else -2
                 if cell == -1 or (cell == -2 and not crosses(tree, tree.root[p], i, j, k, u, v, w)):
                     continue
@@ -138,14 +143,15 @@ def cast(
 
 def cast_rays(
     place_m: np.ndarray, motion: Rigid, toward: np.ndarray, vertices: np.ndarray, tree: Tree, rotors: list[int],
-    asked: np.ndarray | None = None, known: np.ndarray | None = None,
+    asked: np.ndarray | None = None, known: np.ndarray | None = None, axes: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return whether a triangle hides each point from the station at `place_m` (3,), (N, L) bool.
 
     motion: poses, and points off their own surface (L, 3), each in its part's frame (m); toward (L,): share of the way
     to the station by which a point is moved instead, where it has no normal; vertices (V, 3) m; rotors: parts that turn
     far from symbol to symbol; asked: parts whose triangles count, None for all; known: points (N, L) bool that are
-    hidden already. Of a closed surface with outward normals, the side turned to the station alone hides all.
+    hidden already; axes (P, 3): what turning parts turn about, in their frames, NaN for others. Of a closed surface
+    with outward normals, the side turned to the station alone hides all.
     """
     rotation, translation, points, part = motion
     rotation, translation = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
@@ -161,10 +167,15 @@ def cast_rays(
     listed = ~np.isin(np.arange(len(tree.root)), rotors)
     gridded, grid = _grid(ahead, station, vertices, tree, order[listed[order]])
     found = np.zeros((len(rotation), len(points)), np.bool_) if known is None else known.copy()
+    turning = [int(p) for p in order if p != gridded and axes is not None and np.isfinite(axes[p]).all()]
+    done = turning_rays.cast(station, axes, turning, points, part, toward, vertices, tree, found)
+    own = np.ascontiguousarray(station[:, gridded])
+    verdicts = judged(vertices, tree, gridded, grid, own, points, part, toward)
+    found |= np.repeat(verdicts == HIDDEN, SYMBOLS, axis=0)[: len(found)]
     cast(
         np.asarray(place_m, np.float64), station, rotation, translation, part, points, toward, vertices, tree, order,
         gridded, grid, listed, cells, Lists.empty(len(tree.skip)), np.full(len(points), -1), np.empty((len(listed), 3)),
-        found,
+        verdicts, done, found,
     )  # fmt: skip
     return found
 
