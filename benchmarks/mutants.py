@@ -6,8 +6,9 @@ For each room of `src/lowalt` a number of faults is drawn by seed. Each is set i
 that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too long.
 Maps of tests and outcomes are kept in `--kept`; the same command goes on where the last one stopped. Rooms take turns,
 so that all of them have about as many outcomes when time is up. The list of survivors holds every fault that survived
-a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay. A call for some
-rooms keeps the lines of the others in both tables.
+a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay. Where edits of a
+room change its draw, survivors of earlier draws are tried again and stay in the list; the table by room leaves them
+out. A call for some rooms keeps the lines of the others in both tables.
 """
 
 import argparse
@@ -21,10 +22,11 @@ from pathlib import Path
 from queue import Queue
 
 import numpy as np
-from mutation.candidates import Mutant, draw, mutated, of_file
+from mutation.candidates import Mutant, draw, of_file
 from mutation.coverage_map import Coverage, measure, shown_tests
 from mutation.forked import LIBRARIES, TRAINING, load
 from mutation.kept import Kept
+from mutation.survivors import earlier, survivor_row
 from mutation.trials import Outcome, copy_of_tree, trial
 
 from lowalt.common.csv_tables import write_csv
@@ -117,17 +119,6 @@ def wilson(part: int, whole: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def survivor_row(root: Path, outcome: Outcome, verdicts: dict[tuple, str]) -> dict:
-    """A line of the table of survivors: where the fault stood, the line before and after, and what became of it."""
-    source = (root / outcome.mutant.file).read_text(encoding="utf-8")
-    before, after = source.splitlines(), mutated(source, outcome.mutant).splitlines()
-    changed = next(i for i in range(len(before)) if i >= len(after) or before[i] != after[i])
-    lines = before[changed].strip(), after[changed].strip() if changed < len(after) else ""
-    verdict = "test added" if outcome.killed else verdicts.get((outcome.mutant.file, *lines), "open")
-    return {**outcome.mutant._asdict(), "tests": outcome.tests, "before": lines[0], "after": lines[1],
-            "now": "killed" if outcome.killed else "survives", "verdict": verdict}  # fmt: skip
-
-
 def kept_rows(path: Path) -> list[dict[str, str]]:
     """Lines of a kept table; none where it is not there."""
     if not path.exists():
@@ -196,13 +187,17 @@ def main(argv: list[str] | None = None) -> None:
     }
     in_turn = [mutant for mutant in chain(*zip_longest(*drawn.values())) if mutant]
     kept = Kept(asked.kept / "outcomes.jsonl", ROOT)
-    outcomes = run(ROOT, found, in_turn, asked, until, kept)
     before = kept_rows(asked.survivors)
+    again = earlier(ROOT, before, list(chain(*places.values())), in_turn)
+    outcomes = run(ROOT, found, [*again, *in_turn], asked, until, kept)
     verdicts = {(row["file"], row["before"], row["after"]): row["verdict"] for row in before}
-    once = [survivor_row(ROOT, each, verdicts) for each in outcomes if kept.survived_once(each.mutant)]
-    found = room_rows({room: (places[room], drawn[room]) for room in drawn}, outcomes, kept, once)
+    known = [each for each in outcomes if each.mutant in again or kept.survived_once(each.mutant)]
+    once = {each.mutant: survivor_row(ROOT, each, verdicts) for each in known}
+    of_draw = [row for mutant, row in once.items() if mutant not in again]
+    found = room_rows({room: (places[room], drawn[room]) for room in drawn}, outcomes, kept, of_draw)
     write_csv(asked.out, COLUMNS, with_others(kept_rows(asked.out), found, set(drawn)))
-    write_csv(asked.survivors, SURVIVORS, with_others(before, once, set(drawn)))
+    untried = [row for mutant, row in again.items() if mutant not in once]
+    write_csv(asked.survivors, SURVIVORS, with_others(before, [*once.values(), *untried], set(drawn)))
     print(f"{len(outcomes)} of {len(in_turn)} faults tried, {sum(each.killed for each in outcomes)} killed")
 
 

@@ -13,6 +13,7 @@ from mutants import room_of, room_rows, wilson, with_others
 from mutation.candidates import Mutant, draw, mutated, of_file
 from mutation.coverage_map import Coverage, shown_tests
 from mutation.kept import Kept
+from mutation.survivors import changed, earlier, survivor_row
 from mutation.trials import Outcome, copy_of_tree, trial
 
 ROOT = Path(__file__).parents[1]
@@ -151,6 +152,20 @@ def test_outcomes_are_kept_until_the_source_or_a_survivor_s_tests_change(tree):
     tried(two, True)
     kept = Kept(tree / "kept.jsonl", tree)
     assert [kept.survived_once(each) for each in (one, two)] == [False, True]
+
+
+def test_survivors_of_earlier_draws_are_found_again_by_their_text_where_it_still_stands(tree):
+    places = of_file(tree, "src/lowalt/reach.py")
+    known = [survivor_row(tree, Outcome(mutant, False, 1), {}) for mutant in places if mutant.line == 8]
+    assert len({(row["before"], row["after"]) for row in known}) == len(known) > 3
+    (tree / "src/lowalt/reach.py").write_text(SOURCE.replace("\n\n\ndef", "\nMORE = 2 < 3\n\n\ndef", 1))
+    moved = of_file(tree, "src/lowalt/reach.py")
+    found = earlier(tree, known, moved, [])
+    assert {mutant.line for mutant in found} == {9}
+    assert [changed(tree, mutant) for mutant in found] == [(row["before"], row["after"]) for row in known]
+    assert list(found.values()) == known and list(earlier(tree, known, moved, list(found)[1:])) == list(found)[:1]
+    (tree / "src/lowalt/reach.py").write_text(SOURCE.replace("a + b", "b + a"))
+    assert not earlier(tree, known, of_file(tree, "src/lowalt/reach.py"), [])
 
 
 def test_rates_have_wilson_s_interval():
