@@ -78,6 +78,12 @@ rule slow_times:
     localrule: True
 
 
+rule tracks:
+    input:
+        products.tracks,
+    localrule: True
+
+
 # What needs no torch before the first training: `make` has it made while torch is still on its way.
 rule prepared:
     input:

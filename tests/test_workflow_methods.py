@@ -1,5 +1,7 @@
 """The workflow of `config/methods.yaml`: which files its trainings read, and which configurations are refused."""
 
+import os
+import re
 from types import SimpleNamespace
 
 import pytest
@@ -10,6 +12,7 @@ from lowalt.common.config import merge
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.workflow import options
+from snakemake_runs import run
 
 METHODS = {"table": "config/methods.csv", "schemes": ["signal CNN", "images voting", "RBF-SVM on features"]}
 
@@ -64,6 +67,58 @@ def test_signals_come_from_the_noise_stage_where_shards_hold_images():
     assert "inf" in settings.slow_time(job)
     _, products, _ = parts({"recognition": METHODS, "shards": {"kind": "signal"}, "tiles": {"reduced": []}})
     assert products.noisy_chunk(job) == {} and options.noisy_chunk(job, Inputs()) == ""
+
+
+HEIGHT = {"table": "config/track.csv", "schemes": ["A:VRP+TRP+VT with height"]}
+
+
+def test_tracks_are_read_by_schemes_with_the_cue_alone_from_the_data_set_s_own_run():
+    run, products, _ = parts(load_yaml("config/track.yaml"))
+    assert len(run.trainings) == 2 * 2 * 3 and run.data == "default"
+    job = SimpleNamespace(run="track", scheme="a-vrp-trp-vt-with-height", protocol="seen", train_seed="0")
+    found = products.training_samples(job)
+    assert list(found) == ["views", "tracks"] and len(found["tracks"]) == len(run.plan.shards)
+    assert found["tracks"][0] == "results/default/tracks/seen-train-00000.npz"
+    assert options.samples(None, Inputs(views="a", tracks="b c")) == "--views a --tracks b c"
+    _, products, _ = parts({"recognition": HEIGHT | {"cache": False}})
+    assert list(products.samples(job)) == ["index", "tracks"]
+    assert options.samples(None, Inputs(index="a", tracks="b c")) == "--index a --tracks b c"
+    _, products, _ = parts()
+    assert list(products.samples(SimpleNamespace(run="default", scheme="a-vrp-trp-vt"))) == ["views"]
+    assert products.tracks(None)[0] == "results/default/tracks/seen-train-00000.npz"
+    with pytest.raises(InputError, match="expected one without cues to ask about effects"):
+        _ = run.asked
+
+
+@pytest.mark.workflow
+def test_a_dry_run_makes_tracks_for_schemes_with_the_cue_alone(tmp_path):
+    pytest.importorskip("snakemake")
+    for name in ("workflow", "profiles", "src", "envs", "Snakefile"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    rows = "plain,A,VRP,attention,,seen,\nwith height,A,VRP,attention,,seen,height\n"
+    (tmp_path / "schemes.csv").write_text("scheme,stations,spectra,fusion,backbone,protocols,cues\n" + rows)
+    block = {"table": "schemes.csv", "schemes": ["plain", "with height"], "protocols": ["seen"]}
+    overlay = {"run": "mine", "targets": {"select": ["DJI Mini 2", "Crow"]}, "recognition": block}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(overlay))
+    line = ["--dry-run", "--cores", "1", "--configfile", "mine.yaml", "--", "models"]
+    environment = {name: value for name, value in os.environ.items() if name != "LOWALT_INPUTS"}
+    status, text = run(tmp_path, line, environment | {"PYTHONPATH": str(ROOT / "src")})
+    assert status == 0, text[-3000:]
+    jobs = {re.search(r"scheme=([a-z-]+)", job)[1]: job for job in text.split("\n\n") if "rule train:" in job}
+    assert {name: "results/mine/tracks/" in job for name, job in jobs.items()} == {"plain": False, "with-height": True}
+    assert "rule track:" in text
+
+
+@pytest.mark.parametrize(
+    ("overlay", "key"),
+    [({"recognition": {"cache": False, "input": "dataset"}}, "input"), ({"effects": {"clutter": {}}}, "effects"),
+     ({"recognition": {"training": {"stream": 0.5}}}, "training.stream"), ({"recognition": {"extra": ["x"]}}, "extra"),
+     ({"recognition": {"timed": HEIGHT["schemes"]}}, "timed"),
+     ({"network": {"stations": {"AB": {"transmit": "A", "receive": "B"}}}}, "links")],
+)  # fmt: skip
+def test_heights_that_nobody_measures_are_refused_by_name(overlay, key):
+    with pytest.raises(InputError, match=f"with height' has the cue 'height' and {key} is .*, expected no {key}"):
+        run_of(merge({"recognition": HEIGHT}, overlay))
 
 
 @pytest.mark.parametrize(

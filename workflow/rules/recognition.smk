@@ -51,6 +51,26 @@ rule slow_time:
         " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.noisy} --out {output:q} 2> {log:q}"
 
 
+rule track:
+    input:
+        code=code("lowalt.recognition.track"),
+        index=ancient("results/{run}/shards/index.json"),
+        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
+    output:
+        "results/{run}/tracks/{group}-{fold}-{part}.npz",
+    log:
+        "results/{run}/logs/tracks/{group}-{fold}-{part}.log",
+    benchmark:
+        "results/{run}/benchmarks/tracks/{group}-{fold}-{part}.jsonl"
+    conda:
+        "../../envs/environment.yaml"
+    params:
+        render=settings.index,
+    shell:
+        "python -m lowalt.recognition.track --settings '{{}}' --index {input.index:q}"
+        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
+
+
 rule freeze:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.freeze"),
@@ -89,7 +109,11 @@ rule train:
     input:
         unpack(products.training_samples),
         code=code(
-            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+            "lowalt.recognition",
+            "lowalt.recognition.runs",
+            "lowalt.recognition.views",
+            "lowalt.recognition.tracked",
+            "lowalt.recognition.freeze",
         ),
         frozen=products.frozen,
         schemes=config["recognition"]["table"],
@@ -127,7 +151,11 @@ rule evaluate:
     input:
         unpack(products.samples),
         code=code(
-            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+            "lowalt.recognition",
+            "lowalt.recognition.runs",
+            "lowalt.recognition.views",
+            "lowalt.recognition.tracked",
+            "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
@@ -181,7 +209,11 @@ rule transfer_evaluate:
     input:
         unpack(products.samples),
         code=code(
-            "lowalt.recognition", "lowalt.recognition.runs", "lowalt.recognition.views", "lowalt.recognition.freeze"
+            "lowalt.recognition",
+            "lowalt.recognition.runs",
+            "lowalt.recognition.views",
+            "lowalt.recognition.tracked",
+            "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
         model="results/{other}/models/{protocol}/{scheme}/{train_seed}/model.pt",

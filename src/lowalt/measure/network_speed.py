@@ -27,7 +27,7 @@ from lowalt.recognition.inference import Machine
 from lowalt.recognition.methods import built
 from lowalt.recognition.objective import objective
 from lowalt.recognition.runs import load
-from lowalt.recognition.schemes import TABLE, Scheme, named
+from lowalt.recognition.schemes import TABLE, Scheme, named, refuse_cues
 
 BATCHES = (1, 64)
 
@@ -86,6 +86,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0, model_path: st
     Where the settings compile, the training step is that of the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
+    refuse_cues(scheme, "network_speed")
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block = recipe.check(settings["training"])
     recipe.seeded(settings["seed"], ("speed",), block["threads"])

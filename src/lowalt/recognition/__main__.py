@@ -9,8 +9,8 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
-from lowalt.recognition.sources import name_sources, of_size
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names, refuse_cues
+from lowalt.recognition.sources import name_sources, open_samples
 
 
 def _views(arguments: list[str]) -> None:
@@ -49,38 +49,19 @@ def _freeze(arguments: list[str]) -> None:
     print(f"{given.out}: {freeze.verify(given.out)} files as frozen", file=sys.stderr)
 
 
-def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
-    """Return the samples of some (group, fold) pairs from the source the command line names."""
-    from lowalt.recognition.samples import ViewSamples
-    from lowalt.recognition.views import ShardSamples
-
-    if sum(source is not None for source in (given.views, given.signals, given.index, given.dataset)) != 1:
-        raise InputError("expected one of --views, --signals, --index and --dataset")
-    if (given.signals is None) != (scheme.sees == "images"):
-        raise InputError(f"--signals: scheme {scheme.name!r} sees {scheme.sees}")
-    if given.signals is not None:
-        from lowalt.recognition.slow_time import SlowTimeSamples
-
-        return of_size(SlowTimeSamples(given.signals, scheme.sees, scheme.columns, pairs), scheme, size)
-    if given.dataset is not None:
-        from lowalt.recognition.made import DatasetSamples, opened
-
-        return DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
-    if given.views is None:
-        return ShardSamples(given.index, scheme.columns, pairs, size, placed)
-    return of_size(ViewSamples(given.views, scheme.columns, pairs), scheme, size)
-
-
 def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
     """Return the sources "train" and "validation" of a scheme in a protocol that the command line of `train` names."""
     from lowalt.recognition.samples import ViewSamples, first_models, with_extra
 
     samples = {
-        part: _open(given, folds(protocol, part), scheme, settings["size"], placed=False)
+        part: open_samples(given, folds(protocol, part), scheme, settings["size"], placed=False)
         for part in ("train", "validation")
     }
     if scheme.share < 1:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
+    for name in ("extra", "stream"):
+        if getattr(given, name):
+            refuse_cues(scheme, f"--{name}")
     if given.extra:
         more = ViewSamples(given.extra, scheme.columns, folds(protocol, "train"))
         samples["train"] = with_extra(samples["train"], more)
@@ -142,7 +123,7 @@ def _evaluate(arguments: list[str]) -> None:
     trained = load(given.model)
     parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
     pairs = set().union(*(folds(trained.protocol, part) for part in parts))
-    found = _open(given, pairs, trained.scheme, trained.size, placed=True)
+    found = open_samples(given, pairs, trained.scheme, trained.size, placed=True)
     evaluate(trained, found, given.settings, given.out, given.trained_on)
 
 

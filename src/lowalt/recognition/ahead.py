@@ -7,6 +7,8 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
+from lowalt.recognition.height_cue import Measured, measured
+
 
 class Unchanged(Dataset):
     """Index images of samples as they are: the map from sample numbers to a batch that evaluation reads."""
@@ -15,9 +17,9 @@ class Unchanged(Dataset):
         """source: samples, with a method `views`."""
         self.source = source
 
-    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor:
-        """Return the index images (len(numbers), views, S, S) uint8 of the samples `numbers`."""
-        return torch.from_numpy(self.source.views(numbers))
+    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor | Measured:
+        """Return the index images (len(numbers), views, S, S) uint8 of the samples `numbers`, perhaps with heights."""
+        return measured(self.source, numbers, torch.from_numpy(self.source.views(numbers)))
 
 
 class ReadAhead:

@@ -1,7 +1,6 @@
 """From settings to the files of a classical training, which are those of a network's, so the same rules read them."""
 
 import time
-from dataclasses import asdict
 from pathlib import Path
 
 from lowalt.common.csv_tables import write_csv
@@ -23,12 +22,12 @@ def train(samples: dict, scheme: Scheme, protocol: str, settings: dict, folder: 
     model, history = classical.fit(samples, scheme.method, len(classes), seed, (protocol, scheme.name))
     seconds, busy = time.monotonic() - start, time.process_time() - busy
     name = checkpoint.identity(
-        scheme=asdict(scheme), protocol=protocol, seed=seed,
+        scheme=scheme.record, protocol=protocol, seed=seed,
         samples={part: source.sha256() for part, source in samples.items()},
     )  # fmt: skip
     folder.mkdir(parents=True, exist_ok=True)
     checkpoint.save(folder / "model.pt", name, {
-        "weights": model.state_dict(), "scheme": asdict(scheme), "protocol": protocol, "size": settings["size"],
+        "weights": model.state_dict(), "scheme": scheme.record, "protocol": protocol, "size": settings["size"],
         "seed": seed, "network": {}, "colour_map": "", "classes": list(classes),
     })  # fmt: skip
     write_csv(folder / "history.csv", classical.HISTORY, [[*map(str, row)] for row in history])

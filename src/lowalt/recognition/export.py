@@ -11,6 +11,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
+from lowalt.recognition.schemes import refuse_cues
 
 
 class Probabilities(nn.Module):
@@ -30,9 +31,10 @@ def export(trained: Trained, out: str | Path) -> None:
     """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size; or its weights and records
     (.safetensors) with a card (.md) next to them.
 
-    Raises: InputError for another suffix, a program of a model that sees no images, or where ONNX is asked for and its
-    packages are not installed.
+    Raises: InputError for another suffix, a model with cues, a program of a model that sees no images, or where ONNX is
+    asked for and its packages are not installed.
     """
+    refuse_cues(trained.scheme, "--model")
     suffix = Path(out).suffix
     if suffix not in (".pt2", ".onnx", ".safetensors"):
         raise InputError(f"--out {out}: expected a name ending in .safetensors, .pt2 or .onnx")

@@ -33,9 +33,9 @@ class Fusion(nn.Module):
         super().__init__()
         self.width = width
 
-    def decided(self, tokens: torch.Tensor, classifier: nn.Module) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> logits (B, classes)."""
-        return classifier(self(tokens))
+    def decided(self, tokens: torch.Tensor, classifier: nn.Module, cue: torch.Tensor | None = None) -> torch.Tensor:
+        """Tokens (B, K, V, features), perhaps with cues (B, K, features) -> logits (B, classes)."""
+        return classifier(self(tokens) if cue is None else self(tokens, cue))
 
     def each_station(self, tokens: torch.Tensor) -> torch.Tensor:
         """Tokens (B, K, V, features) -> (B * K, 1, V, features), station by station."""
@@ -59,12 +59,16 @@ class AttentionFusion(Fusion):
         self.intra = encoder(width, block["intra_depth"], *shape)
         self.inter = encoder(width, block["inter_depth"], *shape)
 
-    def forward(self, tokens: torch.Tensor) -> torch.Tensor:
-        """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F."""
+    def forward(self, tokens: torch.Tensor, cue: torch.Tensor | None = None) -> torch.Tensor:
+        """Tokens (B, K, V, features) -> fused feature (B, features). Source: paper, section IV-F.
+
+        cue (B, K, features): added to the station's token before the stations meet; the paper has none.
+        """
         samples, stations = tokens.shape[:2]
         tokens = tokens + self.modality
         station = self.intra(tokens.flatten(0, 1)).mean(dim=1)
-        return self.inter(station.unflatten(0, (samples, stations))).amax(dim=1)
+        station = station.unflatten(0, (samples, stations))
+        return self.inter(station if cue is None else station + cue).amax(dim=1)
 
 
 class MeanFusion(Fusion):
@@ -99,7 +103,7 @@ class VotingFusion(Fusion):
     Source: Kuncheva, Combining Pattern Classifiers, 2004, ch. 5.
     """
 
-    def decided(self, tokens: torch.Tensor, classifier: nn.Module) -> torch.Tensor:
+    def decided(self, tokens: torch.Tensor, classifier: nn.Module, cue: torch.Tensor | None = None) -> torch.Tensor:
         """Tokens (B, K, V, features) -> log of the mean class probabilities (B, classes)."""
         votes = classifier(tokens).float().log_softmax(-1).flatten(1, 2)
         return votes.logsumexp(1) - math.log(votes.shape[1])
@@ -140,14 +144,19 @@ class Fused(nn.Module):
         """Inputs of all views -> tokens (B, K, V, features)."""
         raise NotImplementedError
 
+    def cue(self, inputs: torch.Tensor) -> torch.Tensor | None:
+        """Inputs -> cues (B, K, features) that are added to the stations' tokens; None for a network without cues."""
+        return None
+
     def forward(self, inputs: torch.Tensor, alone: bool = False) -> torch.Tensor | tuple[torch.Tensor, torch.Tensor]:
         """Inputs of all views (B, K * V, ...), station-major -> logits (B, classes).
 
         alone: return as well the logits (B * K, classes) of each station as if it were the only one; the backbone runs
         once.
         """
-        tokens = self.tokens(inputs)
-        logits = self.fusion.decided(tokens, self.classifier)
+        tokens, cue = self.tokens(inputs), self.cue(inputs)
+        logits = self.fusion.decided(tokens, self.classifier, cue)
         if not alone:
             return logits
-        return logits, self.fusion.decided(self.fusion.each_station(tokens), self.classifier)
+        own = None if cue is None else cue.flatten(0, 1).unsqueeze(1)
+        return logits, self.fusion.decided(self.fusion.each_station(tokens), self.classifier, own)

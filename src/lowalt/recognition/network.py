@@ -27,6 +27,7 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.recognition import own_backbone, spectrogram_transformer
 from lowalt.recognition.fusion import Fused
+from lowalt.recognition.height_cue import HeightCue, Measured, images_of
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
@@ -102,9 +103,15 @@ class Recogniser(Fused):
         pre = self.backbone.pretrained_cfg
         self.palettes = Palettes(palettes, scheme.spectra, pre["mean"], pre["std"])
         self.add_head(scheme.fusion, width, (len(scheme.stations), len(scheme.spectra)), block, classes)
+        # Last, so that all other weights begin as in the network without it.
+        self.height = HeightCue(width) if scheme.cues else None
 
-    def tokens(self, index: torch.Tensor) -> torch.Tensor:
-        """Index images (B, K * V, rows, columns) uint8 -> tokens (B, K, V, features)."""
+    def tokens(self, inputs: torch.Tensor | Measured) -> torch.Tensor:
+        """Index images (B, K * V, rows, columns) uint8, perhaps with heights -> tokens (B, K, V, features).
+
+        Raises: InputError where heights are missing, or are given to a network without the cue.
+        """
+        index = images_of(inputs, self.height is not None)
         samples, views = index.shape[:2]
         stations, spectra = views // self.shape[1], self.shape[1]
         images = self.palettes(index.unflatten(1, (stations, spectra)))
@@ -112,10 +119,17 @@ class Recogniser(Fused):
         features = self.backbone(images.flatten(0, 2))
         return features.view(samples, stations, spectra, -1)
 
+    def cue(self, inputs: torch.Tensor | Measured) -> torch.Tensor | None:
+        """Heights (B, K) of the inputs -> cues (B, K, features); None for a network without the cue."""
+        return self.height(inputs.height_m) if self.height is not None else None
+
     @staticmethod
-    def mirrored(index: torch.Tensor) -> torch.Tensor:
-        """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees."""
-        return index.flip(-2)
+    def mirrored(index: torch.Tensor | Measured) -> torch.Tensor | Measured:
+        """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees.
+
+        A measured height stays as it is.
+        """
+        return index._replace(images=index.images.flip(-2)) if isinstance(index, Measured) else index.flip(-2)
 
 
 def checkpoint_activations(model: Recogniser) -> None:

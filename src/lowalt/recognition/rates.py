@@ -25,7 +25,7 @@ from lowalt.recognition.objective import descent
 from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, refuse_cues
 from lowalt.recognition.slow_time import SlowTimeSamples
 from lowalt.recognition.sources import of_size
 from lowalt.recognition.training import Trainer
@@ -131,6 +131,7 @@ def find(
     samples: the training fold; settings: as of a training, of whose `training` the rates take the place of rate,
     warmup and steps. Raises: InputError for a wrong setting, a method without rates, or a loss that never falls.
     """
+    refuse_cues(scheme, "rates")
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     augment.check(settings["augmentation"])
     block = recipe.check(settings["training"])

@@ -7,6 +7,7 @@ from torch.utils.data import Dataset
 from lowalt.common.streams import stream
 from lowalt.recognition.augment import augment
 from lowalt.recognition.augment_signals import augment_signals
+from lowalt.recognition.height_cue import Measured, measured
 from lowalt.recognition.inference import Machine
 
 
@@ -18,9 +19,9 @@ class Reader(Dataset):
         self.source, self.columns, self.augmentation, self.keys = source, columns, augmentation, keys
         self.rank, self.ranks = machine.rank, machine.ranks
 
-    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor, torch.Tensor]:
+    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor | Measured, torch.Tensor]:
         """Return this rank's share of a batch: index images (B, views, S, S) uint8, or signals (B, stations, N)
-        complex64, and labels (B,)."""
+        complex64, perhaps with heights, and labels (B,)."""
         step, numbers = item
         mine = numbers[self.rank :: self.ranks]
         seed, *keys = self.keys
@@ -32,4 +33,4 @@ class Reader(Dataset):
             seen = augment(seen, self.columns, self.augmentation, generator)
         # A source with a stream knows labels of samples that are not among its facts.
         told = getattr(self.source, "labels", self.source.facts.label.__getitem__)(mine)
-        return torch.from_numpy(seen), torch.from_numpy(told).long()
+        return measured(self.source, mine, torch.from_numpy(seen)), torch.from_numpy(told).long()

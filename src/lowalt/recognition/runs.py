@@ -7,7 +7,7 @@ palettes and the weights.
 import json
 import sys
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -37,7 +37,7 @@ from lowalt.recognition.classical_models import of_arrays
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.methods import built
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import Scheme, columns_in, of_record
+from lowalt.recognition.schemes import Scheme, columns_in, of_record, refuse_cues
 from lowalt.recognition.slow_time import SlowTimeSamples, of_stations
 from lowalt.recognition.start import Start, carry
 from lowalt.recognition.training import Trainer
@@ -92,7 +92,7 @@ def train(
     at = trainer.fit()
     seconds, busy = time.monotonic() - began, time.process_time() - busy
     trainer.finish({
-        "scheme": asdict(scheme), "protocol": protocol, "network": settings["network"], "size": settings["size"],
+        "scheme": scheme.record, "protocol": protocol, "network": settings["network"], "size": settings["size"],
         "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes), **begun,
     })  # fmt: skip
     if machine.rank == 0:
@@ -116,7 +116,7 @@ def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, mach
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
-        scheme=asdict(scheme), protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
+        scheme=scheme.record, protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
         samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
         **({"own": sha256(own)} if own and own.is_file() else {}), **begun,
     )  # fmt: skip
@@ -240,7 +240,11 @@ def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:
 
 
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
-    """Return the probability of each category for one signal file or tile, in full precision."""
+    """Return the probability of each category for one signal file or tile, in full precision.
+
+    Raises: InputError for a model that also asks for a measured height, which no such file has.
+    """
+    refuse_cues(trained.scheme, "predict")
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
     return dict(zip(trained.classes, found.tolist(), strict=True))

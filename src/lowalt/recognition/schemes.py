@@ -17,10 +17,12 @@ A table may have more columns, which a row leaves empty to take the configuratio
     method      empty: the network on images. Otherwise the scheme sees signals or features and names no spectra:
                 cnn | complex | transformer on the stations' signals (fusion and stations as for images; size: symbols
                 of a signal); svm | boosting | xgboost on physical features of all its stations (fusion: concatenation)
+    cues        empty, or height: each station gives the network the height that it measures (`track.py`), next to its
+                images; fusion attention, no method, and the word in the scheme's name
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv
@@ -35,7 +37,8 @@ SPECTRA = tuple(name.upper() for name in NAMES)
 FUSIONS = ("attention", "mean", "voting", "concatenation")
 PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
-OPTIONAL = ("size", "steps", "share", "method")
+OPTIONAL = ("size", "steps", "share", "method", "cues")
+CUES = ("height",)
 SEES = {
     "": "images", "cnn": "signals", "complex": "signals", "transformer": "signals",
     "svm": "features", "boosting": "features", "xgboost": "features",
@@ -58,6 +61,12 @@ class Scheme:
     steps: int = 0
     share: float = 1.0
     method: str = ""
+    cues: str = ""
+
+    @property
+    def record(self) -> dict:
+        """The scheme as models and checkpoints keep it; one without cues as before there were any."""
+        return {key: value for key, value in asdict(self).items() if value or key != "cues"}
 
     @property
     def sees(self) -> str:
@@ -87,7 +96,7 @@ class Scheme:
 
 
 def of_record(record: dict) -> Scheme:
-    """Return the scheme of a record in a trained model, `dataclasses.asdict` of it with or without JSON's lists."""
+    """Return the scheme of a record in a trained model, `Scheme.record` with or without JSON's lists."""
     return Scheme(**{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()})
 
 
@@ -141,6 +150,28 @@ def _method(row: dict, where: str) -> str:
     return method
 
 
+def _cues(row: dict, where: str) -> str:
+    """Return the cues of a row; refuse an unknown one, and a row that cannot take it or does not say it by name."""
+    cues = row.get("cues") or ""
+    if not cues:
+        return ""
+    if cues not in CUES:
+        raise InputError(f"{where}: cues {cues!r}, expected nothing or one of {CUES}")
+    for column, wanted in (("fusion", "attention"), ("method", "")):
+        if (row.get(column) or "") != wanted:
+            raise InputError(f"{where}: cues {cues!r} with {column} {row[column]!r}, expected {wanted or 'none'!r}")
+    # By its name no table takes the row for one that sees images alone.
+    if cues not in row["scheme"]:
+        raise InputError(f"{where}: cues {cues!r}, expected the word in the scheme's name {row['scheme']!r}")
+    return cues
+
+
+def refuse_cues(scheme: Scheme, where: str) -> None:
+    """Raise InputError naming `where` and the scheme for a scheme with cues, where images are all there is."""
+    if scheme.cues:
+        raise InputError(f"{where}: scheme {scheme.name!r} has the cue {scheme.cues!r}, expected one without cues")
+
+
 def _station_names(text: str, known: Sequence[str]) -> list[str]:
     """Split names of stations, "north+south" or "ABC"."""
     names = text.split("+")
@@ -177,6 +208,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
         steps=int(_number(row, "steps", int, 1, 1e9, where)),
         share=float(_number(row, "share", float, 1e-6, 1.0, where)),
         method=method,
+        cues=_cues(row, where),
     )
 
 

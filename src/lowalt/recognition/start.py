@@ -66,9 +66,9 @@ def check_settings(start: Start, scheme: Scheme, settings: dict) -> None:
     settings: network, size, colour_map and classes of this training. Raises: InputError naming what differs.
     """
     own = {**{key: settings[key] for key in ("network", "size", "colour_map")}, "classes": list(settings["classes"]),
-           "method": scheme.method, "backbone": scheme.backbone}  # fmt: skip
+           "method": scheme.method, "backbone": scheme.backbone, "cues": scheme.cues}  # fmt: skip
     theirs = {**start.state, "classes": list(stated(start.state)), "method": start.scheme.method,
-              "backbone": start.scheme.backbone}  # fmt: skip
+              "backbone": start.scheme.backbone, "cues": start.scheme.cues}  # fmt: skip
     differ = sorted(key for key, value in own.items() if theirs[key] != value)
     if differ:
         raise InputError(f"--start: {start.name} has another {', '.join(differ)}, expected this training's")

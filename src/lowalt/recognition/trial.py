@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
 from lowalt.recognition.samples import ViewSamples, joined_views, with_extra
-from lowalt.recognition.schemes import TABLE, Scheme, named
+from lowalt.recognition.schemes import TABLE, Scheme, named, refuse_cues
 from lowalt.recognition.sources import of_size
 
 BLOCKS = ("size", "network", "training", "augmentation", "evaluation")
@@ -74,6 +74,7 @@ def main(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     table = choose.read(given.candidates)
     scheme = named(given.schemes, table.scheme, given.stations)
+    refuse_cues(scheme, "choices")
     trial(table, given.candidate, given.fold, given.settings, scheme, given.views, given.extra, Path(given.out))
 
 

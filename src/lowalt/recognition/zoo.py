@@ -21,6 +21,7 @@ from lowalt.recognition.model_file import EIGHT, ModelFile
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
 from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.schemes import refuse_cues
 from lowalt.recognition.slow_time import SlowTimeSamples
 
 ZOO = Path("results/zoo")
@@ -123,6 +124,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     given = line.parse_args(arguments)
     found = load(given.model)
+    refuse_cues(found.scheme, "--model")
     wanted = "views" if found.scheme.sees == "images" else "signals"
     paths, pairs = getattr(given, wanted), folds(found.protocol, "validation")
     if not paths:

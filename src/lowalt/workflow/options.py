@@ -83,10 +83,11 @@ def start(wildcards: Any, input: Any) -> str:
 
 
 def samples(wildcards: Any, input: Any) -> str:
-    """Option that names the signals, the shrunk images, the index of the shards, or the configuration to make samples
-    from."""
+    """Options that name the signals, the shrunk images, the index of the shards, or the configuration to make samples
+    from; and the measured heights, for a scheme with the cue."""
+    tracks = f" --tracks {input.tracks}" if input.get("tracks") else ""
     if input.get("dataset"):
         return f"--dataset {input.dataset}"
     if input.get("signals"):
         return f"--signals {input.signals}"
-    return f"--views {input.views}" if input.get("views") else f"--index {input.index}"
+    return (f"--views {input.views}" if input.get("views") else f"--index {input.index}") + tracks

@@ -34,16 +34,17 @@ class Products(DataProducts):
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
-        shards, or the clouds from which samples are made on the spot; signals where the scheme sees no images."""
+        shards, or clouds to make samples from; measured heights for a scheme with that cue; signals where it sees no images."""
         base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
         if scheme.sees != "images":
             return {"signals": [f"{base}/slow_time/{shard}.npz" for shard in self._run.plan.shards]}
         if self._config["recognition"].get("input") == "dataset":
             return self._made()
+        tracks = {"tracks": self._tracks(base)} if scheme.cues else {}
         if not self._config["recognition"]["cache"]:
-            return {"index": f"{base}/shards/index.json"}
+            return {"index": f"{base}/shards/index.json", **tracks}
         size = self._run.pixels(scheme)
-        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
+        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards], **tracks}
 
     def _made(self) -> dict[str, str | list[str]]:
         """Files from which samples are made on the spot: configuration, clouds, and surfaces that hide points."""
@@ -100,12 +101,13 @@ class Products(DataProducts):
         """Signals and features of this run's own samples, for schemes that see no images."""
         return [f"results/{self._run.name}/slow_time/{shard}.npz" for shard in self._run.plan.shards]
 
-    def noisy_chunk(self, wildcards: Any) -> dict[str, str]:
-        """Noisy signals of a chunk and its motion table; nothing where shards hold the signals themselves."""
-        if self._config["shards"]["kind"] != "image":
-            return {}
-        noisy = f"results/{wildcards.run}/noisy/{wildcards.group}-{wildcards.part}.npy"
-        return {"noisy": noisy, "motion": self.motion(wildcards)}
+    def tracks(self, wildcards: Any) -> list[str]:
+        """Measured heights of this run's own samples, for schemes with that cue."""
+        return self._tracks(f"results/{self._run.name}")
+
+    def _tracks(self, base: str) -> list[str]:
+        """Measured heights of a run with this run's plan."""
+        return [f"{base}/tracks/{shard}.npz" for shard in self._run.plan.shards]
 
     def timed_model(self, wildcards: Any) -> list[str]:
         """The trained model that is timed, where its time depends on its training: a classical method's; else none."""

@@ -51,6 +51,25 @@ def refuse_signals(config: dict, scheme: Scheme) -> None:
         raise InputError(f"scheme {scheme.name!r}: size {scheme.size}, expected the {symbols} symbols of a signal")
 
 
+def refuse_height(config: dict, scheme: Scheme) -> None:
+    """Refuse a scheme with measured heights where no track is made or where other samples without one join in."""
+    if not scheme.cues:
+        return
+    block = config["recognition"]
+    links = sorted(name for name, place in config["network"]["stations"].items() if "transmit" in place)
+    given = {
+        "effects": sorted(config["effects"]), "links": links, "input": block.get("input") == "dataset",
+        "extra": block.get("extra"), "timed": scheme.name in block["timed"],
+        "training.stream": block["training"].get("stream"),
+    }  # fmt: skip
+    for key, value in given.items():
+        if value:
+            raise InputError(
+                f"recognition: scheme {scheme.name!r} has the cue {scheme.cues!r} and {key} is {value!r}, expected "
+                f"no {key}: heights are measured of stored samples, by stations that hear themselves"
+            )
+
+
 def refuse_starts(starts: dict[str, dict], trained: set[str]) -> None:
     """Refuse a start that this run does not train, that has met samples which are tested, or that goes in a circle.
 

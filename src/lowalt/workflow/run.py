@@ -24,6 +24,7 @@ from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
     refuse_data,
     refuse_extra,
+    refuse_height,
     refuse_heights,
     refuse_input,
     refuse_no_files,
@@ -68,6 +69,7 @@ class Run:
             for name in (*block["schemes"], *block["timed"])
         }
         for name, scheme in schemes.items():
+            refuse_height(config, scheme)
             if scheme.sees == "images":
                 columns_in(scheme.columns, spectra_named(config["spectra"]), len(config["network"]["stations"]), name)
             else:
@@ -201,11 +203,12 @@ class Run:
         able = [
             scheme
             for scheme in self.trained
-            if scheme.sees == "images" and "seen" in scheme.protocols and "seen" in protocols
+            if scheme.sees == "images" and not scheme.cues and "seen" in scheme.protocols and "seen" in protocols
         ]
         if not able:
             raise InputError(
-                "recognition.schemes: none is trained in the protocol 'seen', expected one to ask about effects"
+                "recognition.schemes: none is trained in the protocol 'seen', expected one without cues to ask about "
+                "effects"
             )
         return max(able, key=lambda scheme: len(scheme.columns))
 
