@@ -34,7 +34,7 @@ class Products(DataProducts):
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
-        shards, or clouds to make samples from; measured heights for a scheme with that cue; signals where it sees no images."""
+        shards, or clouds to make samples from; heights for a scheme with that cue; signals where it sees no images."""
         base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
         if scheme.sees != "images":
             return {"signals": [f"{base}/slow_time/{shard}.npz" for shard in self._run.plan.shards]}
