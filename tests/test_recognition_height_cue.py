@@ -12,7 +12,7 @@ from lowalt.common.streams import stream
 from lowalt.recognition import checkpoint, height_cue, methods, recipe, runs, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.export import export
-from lowalt.recognition.height_cue import Measured
+from lowalt.recognition.height_cue import WithHeight
 from lowalt.recognition.tracked import Tracked
 from trainings import SETTINGS, equal, with_training
 
@@ -37,13 +37,13 @@ def test_a_cue_adds_its_own_weights_alone_and_stations_stay_a_set():
     theirs, own = plain.state_dict(), cued.state_dict()
     assert equal(theirs, {name: value for name, value in own.items() if not name.startswith("height.")})
     assert len(own) == len(theirs) + 4
-    found = cued(Measured(given, heights))
-    torch.testing.assert_close(cued(Measured(given.flip(1), heights.flip(1))), found, atol=1e-5, rtol=1e-5)
-    assert not torch.allclose(cued(Measured(given, heights.flip(1))), found, atol=1e-4)
-    _, alone = cued(Measured(given, heights), alone=True)
-    one = cued(Measured(given[:, 1:], heights[:, 1:]))
+    found = cued(WithHeight(given, heights))
+    torch.testing.assert_close(cued(WithHeight(given.flip(1), heights.flip(1))), found, atol=1e-5, rtol=1e-5)
+    assert not torch.allclose(cued(WithHeight(given, heights.flip(1))), found, atol=1e-4)
+    _, alone = cued(WithHeight(given, heights), alone=True)
+    one = cued(WithHeight(given[:, 1:], heights[:, 1:]))
     torch.testing.assert_close(alone.view(5, 2, 4)[:, 1], one, atol=1e-5, rtol=1e-5)
-    for model, inputs in ((cued, given), (plain, Measured(given, heights))):
+    for model, inputs in ((cued, given), (plain, WithHeight(given, heights))):
         with pytest.raises(InputError, match="network: "):
             model(inputs)
 
@@ -105,7 +105,7 @@ def test_a_network_that_ignores_its_images_tells_classes_apart_by_height():
         label = torch.from_numpy(rng.integers(0, 4, count))
         error = 3 * torch.from_numpy(rng.standard_normal((count, 2))).float()
         heights = torch.tensor([0.0, 40, 90, 150])[label, None] + error
-        return Measured(images(1).expand(count, -1, -1, -1), heights), label
+        return WithHeight(images(1).expand(count, -1, -1, -1), heights), label
 
     for _ in range(60):
         given, label = drawn(32)
@@ -192,7 +192,7 @@ def test_rows_that_contradict_their_cues_are_refused_by_name(changes, words):
 
 
 def test_measured_inputs_are_cut_and_moved_together():
-    given = Measured(images(5), torch.arange(10.0).view(5, 2))
+    given = WithHeight(images(5), torch.arange(10.0).view(5, 2))
     parts = given.to(torch.device("cpu")).chunk(2)
     assert [len(part.images) for part in parts] == [len(part.height_m) for part in parts] == [3, 2]
     assert parts[1].height_m.tolist() == [[6, 7], [8, 9]] and given.shape == given.images.shape

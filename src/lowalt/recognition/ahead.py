@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from lowalt.recognition.height_cue import Measured, measured
+from lowalt.recognition.height_cue import WithHeight, measured
 
 
 class Unchanged(Dataset):
@@ -17,7 +17,7 @@ class Unchanged(Dataset):
         """source: samples, with a method `views`."""
         self.source = source
 
-    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor | Measured:
+    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor | WithHeight:
         """Return the index images (len(numbers), views, S, S) uint8 of the samples `numbers`, perhaps with heights."""
         return measured(self.source, numbers, torch.from_numpy(self.source.views(numbers)))
 

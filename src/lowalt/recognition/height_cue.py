@@ -17,7 +17,7 @@ HIDDEN = 16
 """Values between the two linear layers."""
 
 
-class Measured(NamedTuple):
+class WithHeight(NamedTuple):
     """Index images (B, K * V, S, S) uint8 of samples, and the height (B, K) float32 (m) that each station measured.
 
     It answers the calls of a tensor that trainings and evaluations make.
@@ -31,33 +31,33 @@ class Measured(NamedTuple):
         """Shape of the images."""
         return self.images.shape
 
-    def to(self, device: torch.device, non_blocking: bool = False) -> "Measured":
+    def to(self, device: torch.device, non_blocking: bool = False) -> "WithHeight":
         """Return both on a device."""
-        return Measured(*(part.to(device, non_blocking=non_blocking) for part in self))
+        return WithHeight(*(part.to(device, non_blocking=non_blocking) for part in self))
 
-    def chunk(self, count: int) -> list["Measured"]:
+    def chunk(self, count: int) -> list["WithHeight"]:
         """Return the samples in at most `count` parts, as `torch.Tensor.chunk` cuts them."""
-        return [Measured(*parts) for parts in zip(*(part.chunk(count) for part in self), strict=True)]
+        return [WithHeight(*parts) for parts in zip(*(part.chunk(count) for part in self), strict=True)]
 
 
-def measured(source: Any, numbers: np.ndarray, images: torch.Tensor) -> torch.Tensor | Measured:
+def measured(source: Any, numbers: np.ndarray, images: torch.Tensor) -> torch.Tensor | WithHeight:
     """Return the images of the samples `numbers`, with their heights where the source measures any."""
     heights = getattr(source, "height_m", None)
-    return images if heights is None else Measured(images, torch.from_numpy(heights[numbers]))
+    return images if heights is None else WithHeight(images, torch.from_numpy(heights[numbers]))
 
 
-def images_of(inputs: torch.Tensor | Measured, wanted: bool) -> torch.Tensor:
+def images_of(inputs: torch.Tensor | WithHeight, wanted: bool) -> torch.Tensor:
     """Return the images of a network's inputs; wanted: whether the network has the cue.
 
     Raises: InputError where heights are missing, or are given to a network without the cue.
     """
-    if isinstance(inputs, Measured) != wanted:
+    if isinstance(inputs, WithHeight) != wanted:
         raise InputError(
             "network: no measured heights, expected one of each station"
             if wanted
             else "network: measured heights, expected images alone"
         )
-    return inputs.images if isinstance(inputs, Measured) else inputs
+    return inputs.images if isinstance(inputs, WithHeight) else inputs
 
 
 class HeightCue(nn.Module):

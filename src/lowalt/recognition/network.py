@@ -27,7 +27,7 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.recognition import own_backbone, spectrogram_transformer
 from lowalt.recognition.fusion import Fused
-from lowalt.recognition.height_cue import HeightCue, Measured, images_of
+from lowalt.recognition.height_cue import HeightCue, WithHeight, images_of
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
@@ -106,7 +106,7 @@ class Recogniser(Fused):
         # Last, so that all other weights begin as in the network without it.
         self.height = HeightCue(width) if scheme.cues else None
 
-    def tokens(self, inputs: torch.Tensor | Measured) -> torch.Tensor:
+    def tokens(self, inputs: torch.Tensor | WithHeight) -> torch.Tensor:
         """Index images (B, K * V, rows, columns) uint8, perhaps with heights -> tokens (B, K, V, features).
 
         Raises: InputError where heights are missing, or are given to a network without the cue.
@@ -119,17 +119,17 @@ class Recogniser(Fused):
         features = self.backbone(images.flatten(0, 2))
         return features.view(samples, stations, spectra, -1)
 
-    def cue(self, inputs: torch.Tensor | Measured) -> torch.Tensor | None:
+    def cue(self, inputs: torch.Tensor | WithHeight) -> torch.Tensor | None:
         """Heights (B, K) of the inputs -> cues (B, K, features); None for a network without the cue."""
         return self.height(inputs.height_m) if self.height is not None else None
 
     @staticmethod
-    def mirrored(index: torch.Tensor | Measured) -> torch.Tensor | Measured:
+    def mirrored(index: torch.Tensor | WithHeight) -> torch.Tensor | WithHeight:
         """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees.
 
         A measured height stays as it is.
         """
-        return index._replace(images=index.images.flip(-2)) if isinstance(index, Measured) else index.flip(-2)
+        return index._replace(images=index.images.flip(-2)) if isinstance(index, WithHeight) else index.flip(-2)
 
 
 def checkpoint_activations(model: Recogniser) -> None:

@@ -7,7 +7,7 @@ from torch.utils.data import Dataset
 from lowalt.common.streams import stream
 from lowalt.recognition.augment import augment
 from lowalt.recognition.augment_signals import augment_signals
-from lowalt.recognition.height_cue import Measured, measured
+from lowalt.recognition.height_cue import WithHeight, measured
 from lowalt.recognition.inference import Machine
 
 
@@ -19,7 +19,7 @@ class Reader(Dataset):
         self.source, self.columns, self.augmentation, self.keys = source, columns, augmentation, keys
         self.rank, self.ranks = machine.rank, machine.ranks
 
-    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor | Measured, torch.Tensor]:
+    def __getitem__(self, item: tuple[int, np.ndarray]) -> tuple[torch.Tensor | WithHeight, torch.Tensor]:
         """Return this rank's share of a batch: index images (B, views, S, S) uint8, or signals (B, stations, N)
         complex64, perhaps with heights, and labels (B,)."""
         step, numbers = item
