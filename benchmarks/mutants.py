@@ -40,7 +40,7 @@ SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after
 _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "hardware", "noise",
            "plan", "portable", "splits", "turns", "workflow_board")  # fmt: skip
 _MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "physics", "echo_command", "echo_hard",
-            "recognition_price", "recognition_stream")  # fmt: skip
+            "command", "recognition_price", "recognition_stream")  # fmt: skip
 _RECOGNITION = ("own_backbone", *(f"recognition{name}" for name in (
     ".py", "_augment", "_choose", "_classical", "_data", "_distances", "_faults", "_features", "_fusion", "_made",
     "_rates", "_rotor", "_shards", "_sharing", "_signals", "_start", "_tables", "_training", "_transfer")))  # fmt: skip
