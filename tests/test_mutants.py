@@ -70,20 +70,21 @@ def test_a_draw_takes_a_line_once_and_the_same_for_the_same_seed(tree):
     assert len({mutant.line for mutant in drawn}) == len(drawn) == len({mutant.line for mutant in found})
 
 
-def test_the_quickest_tests_of_a_line_come_first_until_time_is_up():
+def test_the_quickest_tests_of_a_line_come_first_until_time_is_up(tree):
     file = "src/lowalt/reach.py"
-    found = Coverage({file: {7: ["t.py::slow", "t.py::quick", "t.py::middle"], 2: ["u.py"]}},
+    found = Coverage({file: {7: ["t.py::slow", "t.py::quick", "t.py::middle"], 8: ["u.py"], 2: ["t.py::slow"]}},
                      {"t.py::slow": 30.0, "t.py::quick": 1.0, "t.py::middle": 5.0, "u.py::one": 1.0})  # fmt: skip
-    assert shown_tests(Path(), found, file, 7, 10.0) == ["t.py::quick", "t.py::middle"]
-    assert shown_tests(Path(), found, file, 2, 10.0) == ["u.py::one"]
+    assert shown_tests(tree, found, file, 7, 10.0) == ["t.py::quick", "t.py::middle"]
+    assert shown_tests(tree, found, file, 8, 10.0) == ["u.py::one"]
     # Tests of the room come before quicker ones of other rooms.
     near = Coverage({file: {7: ["t.py::quick", "tests/test_reach_far.py::slow"]}},
                     {"t.py::quick": 1.0, "tests/test_reach_far.py::slow": 9.0})  # fmt: skip
-    assert shown_tests(Path(), near, file, 7, 10.0) == ["tests/test_reach_far.py::slow", "t.py::quick"]
+    assert shown_tests(tree, near, file, 7, 10.0) == ["tests/test_reach_far.py::slow", "t.py::quick"]
     # One that takes longer by itself is shown with those that do not.
-    assert shown_tests(Path(), near, file, 7, 5.0) == ["t.py::quick", "tests/test_reach_far.py::slow"]
-    assert shown_tests(Path(), found, file, 7, 0.5) == ["t.py::quick"]
-    assert set(shown_tests(Path(), found, file, 5, 100.0)) == {"t.py::slow", "t.py::quick", "t.py::middle", "u.py::one"}
+    assert shown_tests(tree, near, file, 7, 5.0) == ["t.py::quick", "tests/test_reach_far.py::slow"]
+    assert shown_tests(tree, found, file, 7, 0.5) == ["t.py::quick"]
+    # A line of definitions runs at import, perhaps in a test: all tests of the file are shown.
+    assert set(shown_tests(tree, found, file, 2, 100.0)) == {"t.py::slow", "t.py::quick", "t.py::middle", "u.py::one"}
 
 
 def test_a_fault_that_a_test_notices_is_killed_and_taken_out_again(tree):

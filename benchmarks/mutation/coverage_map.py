@@ -5,6 +5,7 @@ definitions run at import: there no test is recorded. A fault in such a line is 
 the same file, or else of a file that imports it.
 """
 
+import ast
 import hashlib
 import json
 import os
@@ -133,14 +134,21 @@ def _of_room(test: str, file: str) -> bool:
     return bool(room) and test.startswith(f"tests/test_{room}")
 
 
+def _in_function(path: Path, line: int) -> bool:
+    """Whether a line of a file stands in the body of a function."""
+    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    bodies = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    return any(node.body[0].lineno <= line <= (node.end_lineno or 0) for node in bodies)
+
+
 def shown_tests(root: Path, found: Coverage, file: str, line: int, limit: float) -> list[str]:
     """Tests that run a line until they take `limit` seconds together: those of its room first, each half the quickest
     first. The quickest test of the room is shown even where it takes longer."""
     rows = found.lines.get(file, {})
-    names = set(rows.get(line, ()))
-    if not names:
-        names = {test for tests in rows.values() for test in tests}
-    near = [found.lines.get(other, {}) for other in importers(root, file)] if not rows.get(line) else []
+    # A line that runs at import belongs to no test, also where the import stands in one.
+    own = set(rows.get(line, ())) if _in_function(root / file, line) else set()
+    names = own or {test for tests in rows.values() for test in tests}
+    near = [found.lines.get(other, {}) for other in importers(root, file)] if not own else []
     names |= {test for lines in near for tests in lines.values() for test in tests}
     files = {name for name in names if "::" not in name}
     names |= {test for test in found.seconds if test.partition("::")[0] in files}
