@@ -7,17 +7,23 @@ form a group, which costs one more transform an order, for the samples in which 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lowalt.effects import interpolation, time_series, waveform
-from lowalt.effects.steering import SameSymbols, Steered
+from lowalt.effects import gain_times, interpolation, time_series, waveform
+from lowalt.effects.gain_times import Instant
+from lowalt.effects.near_field import SYMBOLS
+from lowalt.effects.response import ImagePath
+from lowalt.effects.steering import SameSymbols, Steered, at_rows, rows_of
 from lowalt.effects.view import View
 
 if TYPE_CHECKING:
     from lowalt.effects.target_echo import TargetEcho
+
+TOGETHER = 40_000
+"""Points times symbols that go through all instants together, so that their factors stay in the processor's caches."""
 
 
 def arriving(
@@ -27,14 +33,24 @@ def arriving(
 
     view, factor, on: as in `samples`. The response has no leakage between subcarriers; the samples have all of it.
     """
+    held = echo.paths if view is echo.view else echo.paths_of(view)
     if "symbol_motion" not in on:
-        return _in_orders(echo, view, on, factor, rows)
+        return _in_orders(echo, view, held, on, factor, rows)
     moving = echo.by_need["symbol_motion"].module
     # Half of the error is for the instants, the other half for the orders that are left out.
     allowed = 0.5 * max(echo.error, moving.rounding(view))
-    count = moving.count(view, allowed)
+    strengths = echo.strengths
+    count = moving.count(view, allowed, strengths.max(axis=0) / max(float(strengths.sum(axis=1).max()), 1e-300))
     if count < view.network.subcarriers and np.isfinite(moving.farther_m(view)):
-        still, samples = _in_orders(echo, view, on, factor, rows, count, allowed)
+        within = _within(echo, view, on, count)
+        numbers, found = np.arange(len(echo.view.times_s))[rows], []
+        together = SYMBOLS * max(1, TOGETHER // (SYMBOLS * view.places.shape[1]))
+        for first in range(0, len(numbers), together):
+            some = np.arange(first, min(first + together, len(numbers)))
+            paths = [at_rows(path, some) for path in held]
+            given = _part_of(view, some), paths, on, rows_of(factor, some), numbers[some]
+            found.append(_in_orders(echo, *given, within, allowed))
+        still, samples = (np.concatenate(every) for every in zip(*found, strict=True))
     else:
         still = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
         samples = _at_instants(echo, view, on, factor, rows, moving.instants(view, echo.error))
@@ -48,31 +64,57 @@ def arriving(
     return still, samples
 
 
-def _in_orders(
-    echo: TargetEcho,
-    view: View,
-    on: frozenset[str],
-    factor: np.ndarray | float,
-    rows,
-    count: int = 1,
-    allowed: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The result of `arriving` from series in time of `count` orders, or of fewer that err by at most `allowed`.
+class Within(NamedTuple):
+    """Instants of a symbol: order: their numbers, as they are computed, and how each gets its array sums.
 
-    allowed: relative to the largest sum of amplitudes.
+    delays_s: (Q,) or (Q, N) s after a symbol's beginning; farther_m: bound of how much ranges differ between instants
+    (m), by which all get moments of the same functions; None for instants that are on their own.
+    """
+
+    order: list[tuple[int, Instant | None]]
+    delays_s: np.ndarray
+    farther_m: float | None
+
+
+def _within(echo: TargetEcho, view: View, on: frozenset[str], count: int) -> Within:
+    """A symbol's `count` Chebyshev points."""
+    moving = echo.by_need["symbol_motion"].module
+    order = [(number, None) for number in range(count)]
+    if "wavefront" in on:
+        order = gain_times.order(view, moving.complex_motion(view), count, echo.error / 10)
+    return Within(order, moving.nodes_s(view, count), moving.farther_m(view))
+
+
+def _part_of(view: View, rows: np.ndarray) -> View:
+    """The view at some of its symbols, with what is known of the motion."""
+    part, known = view.at(view.times_s[rows]), view.__dict__
+    if "motion" in known:
+        turned, moved = known["motion"].rotation[rows], known["motion"].translation[rows]
+        part.__dict__["motion"] = known["motion"]._replace(rotation=turned, translation=moved)
+    if "places" in known:
+        part.__dict__["places"] = known["places"][rows]
+    return part
+
+
+def _in_orders(
+    echo: TargetEcho, view: View, held: Sequence[ImagePath], on: frozenset[str], factor: np.ndarray | float, rows,
+    within: Within | None = None, allowed: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """The result of `arriving` from series in time over the instants `within`, or of fewer orders that err little.
+
+    held: all paths but the direct one; within: None for the symbols' beginnings; allowed: largest error of orders left
+    out, relative to the largest sum of amplitudes.
     """
     groups, turned = _groups(echo, view, on, factor)
-    times, farther = view.times_s[None], 0.0
-    if "symbol_motion" in on:
-        moving = echo.by_need["symbol_motion"].module
-        times, farther = view.times_s + moving.nodes_s(view, count)[:, None], moving.farther_m(view)
-    found: list[list[time_series.Moments]] = [[] for _ in groups]
+    within = within or Within([(0, None)], np.zeros(1), 0.0)
+    count = len(within.order)
+    found: list[list[time_series.Moments]] = [[[]] * count for _ in groups]
     first, paired = None, []
-    for rays in _rays(echo, view, on, times, farther):
+    for (number, _), rays in zip(within.order, _rays(echo, view, held, on, within), strict=True):
         if first is None:
             first, paired = rays, [rays.paired(strength) for _, strength, _ in groups]
         for mine, own in zip(found, paired, strict=True):
-            mine.append(rays.moments(own))
+            mine[number] = rays.moments(own)
     series = [time_series.orders(mine) for mine in found]
     samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
     now = echo.sending.aired[rows] if turned is not None or count > 1 else None
@@ -114,25 +156,24 @@ def _groups(
 
 
 def _rays(
-    echo: TargetEcho, view: View, on: frozenset[str], times: np.ndarray, farther_m: float | None = None
+    echo: TargetEcho, view: View, held: Sequence[ImagePath], on: frozenset[str], within: Within
 ) -> Iterator[Steered]:
-    """Yield the one-way factors at each row of times (Q, N) s, which differ by less than a symbol.
+    """Yield the one-way factors at each instant of `within`, in its order.
 
-    farther_m: bound of how much ranges differ between the rows (m), by which all rows get moments of the same
-    functions; None for rows that are on their own. Visibility and reflection coefficients stay during a symbol;
-    only places move.
+    held: all paths but the direct one. Visibility and reflection coefficients stay during a symbol; only places move.
     """
-    held = echo.paths if view is echo.view else echo.paths_of(view)
     kept: dict = {}
     asked = {"squint": "squint" in on, "wavefront": "wavefront" in on, "error": echo.error, "kept": kept}
     first, span = None, None
-    if farther_m is not None:
-        span = SameSymbols(view.beam_rows() if view.turning else [], farther_m)
-    for later in view.at_each(times) if "symbol_motion" in on else [view]:
+    if within.farther_m is not None:
+        span = SameSymbols(view.beam_rows() if view.turning else [], within.farther_m)
+    delays = within.delays_s[[number for number, _ in within.order]]
+    each = view.at_each(view.times_s + delays.reshape(len(delays), -1)) if "symbol_motion" in on else [view]
+    for later, (_, instant) in zip(each, within.order, strict=True):
         paths = held
         if held and later is not view:
             paths = echo.moved(later, held)
-        rays = Steered(later, paths, **asked, like=first, span=span)
+        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant)
         if span is not None:
             first = first or rays
         yield rays
@@ -155,8 +196,9 @@ def _at_instants(
     groups, turned = _groups(echo, view, on, factor)
     samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
     now, before = echo.sending.aired[rows], echo.sending.aired_before[rows] if turned is not None else None
-    delays = delays if delays.ndim == 2 else delays[:, None]
-    for rays, weight in zip(_rays(echo, view, on, view.times_s + delays), weights, strict=True):
+    held = echo.paths if view is echo.view else echo.paths_of(view)
+    within = Within([(number, None) for number in range(len(delays))], delays, None)
+    for rays, weight in zip(_rays(echo, view, held, on, within), weights, strict=True):
         for count, strength, lit in groups:
             spectrum = rays.echo(strength)[lit]
             heard = waveform.transmit(spectrum, now[lit])

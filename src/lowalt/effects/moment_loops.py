@@ -14,6 +14,30 @@ BLOCK = 4
 
 
 @LOOPS
+def lit_points(strength, lit):
+    """Fill lit with the numbers of the points that have any strength (L,); return how many they are."""
+    count = 0
+    for i in range(len(strength)):
+        lit[count] = i
+        count += strength[i] != 0.0
+    return count
+
+
+@LOOPS
+def products(out, back, strength, times, lit, count, real, imag):
+    """Fill real, imag with times strength out back, each (L,), of the `count` points `lit`."""
+    if count == len(out):
+        for i in range(count):
+            z = times * strength[i] * (out[i] * back[i])
+            real[i], imag[i] = z.real, z.imag
+        return
+    for i in range(count):
+        at = lit[i]
+        z = times * strength[at] * (out[at] * back[at])
+        real[i], imag[i] = z.real, z.imag
+
+
+@LOOPS
 def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, reach, result):
     """Fill result (N, 2, Q, P) with real and imaginary parts of (-j)^p times the sum over points of z T_p(u).
 
@@ -21,24 +45,25 @@ def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, 
     u counts from `middle` (N,), in cells as `reach`, and runs from -1 to 1 over `reach`. P is a multiple of BLOCK.
     Symbols without any strength are zero.
     """
-    nodes, symbols, count = out.shape
+    nodes, symbols, whole = out.shape
     orders = result.shape[3]
-    powers, real, imag = np.empty((orders, count)), np.empty(count), np.empty(count)
+    powers, real, imag = np.empty((orders, whole)), np.empty(whole), np.empty(whole)
+    lit = np.empty(whole, np.int64)
     for n in range(symbols):
-        row = n % strength.shape[0]
+        own = strength[n % strength.shape[0]]
         result[n] = 0.0
-        if not strength[row].any():
-            continue
+        # Points without strength are left out: of a group of points, all others.
+        count = lit_points(own, lit)
+        there, home = excess_a[n], excess_b[n]
         for i in range(count):
             powers[0, i] = 1.0
-            powers[1, i] = (half_cells * (excess_a[n, i] + excess_b[n, i]) - middle[n]) / reach
+            at = i if count == whole else lit[i]
+            powers[1, i] = (half_cells * (there[at] + home[at]) - middle[n]) / reach
         for p in range(2, orders):
             for i in range(count):
                 powers[p, i] = 2.0 * powers[1, i] * powers[p - 1, i] - powers[p - 2, i]
-        for q in range(nodes):
-            for i in range(count):
-                z = times * strength[row, i] * (out[q, n, i] * back[q, n, i])
-                real[i], imag[i] = z.real, z.imag
+        for q in range(nodes if count else 0):
+            products(out[q, n], back[q, n], own, times, lit, count, real, imag)
             # Four orders a pass over the points.
             for p in range(0, orders, BLOCK):
                 a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -113,6 +138,8 @@ def spread(planes, table, own, whole, cells, result):
     half = (total + 1) // 2
     work, turn, sums = np.empty((4, half)), np.empty((2, half)), np.empty((2, total))
     for n in range(symbols):
+        if not planes[n].any():
+            continue
         halves(planes[n], table, work)
         even_re, even_im, odd_re, odd_im = work[0], work[1], work[2], work[3]
         step = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)

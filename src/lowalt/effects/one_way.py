@@ -12,6 +12,7 @@ from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
 from lowalt.effects import near_field, response_loops
 from lowalt.effects import response_tables as tables
+from lowalt.effects.gain_times import ONE, Instant, Kept
 
 
 class ImagePath(NamedTuple):
@@ -38,11 +39,15 @@ class OneWay(NamedTuple):
 
 
 def end(
-    network: Network, station: Station, paths: Sequence[ImagePath], aim_m: np.ndarray, origin: np.ndarray
-) -> tuple[list, np.ndarray]:
-    """Return the paths as one station's arrays see them, and the ranges from it of the points (N, 3) `origin`."""
+    network: Network, station: Station, paths: Sequence[ImagePath], aim_m: np.ndarray, origin: np.ndarray,
+    refs: np.ndarray | None = None,
+) -> tuple[list, np.ndarray]:  # fmt: skip
+    """Return the paths as one station's arrays see them, and the ranges from it of the points (N, 3) `origin`.
+
+    refs: these ranges (N, 7) where they are known.
+    """
     radio = radar(network, station)
-    refs = reference(origin, radio)
+    refs = reference(origin, radio) if refs is None else refs
     aims = aim_cosines(np.asarray(aim_m, np.float64), radio.station, radio.sine, radio.cosine)
     return [PathFactors(network, station.name, radio, refs, origin, aims, path) for path in paths], refs
 
@@ -77,20 +82,20 @@ class PathFactors:
 
     def one_way(
         self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, wavefront: bool, error: float,
-        kept: dict | None,
+        kept: Kept | None, instant: Instant | None,
     ) -> OneWay:  # fmt: skip
         """Return coefficient, array sum, 1/r and half the two-way phase of all points, and their excess range.
 
-        kappas: the arrays' frequencies (Q,) over the carrier; kept: as in `near_field.sums`.
+        kappas: the arrays' frequencies (Q,) over the carrier; kept: what instants of the same symbols share, where this
+        is the `instant`.
         Raises: InputError for a point in the station.
         """
         radio, axes = self.radio, (self.radio.sine, self.radio.cosine)
         spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
         count = self.places.shape[:2]
         out, excess = np.empty((len(kappas), *count), np.complex128), np.empty(count)
-        gains = np.empty((0, 0, 0), np.complex128)
+        gains, shares = np.empty((0, 0, 0, 0), np.complex128), ONE
         if wavefront:
-            gains = np.empty_like(out)
             centre = 0.5 * (kappas.min() + kappas.max())
             series = tables.series(
                 np.pi * (kappas - centre) / spacing, spacing * tables.half_diagonal(shape), error / 40
@@ -99,11 +104,15 @@ class PathFactors:
                 radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
                 response_loops.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
             )  # fmt: skip
-            near_field.sums(self.places, array, error, gains, kept)
+            if kept is None:
+                gains = np.empty((1, *out.shape), np.complex128)
+                near_field.sums(self.places, array, error, gains[0])
+            else:
+                gains, shares = kept.sums(self.places, array, error, len(kappas), instant)
         fault = response_loops.one_way(
             np.ascontiguousarray(self.places.swapaxes(1, 2)), radio.station, axes, self.refs, self.origin,
-            0.5 * radio.turns, spacing, self.aims, radio.kappa, kappas, squint, shape, self.coefficient, gains, out,
-            excess,
+            0.5 * radio.turns, spacing, self.aims, radio.kappa, kappas, squint, shape, self.coefficient, gains, shares,
+            out, excess,
         )  # fmt: skip
         if fault:
             raise InputError(

@@ -14,6 +14,7 @@ from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.radar import radar
 from lowalt.effects import moment_loops
 from lowalt.effects import response_tables as tables
+from lowalt.effects.gain_times import Instant, Kept
 from lowalt.effects.one_way import ImagePath as ImagePath
 from lowalt.effects.one_way import end, range_sum
 
@@ -55,19 +56,21 @@ class OneWayFactors:
     The arguments are those of `response`; kept: polynomials of spherical waves that serve several instants of the same
     symbols, filled by the first of them; like: the factors at another instant of the same symbols, whose references
     this instant shares, so that both have moments of the same functions; farther_m: bound of how much any range differs
-    between instants that share them (m).
+    between instants that share them (m); instant: how this one gets its array sums, None for by itself.
     """
 
     def __init__(
         self, network: Network, station: Station, places: np.ndarray, aim_m: np.ndarray,
         paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float, kept: dict | None = None,
         sender_aim_m: np.ndarray | None = None, like: "OneWayFactors | None" = None, farther_m: float = 0.0,
+        instant: Instant | None = None,
     ):  # fmt: skip
         self.radio = radio = radar(network, station)
         self.farther_m = farther_m
         self.origin = places[:, 0] if like is None else like.origin
         seen = [ImagePath(places), *paths]
-        chosen, self.refs = end(network, station, seen, aim_m, self.origin)
+        alone = station.transmitter is None
+        chosen, self.refs = end(network, station, seen, aim_m, self.origin, like.refs if like and alone else None)
         sending = chosen
         if station.transmitter is not None:
             out = [path.sender or path for path in seen]
@@ -75,20 +78,22 @@ class OneWayFactors:
             sending, _ = end(network, station.transmitter, out, sender_aim_m, self.origin)
             if station.transmitter.position_m != station.position_m:
                 self.refs = range_sum(network, station, self.origin)
-        # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays and for the
-        # tables. The tenth is rounded down to a power of ten, so that a cached table serves many samples.
+        # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays, for their
+        # sums that follow from other instants, and for the tables.
         self.nodes = kappas = tables.frequencies(network, radio, squint, error / 2)
-        self.rest = 10.0 ** np.floor(np.log10(error / 10))
+        self.rest = tenth(error)
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
         asked = kappas, squint, wavefront, self.rest
         self.out = [
-            path.one_way(network.transmit, *asked, _own(kept, "out", number)) for number, path in enumerate(sending)
+            path.one_way(network.transmit, *asked, _own(kept, "out", number), instant)
+            for number, path in enumerate(sending)
         ]
         self.back = self.out
         if not symmetric:
             self.back = [
-                path.one_way(network.receive, *asked, _own(kept, "back", number)) for number, path in enumerate(chosen)
+                path.one_way(network.receive, *asked, _own(kept, "back", number), instant)
+                for number, path in enumerate(chosen)
             ]
         self.frames = self._frames() if like is None else like.frames
 
@@ -168,9 +173,14 @@ class OneWayFactors:
         return result
 
 
-def _own(kept: dict | None, *key) -> dict | None:
+def tenth(error: float) -> float:
+    """Return a tenth of an error, rounded down to a power of ten, so that a cached table serves many samples."""
+    return 10.0 ** np.floor(np.log10(error / 10))
+
+
+def _own(kept: dict | None, *key) -> Kept | None:
     """The part of `kept` that belongs to one array over one path, None where nothing is kept."""
-    return None if kept is None else kept.setdefault(key, {})
+    return None if kept is None else kept.setdefault(key, Kept())
 
 
 def _pairs(paths: int, symmetric: bool) -> list[tuple[int, int, float]]:

@@ -112,20 +112,33 @@ def scaled(own, weight, c, s, turn, real, imag):
 
 
 @LOOPS
+def blended(gains, shares, q, n, out):
+    """Fill out (L,) with the sum of gains (K, Q, N, L) at q and n times shares (K,), two at least."""
+    one, two, a, b = gains[0, q, n], gains[1, q, n], shares[0], shares[1]
+    for i in range(np.uint64(len(out))):
+        out[i] = complex(a * one[i].real + b * two[i].real, a * one[i].imag + b * two[i].imag)
+    for k in range(2, len(shares)):
+        more, c = gains[k, q, n], shares[k]
+        for i in range(np.uint64(len(out))):
+            out[i] = complex(out[i].real + c * more[i].real, out[i].imag + c * more[i].imag)
+
+
+@LOOPS
 def one_way(
     places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, squint, shape, coefficient, gains,
-    out, excess,
+    shares, out, excess,
 ):  # fmt: skip
     """Fill out (Q, N, L), one array's complex factors over one path at Q frequencies, and excess (N, L) (m).
 
     places: (N, 3, L) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
     beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; shape: the array;
-    coefficient: (N or 1, L or 1); gains: (Q, N, L) sums of `near_field` to use instead of the plane wave's, or empty.
+    coefficient: (N or 1, L or 1); gains: (K, Q, N, L) sums of `near_field`, which count by shares (K,), to use instead
+    of the plane wave's, or empty.
     excess: range minus the reference's; with squint the range of the array's middle, else of its corner.
     Returns 0, or n L + l + 1 where r = 0.
     """
     count = places.shape[2]
-    work = np.empty((15, count))
+    work, blend = np.empty((15, count)), np.empty(count, np.complex128)
     side, up, r, weight, middle = work[0], work[1], work[2], work[3], work[4]
     turn, square, c, gain_h, gain_v = work[5], work[6], work[7], work[8], work[9]
     ct, st, more, real, imag = work[10], work[11], work[12], work[13], work[14]
@@ -151,7 +164,10 @@ def one_way(
         for q in range(len(kappas)):
             own = out[q, n]
             if spherical:
-                seen = gains[q, n]
+                seen = gains[0, q, n]
+                if len(shares) > 1:
+                    seen = blend
+                    blended(gains, shares, q, n, seen)
                 for i in range(np.uint64(count)):
                     own[i] = complex(real[i], imag[i]) * seen[i]
                 continue

@@ -8,6 +8,7 @@ import numpy as np
 from lowalt.common.network import Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
+from lowalt.effects.gain_times import Instant
 from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
 
@@ -33,13 +34,14 @@ class Steered:
     def __init__(
         self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
         error: float = 1e-14, kept: dict | None = None, like: "Steered | None" = None, span: SameSymbols | None = None,
+        instant: Instant | None = None,
     ):  # fmt: skip
-        """Prepare the factors; kept and like: as in `response.OneWayFactors`, for every beam.
+        """Prepare the factors; kept, like and instant: as in `response.OneWayFactors`, for every beam.
 
         span: of the symbols, where the view is one of several instants in them.
         """
         self.view = view
-        asked = {"squint": squint, "wavefront": wavefront, "error": error}
+        asked = {"squint": squint, "wavefront": wavefront, "error": error, "instant": instant}
         asked["farther_m"] = 0.0 if span is None else span.farther_m
         given, self.steady = (view.network, view.station), not view.turning
         if self.steady:
@@ -50,7 +52,7 @@ class Steered:
             return
         self.beams = []
         for place, (number, aims, rows) in enumerate(view.beam_rows() if span is None else span.rows):
-            some = [_at_rows(path, rows) for path in paths]
+            some = [at_rows(path, rows) for path in paths]
             own = None if kept is None else kept.setdefault(number, {})
             asked["like"] = None if like is None else like.beams[place][2]
             rays = OneWayFactors(
@@ -71,7 +73,7 @@ class Steered:
         They serve all instants of the same symbols.
         """
         roots = np.sqrt(self.view.cloud.rcs_m2)
-        return [rays.paired(roots * _rows_of(factor, rows)) for rows, _, rays in self.beams]
+        return [rays.paired(roots * rows_of(factor, rows)) for rows, _, rays in self.beams]
 
     def moments(self, paired: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
         """Return the moments (`response.OneWayFactors.moments`) of every beam, with the amplitudes of `paired`."""
@@ -91,15 +93,15 @@ class Steered:
         return max(rays.largest(mine) for (_, _, rays), mine in zip(self.beams, moments, strict=True))
 
 
-def _rows_of(values: np.ndarray | complex, rows: np.ndarray | slice) -> np.ndarray | complex:
+def rows_of(values: np.ndarray | complex, rows: np.ndarray | slice) -> np.ndarray | complex:
     """The rows of a table (N, L) or (R, N, L), or the value that all rows share."""
     return values[..., rows, :] if np.ndim(values) > 1 and values.shape[-2] > 1 else values
 
 
-def _at_rows(path: ImagePath, rows: np.ndarray) -> ImagePath:
+def at_rows(path: ImagePath, rows: np.ndarray) -> ImagePath:
     """A path at some symbols alone."""
-    sender = None if path.sender is None else _at_rows(path.sender, rows)
-    return ImagePath(path.places[rows], _rows_of(path.coefficient, rows), path.station_m, sender)
+    sender = None if path.sender is None else at_rows(path.sender, rows)
+    return ImagePath(path.places[rows], rows_of(path.coefficient, rows), path.station_m, sender)
 
 
 def _kept_phase(view: View, aims_m: np.ndarray) -> complex:

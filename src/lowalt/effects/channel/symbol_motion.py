@@ -142,29 +142,45 @@ def rounding(view: View) -> float:
     return 2.0**-53 * farthest * 2 * np.pi * radar(view.network, view.station).turns
 
 
-def count(view: View, error: float) -> int:
-    """Return how many Chebyshev points of a symbol keep every range cell to `error`; at most its samples.
+def complex_motion(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return ellipses of complex time (E,) by semi-axes' sum, and bounds of the motion on them; None next to a station.
 
-    The error is relative to the sum of peak amplitudes: the interpolation of a function bounded by B on an ellipse of
-    semi-axes' sum rho errs by at most 4 B rho^(1-Q) / (rho - 1).
+    The bounds (m): least range (P,) of each part's points, how far positions move (E, P), how large their imaginary
+    parts are (E, P).
     """
-    samples, half = view.network.subcarriers, 0.5 * duration_s(view)
-    speeds, radio = _speeds(view), radar(view.network, view.station)
-    near = view.nearest_m().min(axis=0)
-    farthest = farthest_m(view.network)
-    wave = 2 * np.pi * (2 * radio.centre_hz + radio.bandwidth_hz) / SPEED_OF_LIGHT
-    travel, rho = speeds.travel_m(1.0), ELLIPSES[:, None]
+    speeds, half = _speeds(view), 0.5 * duration_s(view)
+    near, rho = view.nearest_m().min(axis=0), ELLIPSES[:, None]
     wide, high = 0.5 * (rho + 1.0 / rho), 0.5 * (rho - 1.0 / rho)
     beyond = speeds.imaginary_m(high[:, 0] * half)
     # Real times reach a half-symbol times `wide` from its middle; positions also swell by the imaginary turn.
-    moved = travel * (1.0 + wide) * half + 2.0 * beyond + farthest
+    moved = speeds.travel_m(1.0) * (1.0 + wide) * half + 2.0 * beyond + farthest_m(view.network)
     holds = (near > 4.0 * moved).all(axis=1)
     if not holds[0]:
-        return samples
+        return None
     holds = np.logical_and.accumulate(holds)
-    rho, moved, beyond = rho[holds, 0], moved[holds], beyond[holds]
+    return ELLIPSES[holds], near, moved[holds], beyond[holds]
+
+
+def count(view: View, error: float, shares: np.ndarray | None = None) -> int:
+    """Return how many Chebyshev points of a symbol keep every range cell to `error`; at most its samples.
+
+    The error is relative to the sum of peak amplitudes, of which shares (P,) are the parts', None for unknown ones. On
+    an ellipse of semi-axes' sum rho subcarriers are bounded by B, so the coefficients of each order k in time are at
+    most 2 B rho^-k, and interpolation errs by up to twice those of all orders from Q on. Data of unit modulus and the
+    transforms keep the 2-norm of an order's coefficients, so a range cell errs by at most 4 B rho^(1-Q) / (rho - 1). It
+    errs by up to twice as much where some of a symbol's samples carry another symbol, or where the symbol is
+    interpolated in two pieces.
+    """
+    samples, radio = view.network.subcarriers, radar(view.network, view.station)
+    found = complex_motion(view)
+    if found is None:
+        return samples
+    rho, near, moved, beyond = found
+    farthest = farthest_m(view.network)
+    wave = 2 * np.pi * (2 * radio.centre_hz + radio.bandwidth_hz) / SPEED_OF_LIGHT
     # |Im d| is below a third of |Re d|, so |Im r| <= 1.07 |Im d|; elements add their distance over the range.
     growth = wave * 1.07 * beyond * (1.0 + 2.5 * farthest / (near - moved))
-    largest = (growth - 2.0 * np.log1p(-moved / near)).max(axis=1)
-    need = 1.0 + (np.log(4.0 * np.sqrt(samples) / (error * (rho - 1.0))) + largest) / np.log(rho)
+    largest = growth - 2.0 * np.log1p(-moved / near)
+    largest = largest.max(axis=1) if shares is None else np.log(np.exp(np.minimum(largest, 700.0)) @ shares + 1e-300)
+    need = 1.0 + (np.log(8.0 / (error * (rho - 1.0))) + largest) / np.log(rho)
     return min(samples, max(int(np.ceil(need.min())), 1))
