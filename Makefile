@@ -257,9 +257,12 @@ reference-choices:  ## keep the tables of a finished `make choices`
 reference-confirm:  ## keep the tables of a finished `make confirm`
 	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
 
-rotors: $(BASE)  ## blade passing frequencies read from the default's signals, against the truth: results/reference/default-rotors.csv
+rotors: $(BASE)  ## rates, lengths and numbers of blades read from signals, against the truth: results/reference/*-rotors.csv
 	$(SNAKEMAKE) -- data
 	$(BIN)/python -m lowalt.measure.rotor_estimates --run results/default --out results/reference/default-rotors.csv
+	$(SNAKEMAKE) --configfile config/rotors.yaml -- $(foreach file,config.yaml noisy/seen-00000.npy noisy/unseen-00000.npy,results/rotors/$(file))
+	$(BIN)/python -m lowalt.measure.rotor_estimates --run results/rotors --out results/reference/short-rotors.csv
+	$(BIN)/python -m lowalt.measure.rotor_made --out results/reference/made-rotors.csv
 
 reference-methods: $(SETUP)  ## keep the tables of a finished `make methods`
 	for table in $(REFERENCE) alarms.csv accuracy_cost.csv; do cp results/methods/$$table results/reference/methods-$$table; done
