@@ -174,6 +174,14 @@ def test_a_run_without_a_worker_is_left_after_a_minute_and_one_that_ended_at_onc
         assert clock.now == 0
 
 
+@pytest.mark.parametrize("starved", [True, False])
+def test_a_lack_of_memory_counts_only_where_the_kernel_killed_a_process(starved, monkeypatch):
+    monkeypatch.setattr(disturbances, "one_worker", lambda main, choose: object())
+    monkeypatch.setattr(disturbances, "running", lambda main: "echo")
+    group = SimpleNamespace(starve=lambda: starved)
+    assert disturb("memory", SimpleNamespace(), random.Random(0), group) == ("echo" if starved else None)
+
+
 @pytest.mark.parametrize("killed_after", [3, None])
 def test_a_memory_limit_follows_what_is_held_until_one_process_is_killed_and_is_then_lifted(
     killed_after, tmp_path, clock

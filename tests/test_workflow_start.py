@@ -9,6 +9,7 @@ import pytest
 from configured import Inputs, parts, run_of
 from lowalt.common.errors import InputError
 from lowalt.workflow import options
+from lowalt.workflow.refusals import refuse_starts
 
 ROOT = Path(__file__).parent.parent
 ONE, THREE = "A:VRP+TRP+VT", "ABC:VRP+TRP+VT"
@@ -75,3 +76,9 @@ def test_a_start_that_cannot_be_meant_is_refused_by_name(name, origin, message):
     circle = {f"seen/{ONE}": {"from": f"seen/{THREE}", "steps": 5}}
     with pytest.raises(InputError, match=message):
         run_of({"recognition": {"start": {**circle, name: {"from": origin, "steps": 5}}}})
+
+
+def test_starts_may_follow_one_another_and_never_meet_again():
+    refuse_starts({"seen/a": {"from": "seen/b"}, "seen/b": {"from": "seen/c"}}, {"seen/a", "seen/b", "seen/c"})
+    with pytest.raises(InputError, match="seen/a from seen/b from seen/a is a circle"):
+        refuse_starts({"seen/a": {"from": "seen/b"}, "seen/b": {"from": "seen/a"}}, {"seen/a", "seen/b"})
