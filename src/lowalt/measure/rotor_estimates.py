@@ -11,7 +11,7 @@ rotors.csv, one row a craft with rotors and SNR:
     pursued_right_percent                     as right_percent, the body taken away by null space pursuit
     length_told_percent                       models in which blade length over number of blades is told
     length_error_percent                      median error of those, over the truth
-    length_inside_percent                     those whose 95 % interval holds the truth
+    length_inside_percent                     those whose interval holds the truth
     parity_told_percent, parity_right         models in which an even number of blades is told from an odd one; how
                                               many of these are right
 Craft count as level, since a radar knows a target's direction, not its tilt.
