@@ -27,12 +27,13 @@ EDGE_DB = 9.0
 STRONGEST, DEEP_DB = 4, 18.0
 """Levels this far below the mean of the strongest lines count as none: beyond its edge a comb only fades."""
 SURE, SPAN = 20.0, 2.0
-"""Least gain in log likelihood by an edge, and the loss within which another edge is as likely: 95 % for a likelihood of its own."""
+"""Least gain in log likelihood by an edge, and the loss within which another edge counts as likely."""
 FAINT = 0.15
 """Lines whose mean power is less than this share of that of the lines before them do not refine a frequency."""
 BEYOND, UNSURE = 0.15, 0.5
 """A comb of x lines shows that many x^(1/3) lines more than x, and its interval is wider by that many to either side:
-J_m fades over some m^(1/3) beyond its argument. Both were read off made signals of 1 and 4 rotors, 2 to 5 blades, with earlier settings of the edge."""
+J_m fades over some m^(1/3) beyond its argument. Both were read off made signals of 1 and 4 rotors, 2 to 5
+blades, with earlier settings of the edge."""
 LEVEL, HELD = 5.0, 1 / 3
 """Least level of a comb over the noise, and least share of the rests' power up to the edge, at which blades are read.
 Wrong combs and combs cut short hold less; the share was chosen on the default's signals."""
