@@ -10,7 +10,7 @@ from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names, refuse_cues
-from lowalt.recognition.sources import name_sources, open_samples
+from lowalt.recognition.sources import name_sources, of_size
 
 
 def _views(arguments: list[str]) -> None:
@@ -37,16 +37,37 @@ def _views(arguments: list[str]) -> None:
 
 def _freeze(arguments: list[str]) -> None:
     """Write the checksums of files, or check them. Settings: none ({})."""
-    from lowalt.recognition import freeze
+    from lowalt.recognition.freeze import command
 
-    line = parser("lowalt.recognition freeze", _freeze.__doc__)
-    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
-    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    if given.files:
-        freeze.freeze(given.files, given.out)
-    print(f"{given.out}: {freeze.verify(given.out)} files as frozen", file=sys.stderr)
+    command(arguments, _freeze.__doc__)
+
+
+def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
+    """Return the samples of some (group, fold) pairs from the source the command line names, heights included."""
+    from lowalt.recognition.samples import ViewSamples
+    from lowalt.recognition.views import ShardSamples
+
+    if sum(source is not None for source in (given.views, given.signals, given.index, given.dataset)) != 1:
+        raise InputError("expected one of --views, --signals, --index and --dataset")
+    if (given.signals is None) != (scheme.sees == "images"):
+        raise InputError(f"--signals: scheme {scheme.name!r} sees {scheme.sees}")
+    if given.signals is not None:
+        from lowalt.recognition.slow_time import SlowTimeSamples
+
+        found = of_size(SlowTimeSamples(given.signals, scheme.sees, scheme.columns, pairs), scheme, size)
+    elif given.dataset is not None:
+        from lowalt.recognition.made import DatasetSamples, opened
+
+        found = DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
+    elif given.views is None:
+        found = ShardSamples(given.index, scheme.columns, pairs, size, placed)
+    else:
+        found = of_size(ViewSamples(given.views, scheme.columns, pairs), scheme, size)
+    if given.tracks is None and not scheme.cues:
+        return found
+    from lowalt.recognition.tracked import with_heights
+
+    return with_heights(found, given.tracks, scheme)
 
 
 def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
@@ -54,20 +75,19 @@ def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
     from lowalt.recognition.samples import ViewSamples, first_models, with_extra
 
     samples = {
-        part: open_samples(given, folds(protocol, part), scheme, settings["size"], placed=False)
+        part: _open(given, folds(protocol, part), scheme, settings["size"], placed=False)
         for part in ("train", "validation")
     }
     if scheme.share < 1:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    for name in ("extra", "stream"):
-        if getattr(given, name):
-            refuse_cues(scheme, f"--{name}")
     if given.extra:
+        refuse_cues(scheme, "--extra")
         more = ViewSamples(given.extra, scheme.columns, folds(protocol, "train"))
         samples["train"] = with_extra(samples["train"], more)
     if given.stream:
         from lowalt.recognition.stream import streamed
 
+        refuse_cues(scheme, "--stream")
         models = settings["training"].get("stream_models", 0)
         samples["train"] = streamed(samples["train"], given.stream, scheme.columns, protocol, models)
     return samples
@@ -123,7 +143,7 @@ def _evaluate(arguments: list[str]) -> None:
     trained = load(given.model)
     parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
     pairs = set().union(*(folds(trained.protocol, part) for part in parts))
-    found = open_samples(given, pairs, trained.scheme, trained.size, placed=True)
+    found = _open(given, pairs, trained.scheme, trained.size, placed=True)
     evaluate(trained, found, given.settings, given.out, given.trained_on)
 
 

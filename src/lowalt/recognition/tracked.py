@@ -9,6 +9,7 @@ import numpy as np
 from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
 from lowalt.recognition.samples import Facts
+from lowalt.recognition.schemes import Scheme
 
 
 class Tracked:
@@ -43,6 +44,18 @@ class Tracked:
     def sha256(self) -> str:
         """Return the SHA-256 of all that a training sees of these samples, heights included."""
         return hashlib.sha256(self.source.sha256().encode() + self.height_m.tobytes()).hexdigest()
+
+
+def with_heights(source: Any, paths: list[str] | None, scheme: Scheme) -> Tracked:
+    """Return samples with the heights of a scheme's stations; paths: those of `--tracks`, None where there are none.
+
+    Raises: InputError where files are named and the scheme has no cue, or the other way round; as `Tracked`.
+    """
+    if paths is None or not scheme.cues:
+        raise InputError(
+            f"--tracks: scheme {scheme.name!r} has {f'the cue {scheme.cues!r}' if scheme.cues else 'no cue'}"
+        )
+    return Tracked(source, paths, scheme.stations)
 
 
 def _load(path: Path, stations: tuple[int, ...]) -> list[tuple[str, np.ndarray]]:
