@@ -58,6 +58,7 @@ NEAR = {
     "noise": ("noise", "laws"),
     "tiles": ("tiles", "spectra"),
     "report": ("report", "gallery"),
+    "workflow": ("workflow", "invented_sizes"),
 }
 """How the names of files of tests of a room begin, where not by the room's name alone."""
 

@@ -17,6 +17,7 @@ WorkflowError = pytest.importorskip("snakemake.exceptions").WorkflowError
 
 def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_is_not():
     assert run_of().launch == Launch(1, 1, False) and run_of().launch.words == ""
+    assert Launch.of({}) == Launch(1, 1, False)
     launch = run_of({"recognition": {"processes": 4}}).launch
     assert launch.words == "lowalt.recognition.gpus 4 torch.distributed.run --standalone --nproc-per-node 4 -m"
     assert launch.training == {"gpu": 0} and launch.per_node == 4

@@ -141,6 +141,19 @@ def test_the_check_refuses_warns_or_is_off(tmp_path, monkeypatch):
         space_check.check(*arguments)
 
 
+def test_a_run_that_ends_on_a_full_disk_says_how_much_is_free(tmp_path, monkeypatch, caplog):
+    from snakemake.logging import logger
+
+    monkeypatch.setattr(logger, "propagate", True)
+    monkeypatch.setattr(space_check, "free_bytes", lambda folder: 500_000)
+    space_check.after(tmp_path)
+    assert f"the disk of {(tmp_path / 'results').resolve()} is full (0.5 MB free)" in caplog.text
+    caplog.clear()
+    monkeypatch.setattr(space_check, "free_bytes", lambda folder: space_check.FULL_BYTES)
+    space_check.after(tmp_path)
+    assert not caplog.text
+
+
 @pytest.fixture
 def small_disk(tmp_path):
     """A disk of 2 MB of its own, where this user may mount one."""
