@@ -36,6 +36,11 @@ def test_the_default_run_names_what_it_trains_in_the_configuration_s_order():
     assert run.data == run.name == "default"
 
 
+def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
+    _, products, _ = parts()
+    assert products.first_motion(CHUNK) == [f"results/default/motion/{group}-00000.csv" for group in ("seen", "unseen")]
+
+
 def test_the_network_asked_about_effects_sees_the_most_images_and_knows_all_subtypes():
     assert run_of().asked.name == "ABC:VRP+TRP+VT"
     with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
