@@ -115,6 +115,7 @@ def test_the_rate_rises_linearly_and_falls_as_a_cosine():
     assert recipe.schedule(0.1, 0.1) == pytest.approx(1.0)
     assert recipe.schedule(0.55, 0.1) == pytest.approx(0.5)
     assert recipe.schedule(1.0, 0.1) == pytest.approx(0.0, abs=1e-12)
+    assert recipe.schedule(1.0, 1.0) == 1.0
 
 
 def test_every_parameter_has_one_group_and_only_matrices_decay(trained):
