@@ -10,7 +10,7 @@ from forks import ended
 from lowalt.common.command import pick, refusal, run, settings
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256
-from needed_options import ask_for_nothing
+from needed_options import assert_needed_options_are_named
 
 NEEDED = """
 common.config: --settings, --out
@@ -62,7 +62,7 @@ workflow.space_measured: --runs, --out
 
 
 def test_a_command_without_its_options_names_all_that_it_needs(capsys):
-    ask_for_nothing(NEEDED, capsys)
+    assert_needed_options_are_named(NEEDED, capsys)
 
 
 def test_settings_come_as_json_or_as_a_file(tmp_path):

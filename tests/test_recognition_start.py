@@ -15,7 +15,7 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.methods import built
 from lowalt.recognition.schemes import Scheme
 from lowalt.recognition.start import carry, opened
-from needed_options import ask_for_nothing
+from needed_options import assert_needed_options_are_named
 from trainings import SCHEME, SETTINGS, Killed, equal, kill_at, with_training, write_views
 
 ONE = Scheme("A:VRP+VT", (0,), (0, 2))
@@ -178,4 +178,4 @@ recognition.zoo: --model, --name
 
 
 def test_a_command_without_its_options_names_all_that_it_needs(capsys):
-    ask_for_nothing(NEEDED, capsys)
+    assert_needed_options_are_named(NEEDED, capsys)

@@ -5,7 +5,7 @@ import importlib
 import pytest
 
 
-def ask_for_nothing(needed: str, capsys: pytest.CaptureFixture) -> None:
+def assert_needed_options_are_named(needed: str, capsys: pytest.CaptureFixture) -> None:
     """Check lines `MODULE [COMMAND]: OPTIONS`, modules below the package.
 
     The help has a sentence before the options' meaning. Without options each command names just these.

@@ -103,7 +103,7 @@ def estimates(folder: Path, models: int) -> dict[tuple, list[Read]]:
 
 
 def summary(reads: list[Read], count: int, near_hz: float) -> list[str]:
-    """Return the columns after `chance_percent` and `right_percent` before it; count: true number of blades."""
+    """Return the values of `right_percent` and of the columns after `chance_percent`; count: true number of blades."""
     errors = np.array([read.error_hz for read in reads])
     pursued = np.array([read.pursued_error_hz for read in reads])
     lengths = [read for read in reads if read.told.length_over_count_m is not None]

@@ -74,8 +74,9 @@ def describe(kept: dict, now: float) -> str:
     """Return the lines of one run."""
     board, living = Board.read(kept["board"]), alive(kept)
     state = kept["state"] if living or kept["state"] != "running" else "stopped without a word, killed perhaps"
-    place = elsewhere(kept)
-    head = f"process {kept['pid']}{' of ' if place else ''}{place}: {state}, {span(now - kept['written'])} ago"
+    host = elsewhere(kept)
+    process = f"process {kept['pid']} of {host}" if host else f"process {kept['pid']}"
+    head = f"{process}: {state}, {span(now - kept['written'])} ago"
     moment = now if living else kept["written"]
     lines = [board.line(name, moment, progress.last) for name in board.stages]
     return "\n".join([head, *lines, board.total(moment)])
