@@ -119,7 +119,7 @@ def over_confidence(bands: list[dict[str, str]]) -> Plot:
         "field": "confidence_percent",
         "type": "quantitative",
         "title": "confidence (%)",
-        "scale": {"domain": [25, 101]},
+        "scale": {"domain": [25, 100], "nice": False},
     }
     lines = _lines(across)
     diagonal = {"data": {"values": [{"at": 25}, {"at": 100}]}, "mark": {"type": "line", "color": "gray"}, "encoding": {
