@@ -19,7 +19,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -191,6 +191,12 @@ invented: $(SETUP)  ## the default's schemes trained also on craft and birds of 
 	$(SNAKEMAKE) -- data
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
 	$(SNAKEMAKE) --configfile config/with-invented.yaml $(OVERLAY)
+
+# On the data of `make confirm` instead: make track-invented OVERLAY=config/track-invented-confirm.yaml
+track-invented: $(SETUP)  ## networks with measured heights, trained also on invented sizes and their heights: results/track-invented
+	$(SNAKEMAKE) $(if $(findstring confirm,$(OVERLAY)),--configfile config/confirm.yaml) -- prepared training_samples tracks
+	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples tracks
+	$(SNAKEMAKE) --configfile config/track-invented.yaml $(OVERLAY)
 
 # The classical methods' packages, which nothing else needs.
 METHODS := .venv/set-up-methods

@@ -18,8 +18,9 @@ from lowalt.motion import poses, read_table, write_table
 from lowalt.motion.poses import positions
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.recognition.__main__ import main
+from lowalt.recognition.extra import with_extra
 from lowalt.recognition.freeze import freeze
-from lowalt.recognition.samples import Facts, ViewSamples, with_extra, write
+from lowalt.recognition.samples import Facts, ViewSamples, write
 from lowalt.shards.record import record, row_of
 from lowalt.targets.cloud import cloud_of, extent, scaled
 from lowalt.targets.make import make

@@ -68,7 +68,7 @@ def blank(tmp_path_factory):
     samples.write(folder / "views.npz", pixels, samples.Facts(*columns, nan, nan))
     heights = 40.0 * columns[-1][:, None] + 3 * rng.standard_normal((48, 3))
     order = rng.permutation(48)
-    np.savez(folder / "tracks.npz", key=columns[0][order], height_m=heights[order])
+    np.savez(folder / "tracks.npz", key=columns[0][order], height_m=heights[order], range_m=heights[order])
     (folder / "schemes.csv").write_text(
         ",".join((*schemes.COLUMNS, "cues")) + "\nAB:VRP height,AB,VRP,attention,,seen,height\n"
         "AB:VRP,AB,VRP,attention,,seen,\n"
@@ -147,8 +147,9 @@ def test_identity_holds_the_heights_and_a_missing_one_is_refused(blank, tmp_path
     assert before.height_m.tolist() == [wanted[key] for key in before.facts.key.tolist()]
     before.keep(np.array([4, 1]))
     assert before.height_m.tolist() == [wanted[key] for key in before.facts.key.tolist()] and len(before.facts) == 2
-    for change, words in (({"key": kept["key"][::-1]}, None), ({"height_m": kept["height_m"][:, :1]}, "of 1 stations"),
-                          ({"key": kept["key"][:9], "height_m": kept["height_m"][:9]}, "no height of sample"),
+    narrow = {name: kept[name][:, :1] for name in ("height_m", "range_m")}
+    for change, words in (({"key": kept["key"][::-1]}, None), (narrow, "of 1 stations"),
+                          ({key: values[:9] for key, values in kept.items()}, "no height of sample"),
                           ({"height_m": np.full((48, 3), np.nan)}, "expected finite ones")):  # fmt: skip
         np.savez(tmp_path / "tracks.npz", **{**kept, **change})
         fresh = samples.ViewSamples([blank / "views.npz"], CUED.columns, {("seen", "train")})
@@ -163,7 +164,7 @@ def test_identity_holds_the_heights_and_a_missing_one_is_refused(blank, tmp_path
 @pytest.mark.parametrize(
     ("more", "words"),
     [([], "--tracks: scheme 'AB:VRP height' has the cue"),
-     (["--tracks", "{}/tracks.npz", "--extra", "a.npz"], "--extra: scheme 'AB:VRP height' has the cue"),
+     (["--tracks", "{}/tracks.npz", "--extra", "a.npz"], "--extra-tracks: scheme 'AB:VRP height' has the cue"),
      (["--tracks", "{}/tracks.npz", "--stream", "a.yaml"], "--stream: scheme 'AB:VRP height' has the cue"),
      (["--tracks", "{}/tracks.npz", "--start", "{}/plain/model.pt"], "seen/AB:VRP has another cues")],
 )  # fmt: skip

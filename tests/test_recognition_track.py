@@ -11,6 +11,7 @@ from dataset import RENDER, build
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.recognition import track
+from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main as write_index
 from pictures import NETWORK
@@ -90,6 +91,7 @@ def test_a_cache_holds_the_heights_of_a_shard_s_samples_by_key(data, tmp_path):
     with np.load(tmp_path / "tracks.npz") as found:
         assert found["key"].tolist() == [key.decode() for key in shards.keys]
         np.testing.assert_array_equal(found["height_m"], wanted)
+        np.testing.assert_array_equal(found["range_m"], facts_of(shards, np.arange(len(shards))).range_m)
     exact = np.array([shards.record(number)["motion"]["z_m"] for number in range(len(shards))])
     quiet = np.array([not shards.record(number)["noise"] for number in range(len(shards))])
     assert abs(wanted[quiet] - exact[quiet, None]).max() < CELL_M / 2

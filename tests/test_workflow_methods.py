@@ -2,6 +2,7 @@
 
 import os
 import re
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -90,30 +91,115 @@ def test_tracks_are_read_by_schemes_with_the_cue_alone_from_the_data_set_s_own_r
         _ = run.asked
 
 
+def finished_invented():
+    """A finished run of invented sizes in the working folder, as far as another run looks at it, with two shards."""
+    folder = Path("results/invented")
+    (folder / "shards").mkdir(parents=True)
+    made = merge(load_yaml(ROOT / "config/default.yaml"), load_yaml(ROOT / "config/invented.yaml"))
+    (folder / "config.yaml").write_text(yaml.safe_dump(made))
+    for shard in ("seen-train-00000", "seen-train-00001", "seen-val-00000"):
+        (folder / f"shards/{shard}.tar").touch()
+    return folder
+
+
+@pytest.mark.parametrize(("overlay", "data"), [([], "default"), (["config/track-invented-confirm.yaml"], "confirm")])
+def test_heights_of_another_run_come_from_its_own_tracks_shard_by_shard(overlay, data):
+    folder = finished_invented()
+    config = merge(load_yaml("config/default.yaml"), load_yaml("config/track-invented.yaml"))
+    if overlay:
+        config = merge(config, load_yaml(overlay[0]))
+        made = merge(load_yaml("config/default.yaml"), load_yaml("config/confirm.yaml"))
+        Path("results/confirm").mkdir()
+        Path("results/confirm/config.yaml").write_text(yaml.safe_dump(made))
+    run, products, _ = parts(config)
+    assert run.data == data and len(run.trainings) == 2 * 2 * 3
+    job = SimpleNamespace(run=run.name, scheme="abc-vrp-trp-vt-with-height", protocol="unseen", train_seed="0")
+    for kind, target in (("views/24", "training_samples"), ("tracks", "tracks")):
+        words = f"no results/invented/{kind}/seen-train-00000.npz; expected what the target `{target}` makes in the run"
+        with pytest.raises(InputError, match=words):
+            products.training_samples(job)
+        (folder / kind).mkdir(parents=True)
+        for shard in ("seen-train-00000", "seen-train-00001", "seen-val-00000"):
+            (folder / f"{kind}/{shard}.npz").touch()
+    found = products.training_samples(job)
+    assert list(found) == ["views", "tracks", "extra", "extra_tracks"]
+    assert found["tracks"][0] == f"results/{data}/tracks/seen-train-00000.npz"
+    for key, kind in (("extra", "views/24"), ("extra_tracks", "tracks")):
+        assert found[key] == [f"results/invented/{kind}/seen-train-0000{part}.npz" for part in (0, 1)]
+    assert list(products.samples(job)) == ["views", "tracks"]
+    assert products.frozen(job)[1] == "results/invented/SHA256SUMS"
+    assert options.extra(None, Inputs(extra="a b", extra_tracks="c d")) == "--extra a b --extra-tracks c d"
+
+
+def test_signals_of_another_run_come_from_its_own_slow_times():
+    folder = finished_invented()
+    block = METHODS | {"extra": ["invented"]}
+    _, products, _ = parts({"run": "mine", "data": "default", "recognition": block})
+    job = SimpleNamespace(run="mine", scheme="signal-cnn", protocol="unseen", train_seed="0")
+    with pytest.raises(InputError, match=r"no results/invented/slow_time/.* what the target `slow_times` makes"):
+        products.training_samples(job)
+    (folder / "slow_time").mkdir()
+    for part in (0, 1):
+        (folder / f"slow_time/seen-train-0000{part}.npz").touch()
+    found = products.training_samples(job)
+    assert list(found) == ["signals", "extra"]
+    assert found["extra"] == [f"results/invented/slow_time/seen-train-0000{part}.npz" for part in (0, 1)]
+
+
+def dry_run(folder, block, target):
+    """What is printed for a target of a run `mine` of two subtypes with this block `recognition`, with its commands."""
+    pytest.importorskip("snakemake")
+    for name in ("workflow", "profiles", "src", "envs", "Snakefile"):
+        (folder / name).symlink_to(ROOT / name)
+    overlay = {"run": "mine", "targets": {"select": ["DJI Mini 2", "Crow"]}, "recognition": block}
+    (folder / "mine.yaml").write_text(yaml.safe_dump(overlay))
+    line = ["--dry-run", "--printshellcmds", "--cores", "1", "--configfile", "mine.yaml", "--", target]
+    environment = {name: value for name, value in os.environ.items() if name != "LOWALT_INPUTS"}
+    status, text = run(folder, line, environment | {"PYTHONPATH": str(ROOT / "src")})
+    assert status == 0, text[-3000:]
+    return text
+
+
 @pytest.mark.workflow
 @pytest.mark.slow
 def test_a_dry_run_makes_tracks_for_schemes_with_the_cue_alone(tmp_path):
-    pytest.importorskip("snakemake")
-    for name in ("workflow", "profiles", "src", "envs", "Snakefile"):
-        (tmp_path / name).symlink_to(ROOT / name)
     rows = "plain,A,VRP,attention,,seen,\nwith height,A,VRP,attention,,seen,height\n"
     (tmp_path / "schemes.csv").write_text("scheme,stations,spectra,fusion,backbone,protocols,cues\n" + rows)
     block = {"table": "schemes.csv", "schemes": ["plain", "with height"], "protocols": ["seen"]}
-    overlay = {"run": "mine", "targets": {"select": ["DJI Mini 2", "Crow"]}, "recognition": block}
-    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(overlay))
-    line = ["--dry-run", "--cores", "1", "--configfile", "mine.yaml", "--", "models"]
-    environment = {name: value for name, value in os.environ.items() if name != "LOWALT_INPUTS"}
-    status, text = run(tmp_path, line, environment | {"PYTHONPATH": str(ROOT / "src")})
-    assert status == 0, text[-3000:]
+    text = dry_run(tmp_path, block, "models")
     jobs = {re.search(r"scheme=([a-z-]+)", job)[1]: job for job in re.findall(r"rule train:\n(?: .+\n)+", text)}
     assert {name: "results/mine/tracks/" in job for name, job in jobs.items()} == {"plain": False, "with-height": True}
     assert "rule track:" in text
 
 
+@pytest.mark.workflow
+@pytest.mark.slow
+def test_a_dry_run_trains_with_the_heights_of_another_run_and_evaluates_without(tmp_path):
+    folder = finished_invented()
+    for kind in ("views/24", "tracks"):
+        (folder / kind).mkdir(parents=True)
+        for part in (0, 1):
+            (folder / f"{kind}/seen-train-0000{part}.npz").touch()
+    (folder / "SHA256SUMS").touch()
+    block = HEIGHT | {"extra": ["invented"], "protocols": ["unseen"], "seeds": [0, 1]}
+    text = dry_run(tmp_path, block, "results/mine/accuracy.csv")
+    caches, heights = (" ".join(f"results/invented/{kind}/seen-train-0000{part}.npz" for part in (0, 1))
+                       for kind in ("views/24", "tracks"))  # fmt: skip
+    asked = ("train", "evaluate")
+    trained, evaluated = (re.findall(rf"python -m +lowalt.recognition {name} .+", text) for name in asked)
+    assert len(trained) == len(evaluated) == 2
+    assert text.count("rule track:") == len(set(re.findall(r"results/mine/tracks/[a-z]\S+npz", text)))
+    for line in trained:
+        assert " --tracks results/mine/tracks/seen-train-00000.npz " in line
+        assert f" --extra {caches} --extra-tracks {heights} " in line
+        assert " --frozen results/mine/SHA256SUMS results/invented/SHA256SUMS " in line
+    assert all(" --tracks results/mine/tracks/" in line and "invented" not in line for line in evaluated)
+
+
 @pytest.mark.parametrize(
     ("overlay", "key"),
     [({"recognition": {"cache": False, "input": "dataset"}}, "input"), ({"effects": {"clutter": {}}}, "effects"),
-     ({"recognition": {"training": {"stream": 0.5}}}, "training.stream"), ({"recognition": {"extra": ["x"]}}, "extra"),
+     ({"recognition": {"training": {"stream": 0.5}}}, "training.stream"),
      ({"recognition": {"timed": HEIGHT["schemes"]}}, "timed"),
      ({"network": {"stations": {"AB": {"transmit": "A", "receive": "B"}}}}, "links")],
 )  # fmt: skip

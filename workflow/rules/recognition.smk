@@ -111,6 +111,7 @@ rule train:
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
+            "lowalt.recognition.extra",
             "lowalt.recognition.views",
             "lowalt.recognition.tracked",
             "lowalt.recognition.freeze",

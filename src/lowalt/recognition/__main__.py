@@ -72,7 +72,7 @@ def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
 
 def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
     """Return the sources "train" and "validation" of a scheme in a protocol that the command line of `train` names."""
-    from lowalt.recognition.samples import ViewSamples, first_models, with_extra
+    from lowalt.recognition.samples import first_models
 
     samples = {
         part: _open(given, folds(protocol, part), scheme, settings["size"], placed=False)
@@ -80,10 +80,11 @@ def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
     }
     if scheme.share < 1:
         samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    if given.extra:
-        refuse_cues(scheme, "--extra")
-        more = ViewSamples(given.extra, scheme.columns, folds(protocol, "train"))
-        samples["train"] = with_extra(samples["train"], more)
+    if given.extra or given.extra_tracks:
+        from lowalt.recognition.extra import joined
+
+        more, heights = given.extra or [], given.extra_tracks
+        samples["train"] = joined(samples["train"], more, heights, scheme, folds(protocol, "train"))
     if given.stream:
         from lowalt.recognition.stream import streamed
 
@@ -102,7 +103,8 @@ def _train(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition train", _train.__doc__)
     name_sources(line)
-    line.add_argument("--extra", nargs="+", help="caches of views of other runs that are trained on too")
+    line.add_argument("--extra", nargs="+", help="caches of views or signals of other runs that are trained on too")
+    line.add_argument("--extra-tracks", nargs="+", help="for schemes with the cue height: heights of --extra (.npz)")
     line.add_argument("--stream", help="config.yaml of a run with clouds, of which fresh motion models are trained on")
     line.add_argument("--start", help="model.pt of a finished training on these samples, whose weights it starts from")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
@@ -154,9 +156,7 @@ def _tables(arguments: list[str]) -> None:
     from lowalt.recognition.orderings import read_published
 
     line = parser("lowalt.recognition tables", _tables.__doc__)
-    line.add_argument(
-        "--predictions", nargs="+", required=True, help="prediction files (.csv), their records next to them"
-    )
+    line.add_argument("--predictions", nargs="+", required=True, help="predictions (.csv), records next to them")
     line.add_argument("--published", help="the paper's accuracies (.csv), if there are any to compare with")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
     line.add_argument("--out", required=True, help="folder for the tables")

@@ -12,7 +12,7 @@ A cache file (.npz) holds, for the samples of one shard in its order,
 import copy
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import NamedTuple
 
@@ -159,17 +159,6 @@ def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
     found.images = np.concatenate([first.images, second.images])
     found.facts = joined([first.facts, second.facts])
     return found
-
-
-def with_extra(own: ViewSamples, extra: ViewSamples) -> ViewSamples:
-    """Return a run's own samples and those of other runs as one.
-
-    The numbers of the others' motion models continue after the run's own, so no two motion models have the same number:
-    an epoch takes only a few SNRs of each number. Raises: as `joined_views`.
-    """
-    later = copy.copy(extra)
-    later.facts = replace(extra.facts, model=extra.facts.model + 1 + own.facts.model.max())
-    return joined_views(own, later)
 
 
 def _load(path: Path, columns: list[int], folds: set[tuple[str, str]]) -> tuple[np.ndarray, Facts] | None:

@@ -3,6 +3,8 @@
 A cache file (.npz) holds, for the samples of one shard in its order,
     key       (samples,) the sample's key
     height_m  (samples, stations) float64, measured height above the ground (m)
+    range_m   (samples, stations) float64, range (m) of the target at the first symbol, as caches of images hold it: two
+              runs have samples of the same key, and by their ranges a reader tells whose heights these are
 
 height = height of the station + R (Omega + e)
     R      range, the centre m c / (2 M df) of the cell m = round(r / cell) mod M nearest to the target at the first
@@ -32,7 +34,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.common.streams import stream
-from lowalt.recognition.views import located
+from lowalt.recognition.views import geometry, located
 from lowalt.shards import ShardSet
 from lowalt.shards.record import row_of
 
@@ -93,10 +95,12 @@ def cache_shard(index: str | Path, name: str, out: str | Path) -> int:
         raise InputError(f"{index}: scene with the effects {effects}, of which a measured height knows nothing; "
                          "expected none")  # fmt: skip
     network = Network.from_settings(shards.index["render"]["network"])
-    heights = np.array([heights_m(shards.record(number), network) for number in numbers])
+    records = [shards.record(number) for number in numbers]
+    heights = np.array([heights_m(record, network) for record in records])
+    ranges = np.array([geometry(record, network)[0] for record in records])
     keys = np.array([shards.keys[number].decode() for number in numbers])
-    with replacing(out, heights.nbytes) as temporary:
-        np.savez(temporary, key=keys, height_m=heights)
+    with replacing(out, 2 * heights.nbytes) as temporary:
+        np.savez(temporary, key=keys, height_m=heights, range_m=ranges)
     return len(numbers)
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
-from lowalt.recognition.samples import ViewSamples, joined_views, with_extra
+from lowalt.recognition.extra import opened, with_extra
+from lowalt.recognition.samples import ViewSamples, joined_views
 from lowalt.recognition.schemes import TABLE, Scheme, named, refuse_cues
 from lowalt.recognition.sources import of_size
 
@@ -45,8 +46,7 @@ def trial(
     of_size(source, scheme, block["size"])
     parts = {part: part_of(source, rows) for part, rows in choose.parts(source.facts, fold, choices.folds).items()}
     held = sorted(set(parts["held"].facts.subtype.tolist()))
-    if extra:
-        more = ViewSamples(extra, scheme.columns, choose.PAIRS)
+    for more in opened(extra, None, scheme, choose.PAIRS):
         more.keep(np.flatnonzero(~np.isin(more.facts.subtype, held)))
         parts["train"] = with_extra(parts["train"], more)
     evaluation = block.pop("evaluation")

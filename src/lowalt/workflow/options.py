@@ -53,8 +53,9 @@ def reduced_chunk(wildcards: Any, input: Any) -> str:
 
 
 def extra(wildcards: Any, input: Any) -> str:
-    """The shrunk images of other runs that are trained on too."""
-    return f"--extra {input.extra}" if input.get("extra") else ""
+    """The shrunk images or the signals of other runs that are trained on too, and their measured heights."""
+    tracks = f" --extra-tracks {input.extra_tracks}" if input.get("extra_tracks") else ""
+    return f"--extra {input.extra}{tracks}" if input.get("extra") else ""
 
 
 def noisy_chunk(wildcards: Any, input: Any) -> str:

@@ -13,6 +13,7 @@ from lowalt.common.shipped import shipped
 from lowalt.common.street import PACKAGE
 from lowalt.recognition import choose
 from lowalt.report.inputs import KEPT
+from lowalt.workflow import extra_runs
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near
 
@@ -55,13 +56,12 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and the images of other runs that the configuration adds."""
-        size = self._run.pixels(self._run.schemes_by_slug[wildcards.scheme])
+        """Files that one training reads: `samples`, and the same of other runs that the configuration adds."""
+        scheme = self._run.schemes_by_slug[wildcards.scheme]
         names = self._config["recognition"].get("extra", [])
-        extra = [path for name in names for path in self._extra(name, size)]
-        found = {**self.samples(wildcards), **({"extra": extra} if extra else {}), **self._own_backbone(wildcards)}
-        sees = self._run.schemes_by_slug[wildcards.scheme].sees
-        if self._config["recognition"]["training"].get("stream", 0) and sees == "images":
+        extra = extra_runs.of_scheme(names, scheme, self._run.pixels(scheme))
+        found = {**self.samples(wildcards), **extra, **self._own_backbone(wildcards)}
+        if self._config["recognition"]["training"].get("stream", 0) and scheme.sees == "images":
             made = self._made()
             found |= {"stream": made.pop("dataset"), **made}
         return {**found, **self._run.start_model(wildcards)}
@@ -71,21 +71,6 @@ class Products(DataProducts):
         scheme = self._run.schemes_by_slug[wildcards.scheme]
         name = scheme.backbone or self._config["recognition"]["network"]["backbone"]
         return {"backbone": name.rpartition(":")[0]} if ".py:" in name else {}
-
-    def _extra(self, name: str, size: int) -> list[str]:
-        """Images of another run's fold train, in the shards' order.
-
-        Raises: InputError naming the target that makes the missing ones.
-        """
-        shards = sorted(Path(f"results/{name}/shards").glob("*-train-*.tar"))
-        views = [f"results/{name}/views/{size}/{shard.stem}.npz" for shard in shards]
-        missing = [path for path in views if not Path(path).is_file()]
-        if missing or not views:
-            raise InputError(
-                f"recognition.extra: no {(missing or [f'results/{name}/shards'])[0]}; expected what the target "
-                f"`training_samples` makes in the run {name!r} (at {size} pixels)"
-            )
-        return views
 
     def data(self, wildcards: Any) -> list[str]:
         """Files of the run's data set: shards, their tables, index and data card."""
@@ -130,7 +115,7 @@ class Products(DataProducts):
     def trial_extra(self, wildcards: Any) -> list[str]:
         """Images of the other runs whose samples a trial's candidate trains on too, none for most candidates."""
         names = choose.read(choose.TABLE).extra(wildcards.candidate)
-        return [path for name in names for path in self._extra(name, self._trial_size(wildcards))]
+        return [path for name in names for path in extra_runs.files(name, f"views/{self._trial_size(wildcards)}")]
 
     def _trial_size(self, wildcards: Any) -> int:
         """Pixels a side of the images that the candidate of a trial is trained on."""

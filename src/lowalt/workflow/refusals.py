@@ -43,24 +43,21 @@ def refuse_input(config: dict) -> None:
 def refuse_signals(config: dict, scheme: Scheme) -> None:
     """Refuse a scheme on signals or features where their caches are not made, or of another number of symbols."""
     block, symbols = config["recognition"], config["network"]["symbols"]
-    if not block["cache"] or block.get("extra"):
-        raise InputError(
-            f"recognition: scheme {scheme.name!r} sees {scheme.sees}, expected cache: true and no other runs in extra"
-        )
+    if not block["cache"]:
+        raise InputError(f"recognition: scheme {scheme.name!r} sees {scheme.sees}, expected cache: true")
     if scheme.sees == "signals" and scheme.size != symbols:
         raise InputError(f"scheme {scheme.name!r}: size {scheme.size}, expected the {symbols} symbols of a signal")
 
 
 def refuse_height(config: dict, scheme: Scheme) -> None:
-    """Refuse a scheme with measured heights where no track is made or where other samples without one join in."""
+    """Refuse a scheme with measured heights where no track is made or where fresh samples without one join in."""
     if not scheme.cues:
         return
     block = config["recognition"]
     links = sorted(name for name, place in config["network"]["stations"].items() if "transmit" in place)
     given = {
         "effects": sorted(config["effects"]), "links": links, "input": block.get("input") == "dataset",
-        "extra": block.get("extra"), "timed": scheme.name in block["timed"],
-        "training.stream": block["training"].get("stream"),
+        "timed": scheme.name in block["timed"], "training.stream": block["training"].get("stream"),
     }  # fmt: skip
     for key, value in given.items():
         if value:
