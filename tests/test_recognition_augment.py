@@ -107,3 +107,40 @@ def test_wrong_augmentation_is_refused(change):
 
     with pytest.raises(InputError, match=next(iter(change))):
         check(block(**change))
+    for bound in (0, 1):
+        assert check(block(mirror=bound))["mirror"] == bound
+
+
+def slow(image, draw, strengths, zeros, dropped):
+    """The changed views of one sample, a pixel at a time, from eight draws in 0..1."""
+    views, rows, columns = image.shape
+    down = round((2 * draw[1] - 1) * strengths["shift_doppler"] * rows)
+    right = round((2 * draw[2] - 1) * strengths["shift_time"] * columns)
+    exponent = 2 ** ((2 * draw[3] - 1) * strengths["contrast"])
+    band, strip = int(draw[4] * strengths["mask_doppler"] * rows), int(draw[6] * strengths["mask_time"] * columns)
+    top, left = int(draw[5] * (rows - band + 1)), int(draw[7] * (columns - strip + 1))
+    found = np.empty_like(image)
+    for view, row, column in np.ndindex(views, rows, columns):
+        from_row, zero = (row - down) % rows, zeros[view]
+        if draw[0] < strengths["mirror"]:
+            from_row = rows - 1 - from_row
+        away = int(image[view, from_row, (column - right) % columns]) - zero
+        value = zero + np.sign(away) * (255 - zero) * (abs(away) / (255 - zero)) ** exponent
+        blank = top <= row < top + band or left <= column < left + strip or (dropped[view] and not all(dropped))
+        found[view, row, column] = zero if blank else min(max(round(value), 0), 255)
+    return found
+
+
+def test_each_of_the_eight_draws_decides_one_change():
+    """Views are VRP, TRP and VT of a station, whose zero is 0, 0 and 128, and the VT of the next one."""
+    images = stream(7, "images").integers(0, 256, (24, 4, 7, 12), dtype=np.uint8)
+    strong = {"mirror": 0.4, "shift_doppler": 0.3, "shift_time": 0.4, "contrast": 0.8, "mask_doppler": 0.6,
+              "mask_time": 0.5, "drop_view": 0.7}  # fmt: skip
+    numbers = stream(8, "draws")
+    draws, drops = numbers.random((24, 8)), numbers.random((24, 4))
+    draws[0, 0], draws[1, 0], drops[2] = 0.4, np.nextafter(0.4, 0), 0.1
+    drops[3, 1] = 0.7
+    made = iter((draws, drops))
+    found = augment(images, [0, 1, 2, 5], strong, SimpleNamespace(random=lambda shape: next(made)))
+    for image, changed, draw, drop in zip(images, found, draws, drops, strict=True):
+        assert (changed == slow(image, draw, strong, (0, 0, 128, 128), drop < 0.7)).all()

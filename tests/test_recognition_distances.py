@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.motion import positions
+from lowalt.recognition import distances
 from lowalt.recognition.distances import cycle_s, energy_distance, form, swept
 from moving_clouds import rigid_cloud, row
 
@@ -63,3 +64,38 @@ def test_swept_points_are_those_of_sixteen_instants_of_a_cycle_without_the_body_
     np.testing.assert_allclose(swept(cloud, moving), wanted, atol=1e-12)
     large = replace(cloud, points=np.repeat(cloud.points, 500, 0), part=np.repeat(cloud.part, 500))
     assert len(swept(large, moving)) == 1200 < 16 * len(large.points)
+
+
+def test_rows_name_the_nearest_of_the_category_and_of_the_trained_with_distance_and_ratio_of_size():
+    """Three rotors that differ in form a little, of sizes 1, 2 and 5; a bird alone in its category."""
+    plain = rigid_cloud("rotor", "UAV")
+    shapes = {"far": 5.0, "near": 2.0, "plain": 1.0}
+    bend = {"far": 0.4, "near": 0.05, "plain": 0.0}
+    clouds = []
+    for name, scale in shapes.items():
+        points = scale * (plain.points + np.array([[0, 0, bend[name]], [0, 0, 0], [0, 0, 0], [0, 0, 0]]))
+        clouds.append(replace(plain, points=points, hinges=scale * plain.hinges, record={
+            **plain.record, "subtype": name}))  # fmt: skip
+    clouds.append(replace(plain, record={**plain.record, "subtype": "bird", "category": "Bird"}))
+    groups = {"far": "seen", "near": "unseen", "plain": "seen", "bird": "seen"}
+    motion = [
+        row(rate_hz=40.0, phase_0_rad=0.3, playback=1.0) | {"subtype": name, "group": group}
+        for name, group in groups.items()
+    ]
+    # Of several rows of a subtype the first counts.
+    motion.append(motion[0] | {"group": "unseen", "rate_hz": 3.0})
+    forms = {cloud.subtype: form(swept(cloud, motion[0])) for cloud in clouds}
+
+    def told(one, other):
+        radii = sorted(forms[name][1] for name in (one, other))
+        return [other, f"{energy_distance(forms[one][0], forms[other][0]):.4f}", f"{radii[1] / radii[0]:.3f}"]
+
+    assert distances.rows(clouds, motion) == [
+        ["UAV", "far", "seen", *told("far", "near"), *told("far", "plain")],
+        ["UAV", "near", "unseen", *told("near", "plain"), *told("near", "plain")],
+        ["UAV", "plain", "seen", *told("plain", "near"), *told("plain", "far")],
+        ["Bird", "bird", "seen", "", "", "", "", "", ""],
+    ]
+    assert all(float(told(one, other)[2]) > 1.5 for one, other in (("far", "near"), ("near", "plain")))
+    with pytest.raises(InputError, match=r"no motion row of \['bird'\]"):
+        distances.rows(clouds, motion[:3])

@@ -1,5 +1,7 @@
 """Physical features read the truth of made signals back: body speed, bandwidth, line spacing, repetition, drift."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -89,3 +91,92 @@ def test_features_ignore_size_phase_and_a_turn_by_180_degrees_and_tell_signals_a
     other = features.features(noisy(body(4.0), 18)[None], FREQUENCY_HZ, INTERVAL_S)
     assert other[0, features.NAMES.index("body_share")] > 1.5 * found[0, features.NAMES.index("body_share")]
     assert np.isfinite(features.features(np.zeros((1, 400)), FREQUENCY_HZ, INTERVAL_S)).all()
+
+
+def slow_spectrum(signal):
+    """Power in 1024 bins by the sum itself, the window being sin^2 over the look; of sum one."""
+    steps = np.arange(len(signal))
+    waves = np.exp(-2j * np.pi * np.outer(np.arange(1024), steps) / 1024)
+    power = abs(waves @ (signal * np.sin(np.pi * (steps + 1) / (len(signal) + 1)) ** 2)) ** 2
+    return power / power.sum()
+
+
+def fold(hertz):
+    while hertz >= 200:
+        hertz -= 400
+    while hertz < -200:
+        hertz += 400
+    return hertz
+
+
+def slow_line(signal):
+    """The top of the parabola through the logarithms of the largest bin and its neighbours."""
+    power = slow_spectrum(signal)
+    top = int(power.argmax())
+    curve = np.polyfit([-1, 0, 1], np.log([power[top - 1], power[top], power[(top + 1) % 1024]]), 2)
+    return fold((top - curve[1] / (2 * curve[0])) * 400 / 1024)
+
+
+def slow_peak(likeness, first, last, share):
+    """The first of all peaks that come within 1 - share of the highest one's height, and its height."""
+    peaks = [lag for lag in range(first, last) if likeness[lag] >= max(likeness[lag - 1], likeness[lag + 1])]
+    highest = max(likeness[lag] for lag in peaks)
+    lag = next(lag for lag in peaks if likeness[lag] >= highest - (1 - share) * abs(highest))
+    return lag, likeness[lag]
+
+
+def slow_features(signal):
+    """Every feature of one signal by its definition in words, one number after the other."""
+    count, signal = len(signal), signal / np.sqrt(np.mean(abs(signal) ** 2))
+    power, line = slow_spectrum(signal), slow_line(signal)
+    away = np.array([fold(fold(400 * place / 1024) - line) for place in range(1024)])
+    widths = []
+    for share in (0.5, 0.9):
+        held, order = 0.0, sorted(range(1024), key=lambda place: abs(away[place]))
+        while held < share:
+            place = order.pop(0)
+            held += power[place]
+        widths.append(2 * abs(away[place]))
+    change = np.sqrt(power) - np.sqrt(power).mean()
+    alike = np.array([change @ np.roll(change, lag) for lag in range(514)])
+    spacing, strength = slow_peak(alike / alike[0], 11, 513, 0.5)
+    change = abs(signal) ** 2 - 1
+    alike = np.array([np.mean(change[lag:] * change[: count - lag]) for lag in range(min(200, count // 2) + 2)])
+    repeated, periodicity = slow_peak(alike / alike[0], 2, len(alike) - 1, 0.7)
+    drift = fold(slow_line(signal[count // 2 :]) - slow_line(signal[: count // 2]))
+    limits = (0.0, 3.0, 6.0, 12.0, 25.0, 50.0, 100.0)
+    bands = [power[(abs(away) >= low) & (abs(away) < high)].sum() for low, high in pairwise(limits)]
+    above, below = power[away >= 3].sum(), power[away <= -3].sum()
+    envelope = abs(signal)
+    deviation = envelope - envelope.mean()
+    variance = np.mean(deviation**2)
+    return [
+        abs(line) * 299792458 / (2 * FREQUENCY_HZ), power.max() * 1024 / count, abs(drift), *widths,
+        spacing * 400 / 1024, strength, 400 / repeated, periodicity, np.sqrt(variance) / envelope.mean(),
+        np.mean(deviation**4) / variance**2, np.exp(np.mean(np.log(power + 1e-12))) * 1024, *bands,
+        abs(above - below) / (above + below),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("symbols", [300, 460])
+def test_every_feature_is_that_of_its_definition(symbols):
+    """Looks of 300 and 460 symbols: half a look is less than the longest lag of half a second, or more."""
+    times = np.arange(symbols) * INTERVAL_S
+    looks = []
+    for seed, (speed, rate, reach) in enumerate(((-5.5, 11, 6), (1.2, 17, 3), (3.0, 47, 1.5), (6.1, 5, 9))):
+        turning = np.exp(1j * reach * np.sin(2 * np.pi * (rate * times[:, None] + np.arange(2) / 2))).sum(-1)
+        course = np.exp(-4j * np.pi * FREQUENCY_HZ / SPEED_OF_LIGHT * (speed * times + 0.3 * times**2))
+        looks.append(noisy(course * (1 + np.exp(1j) * turning), 15, seed))
+    found = features.features(1e-5 * np.array(looks), FREQUENCY_HZ, INTERVAL_S)
+    assert found.dtype == np.float32 and features.NAMES[5:9] == (
+        "line_spacing_hz", "line_strength", "repetition_hz", "periodicity")  # fmt: skip
+    np.testing.assert_allclose(found, [slow_features(look) for look in looks], rtol=2e-5, atol=1e-6)
+
+
+def test_a_look_without_envelope_has_small_finite_features():
+    """Of a line alone the envelope is constant: its variation is the square root of the floor of 1e-12."""
+    found = dict(zip(features.NAMES, features.features(body(1.0)[None], FREQUENCY_HZ, INTERVAL_S)[0], strict=True))
+    assert found["envelope_variation"] == pytest.approx(1e-6, rel=1e-3) and found["envelope_kurtosis"] < 1e-6
+    silent = dict(zip(features.NAMES, features.features(np.zeros((1, 400)), FREQUENCY_HZ, INTERVAL_S)[0], strict=True))
+    assert silent["asymmetry"] == silent["body_share"] == silent["periodicity"] == 0
+    assert silent["flatness"] == pytest.approx(1024e-12, rel=1e-3) and silent["envelope_variation"] == 1e6

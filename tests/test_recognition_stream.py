@@ -14,7 +14,7 @@ from lowalt.recognition import checkpoint, order, recipe, runs, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.made import opened
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.stream import STRIDE, Stream, streamed
+from lowalt.recognition.stream import STRIDE, Stream, Streamed, streamed
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.tiles import split
@@ -91,6 +91,25 @@ def test_batches_take_their_share_and_never_a_fresh_sample_twice():
     assert [list(batch[:6]) for batch in found] == [list(range(6))] * 3
     assert np.concatenate([batch[6:] for batch in found]).tolist() == [100, 101, 102, 103, 104, 105]
     assert order.with_fresh(part, 2, 1.0, 100).tolist() == list(range(116, 124))
+
+
+def test_fixed_and_fresh_samples_come_in_the_order_asked_for_also_where_all_are_of_one_kind():
+    """Fixed numbers 0 to 4 have images of 0 to 4, fresh ones, from 5 on, of 100 and more."""
+    facts = type("Facts", (), {"label": np.arange(5), "__len__": lambda self: 5})()
+
+    def images(values):
+        return np.broadcast_to(values.astype(np.uint8)[:, None, None, None], (len(values), 1, 2, 2))
+
+    fixed = SimpleNamespace(facts=facts, size=2, views=images)
+    fresh = SimpleNamespace(labels=lambda some: 1000 + some, views=lambda some: images(100 + some))
+    mixed = Streamed(fixed, fresh)
+    for numbers in ([7, 0, 5, 4], [3, 1], [5], [9, 8, 6]):
+        wanted = [number if number < 5 else 100 + number - 5 for number in numbers]
+        found, labels = mixed.views(np.array(numbers)), mixed.labels(np.array(numbers))
+        assert (
+            found.dtype == np.uint8 and found.shape == (len(numbers), 1, 2, 2) and found[:, 0, 1, 0].tolist() == wanted
+        )
+        assert labels.tolist() == [number if number < 5 else 1000 + number - 5 for number in numbers]
 
 
 def line(run, settings, out):
