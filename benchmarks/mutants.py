@@ -23,7 +23,7 @@ from queue import Queue
 
 import numpy as np
 from mutation.candidates import Mutant, draw, of_file
-from mutation.coverage_map import Coverage, measure, shown_tests
+from mutation.coverage_map import Coverage, joined, measure, naming, shown_tests
 from mutation.forked import LIBRARIES, TRAINING, load
 from mutation.kept import Kept
 from mutation.survivors import earlier, survivor_row
@@ -113,6 +113,39 @@ def run(
         return [outcome for outcome in pool.map(one, drawn) if outcome]
 
 
+def looks(
+    root: Path, faults: list[Mutant], asked: argparse.Namespace, until: float, kept: Kept
+) -> list[Outcome] | None:  # fmt: skip
+    """Try faults; None where time was up before the tests were mapped.
+
+    With `asked.near`, tests near the rooms that name the modules of the faults come first. Survivors get a second look,
+    by tests of other rooms that name their modules.
+    """
+    every = sorted(path.name for path in (root / "tests").glob("test_*.py"))
+
+    def mapped(names: list[str]) -> Coverage | None:
+        """The map of files of tests."""
+        return measure(root, names, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)
+
+    def that_name(names: list[str], some: list[Mutant]) -> set[str]:
+        """Files of tests that name the modules of faults."""
+        return set().union(*(naming(root, names, file) for file in {mutant.file for mutant in some}))
+
+    first = sorted(that_name(near(root, asked.rooms), faults)) if asked.near else every
+    found = mapped(first)
+    if found is None:
+        return None
+    outcomes = run(root, found, faults, asked, until, kept)
+    left = [outcome.mutant for outcome in outcomes if not outcome.killed]
+    others = sorted(that_name(every, left) - set(first)) if asked.near and left else []
+    more = mapped(others) if others else None
+    if more:
+        second = run(root, joined([found, more]), left, asked, until, kept)
+        outcomes = [*(outcome for outcome in outcomes if outcome.killed), *second]
+    kept.note(outcome.mutant for outcome in outcomes if not outcome.killed)
+    return outcomes
+
+
 def wilson(part: int, whole: int) -> tuple[float, float]:
     """Return the 95 % interval of a share. Source: Wilson, J. Am. Stat. Assoc. 22, 1927."""
     share, z = part / whole, 1.959964
@@ -176,11 +209,6 @@ def main(argv: list[str] | None = None) -> None:
     os.nice(asked.nice)
     load(LIBRARIES + TRAINING if "recognition" in (asked.rooms or ["recognition"]) else LIBRARIES)
     until = time.monotonic() + 60 * asked.minutes
-    names = near(ROOT, asked.rooms) if asked.near else sorted(path.name for path in (ROOT / "tests").glob("test_*.py"))
-    found = measure(ROOT, names, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)
-    if found is None:
-        print(f"time is up; the map of tests goes on with the next call ({asked.kept})")
-        return
     every = rooms(ROOT)
     places = {room: every[room] for room in asked.rooms or every}
     drawn = {
@@ -191,7 +219,10 @@ def main(argv: list[str] | None = None) -> None:
     kept = Kept(asked.kept / "outcomes.jsonl", ROOT)
     before = kept_rows(asked.survivors)
     again = earlier(ROOT, before, list(chain(*places.values())), in_turn)
-    outcomes = run(ROOT, found, [*again, *in_turn], asked, until, kept)
+    outcomes = looks(ROOT, [*again, *in_turn], asked, until, kept)
+    if outcomes is None:
+        print(f"time is up; the map of tests goes on with the next call ({asked.kept})")
+        return
     verdicts = {(row["file"], row["before"], row["after"]): row["verdict"] for row in before}
     known = [each for each in outcomes if each.mutant in again or kept.survived_once(each.mutant)]
     once = {each.mutant: survivor_row(ROOT, each, verdicts) for each in known}

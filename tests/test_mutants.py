@@ -11,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from mutants import room_of, room_rows, wilson, with_others
 from mutation.candidates import Mutant, draw, mutated, of_file
-from mutation.coverage_map import Coverage, shown_tests
+from mutation.coverage_map import Coverage, naming, shown_tests
 from mutation.kept import Kept
 from mutation.survivors import changed, earlier, survivor_row
 from mutation.trials import Outcome, copy_of_tree, trial
@@ -148,7 +148,8 @@ def test_outcomes_are_kept_until_the_source_or_a_survivor_s_tests_change(tree):
     (tree / "src/lowalt/reach.py").write_text(SOURCE + "# edited\n")
     tried(one, True), tried(two, False)
     assert calls == [one, two, two, one, two]
-    # A survivor that a new test kills is still known as one.
+    # A survivor of every look that a new test kills is still known as one.
+    Kept(tree / "kept.jsonl", tree).note([two])
     tests.append("tests/test_reach.py::test_more")
     tried(two, True)
     kept = Kept(tree / "kept.jsonl", tree)
@@ -167,6 +168,22 @@ def test_survivors_of_earlier_draws_are_found_again_by_their_text_where_it_still
     assert list(found.values()) == known and list(earlier(tree, known, moved, list(found)[1:])) == list(found)[:1]
     (tree / "src/lowalt/reach.py").write_text(SOURCE.replace("a + b", "b + a"))
     assert not earlier(tree, known, of_file(tree, "src/lowalt/reach.py"), [])
+
+
+def test_tests_that_name_a_module_are_found_by_their_text_and_else_those_that_name_its_importers(tree):
+    """`far` is imported by `reach` alone; `lonely` by none, so all tests are its own."""
+    for name, text in (("far", ""), ("lonely", ""), ("reach", "from lowalt.room import far\n"), ("more", "")):
+        (tree / "src/lowalt/room").mkdir(exist_ok=True)
+        (tree / f"src/lowalt/room/{name}.py").write_text(text)
+    texts = {"a": "from lowalt.room.reach import x\n", "b": "from lowalt.room import (\n    more,\n    reach,\n)\n",
+             "c": "room.reach: --out\n", "d": "from lowalt.room import preach\nreach = lowalt.room.reacher\n",
+             "e": "from lowalt.room import more\n\n# Nothing of reach.\n"}  # fmt: skip
+    names = [f"test_{name}.py" for name in texts]
+    for name, text in texts.items():
+        (tree / f"tests/test_{name}.py").write_text(text)
+    told = {name: naming(tree, names, f"src/lowalt/room/{name}.py") for name in ("reach", "more", "far", "lonely")}
+    assert told["reach"] == told["far"] == {"test_a.py", "test_b.py", "test_c.py"}
+    assert told["more"] == {"test_b.py", "test_e.py"} and told["lonely"] == set(names)
 
 
 def test_rates_have_wilson_s_interval():

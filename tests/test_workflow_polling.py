@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from itertools import pairwise
 
 import pytest
 
@@ -46,6 +47,11 @@ def test_an_end_is_noticed_after_a_fifth_of_the_time_and_the_first_wait_at_most(
     assert times[-1] - seconds <= min(seconds / 5 + FIRST_S, 30)
     # An administrator minds questions: a day has fewer than three thousand.
     assert len(times) <= 18 + seconds / 30
+
+
+def test_each_wait_is_a_fifth_longer_than_the_last_up_to_half_a_minute(mended):
+    waits = [later - now for now, later in pairwise(asked(mended, 300))]
+    assert waits == pytest.approx([min(3 * 1.2**number, 30) for number in range(len(waits))], rel=1e-9)
 
 
 def test_a_profile_that_asks_rarely_is_not_asked_more_often(mended):

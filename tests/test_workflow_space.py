@@ -149,7 +149,11 @@ def test_a_run_that_ends_on_a_full_disk_says_how_much_is_free(tmp_path, monkeypa
     space_check.after(tmp_path)
     assert f"the disk of {(tmp_path / 'results').resolve()} is full (0.5 MB free)" in caplog.text
     caplog.clear()
-    monkeypatch.setattr(space_check, "free_bytes", lambda folder: space_check.FULL_BYTES)
+    monkeypatch.setattr(space_check, "free_bytes", lambda folder: 2**20 - 1)
+    space_check.after(tmp_path)
+    assert "is full (1.0 MB free)" in caplog.text
+    caplog.clear()
+    monkeypatch.setattr(space_check, "free_bytes", lambda folder: 2**20)
     space_check.after(tmp_path)
     assert not caplog.text
 
@@ -194,7 +198,7 @@ def test_a_full_disk_names_the_file_the_need_and_what_is_free(small_disk, name):
 def test_a_working_directory_that_cannot_be_written_is_refused_by_name_and_reason(small_disk):
     space_check.writable(small_disk)
     assert list(small_disk.iterdir()) == []
-    (small_disk / "other").write_bytes(bytes(2**21 - space_check.TRIAL_BYTES // 2))
+    (small_disk / "other").write_bytes(bytes(2**21 - 2**15))
     with pytest.raises(InputError, match=rf"{small_disk}: .*No space left on device, 0\.0 MB free"):
         space_check.writable(small_disk)
     (small_disk / "other").unlink()

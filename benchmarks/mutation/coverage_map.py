@@ -118,9 +118,29 @@ def _seconds(report: Path) -> tuple[dict[str, float], set[str]]:
     return dict(seconds), failed
 
 
+def _module(file: str) -> str:
+    """Dotted name of the module in a source file."""
+    return file.removeprefix("src/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+
+
+def naming(root: Path, names: list[str], file: str) -> set[str]:
+    """Files of tests among `names` whose text names the module of a source file, or else a module that imports it; all
+    where there are none."""
+    texts = {name: (root / "tests" / name).read_text(encoding="utf-8") for name in names}
+    for files in ({file}, importers(root, file)):
+        parts = [_module(each).removeprefix("lowalt.").rpartition(".") for each in files]
+        patterns = [re.compile(rf"\b{re.escape(f'{package}.{name}'.lstrip('.'))}\b"
+                               rf"|from lowalt\.?{re.escape(package)} import (\([^)]*|[^\n]*)\b{name}\b")
+                    for package, _, name in parts]  # fmt: skip
+        found = {name for name, text in texts.items() if any(pattern.search(text) for pattern in patterns)}
+        if found:
+            return found
+    return set(names)
+
+
 def importers(root: Path, file: str) -> set[str]:
     """Files of the package that import the module of `file`, by the text of their import lines."""
-    module = file.removeprefix("src/").removesuffix(".py").replace("/", ".").removesuffix(".__init__")
+    module = _module(file)
     package, _, name = module.rpartition(".")
     pattern = re.compile(rf"^\s*(from {re.escape(module)} import|import {re.escape(module)}\b"
                          rf"|from {re.escape(package)} import [^#\n]*\b{re.escape(name)}\b)", re.MULTILINE)  # fmt: skip

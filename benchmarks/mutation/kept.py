@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from mutation.candidates import Mutant
@@ -29,9 +29,10 @@ class Kept:
         if path.exists():
             for line in path.read_text(encoding="utf-8").splitlines():
                 row = json.loads(line)
-                self.rows[row["fault"]] = row
-                if not row["killed"]:
+                if row.get("survived"):
                     self.once.add(row["fault"])
+                else:
+                    self.rows[row["fault"]] = row
 
     def _fault(self, mutant: Mutant) -> str:
         """The name of a fault in the source as it stands now."""
@@ -60,8 +61,17 @@ class Kept:
             found = try_it()
             row = {"fault": self._fault(mutant), "shown": self._tests(tests), **found._asdict()}
             self.rows[row["fault"]] = row
-            if not found.killed:
-                self.once.add(row["fault"])
-            with self.path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(row) + "\n")
+            self._add(row)
         return found
+
+    def note(self, mutants: Iterable[Mutant]) -> None:
+        """Keep that these faults survived all tests shown to them, in every look."""
+        for fault in map(self._fault, mutants):
+            if fault not in self.once:
+                self.once.add(fault)
+                self._add({"fault": fault, "survived": True})
+
+    def _add(self, row: dict) -> None:
+        """Append a line to the file."""
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
