@@ -95,6 +95,27 @@ def test_the_choice_is_that_of_least_loss_on_validation(quick, method, tmp_path)
         classical.fit(lacking, method, 4, 1, ("x",))
 
 
+def test_the_candidates_are_those_of_the_kept_trainings():
+    """Another candidate, another number of rounds or of SNRs would choose another model on the same samples."""
+    rates = (
+        [{"rate": 0.1, "leaves": leaves} for leaves in (15, 31)],
+        [{"rate": 0.1, "depth": depth} for depth in (4, 6)],
+    )
+    machines = [{"c": c, "gamma": gamma} for c in (3, 30) for gamma in (0.3, 1)]
+    assert {"svm": machines, "boosting": rates[0], "xgboost": rates[1]} == classical.GRID
+    assert (classical.ROUNDS, classical.EVERY, classical.LEVELS) == (200, 25, 3)
+
+
+def test_a_model_is_offered_after_every_twenty_five_rounds_with_the_trees_so_far():
+    """Sixty rounds of a tree for each of two classes, each tree a leaf that adds its round's number."""
+    leaf = {"feature": np.zeros(1), "threshold": np.zeros(1), "left": -np.ones(1), "right": -np.ones(1)}
+    trees = [[{**leaf, "value": np.array([sign * number])} for sign in (1.0, -2.0)] for number in range(1, 61)]
+    models = list(classical._rounds(trees, np.array([0.5, 0.0])))
+    sums = [25 * 26 / 2, 50 * 51 / 2]
+    given = torch.zeros(3, 1, dtype=torch.float64)
+    assert [model.scores(given).tolist() for model in models] == [[[0.5 + total, -2 * total]] * 3 for total in sums]
+
+
 def test_a_missing_package_is_named_with_the_extra_that_has_it(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "sklearn.svm", None)
     with pytest.raises(InputError, match=r"lowalt\[methods\]"):

@@ -48,6 +48,16 @@ def test_a_cue_adds_its_own_weights_alone_and_stations_stay_a_set():
             model(inputs)
 
 
+@torch.inference_mode()
+def test_fifty_metres_enter_the_network_as_one_and_pass_sixteen_values():
+    cue = height_cue.HeightCue(8)
+    heights = torch.tensor([[0.0, 50.0, 125.0]])
+    first, last = cue.layers[0], cue.layers[2]
+    wanted = last(torch.nn.functional.gelu(torch.tensor([[[0.0], [1.0], [2.5]]]) @ first.weight.T + first.bias))
+    torch.testing.assert_close(cue(heights), wanted)
+    assert first.weight.shape == (16, 1) and wanted.shape == (1, 3, 8)
+
+
 def test_a_scheme_without_cues_is_kept_as_before_there_were_any():
     keys = ["name", "stations", "spectra", "fusion", "backbone", "protocols", "size", "steps", "share", "method"]
     assert list(PLAIN.record) == keys and list(CUED.record) == [*keys, "cues"]

@@ -40,8 +40,8 @@ def slow_smooth(signal):
 
 def test_the_rest_is_that_of_three_rounds_of_a_smooth_part_and_a_parabola_of_phase():
     times = np.arange(130) * INTERVAL_S
-    body_phase = 2 * np.pi * 31 * times + 90 * times**2 + 2 * np.sin(2 * np.pi * 2 * times)
-    signal = noisy(np.exp(1j * body_phase) * (1 + 0.3 * np.exp(2j * np.pi * 90 * times)), 20)
+    body_phase = 2 * np.pi * 31 * times + 700 * times**2 + 2 * np.sin(2 * np.pi * 2 * times)
+    signal = noisy(np.exp(1j * body_phase) * (1 + 0.8 * np.exp(2j * np.pi * 90 * times)), 5)
     phase = 2 * np.pi * body_line_hz(signal[None], INTERVAL_S)[0] * times
     for _ in range(3):
         smooth = slow_smooth(signal * np.exp(-1j * phase))

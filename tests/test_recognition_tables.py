@@ -114,6 +114,24 @@ def test_several_seeds_are_averaged(tmp_path):
     assert len({row["brier"] for row in each}) > 1
 
 
+def test_bands_begin_at_multiples_of_their_width_and_leave_out_samples_without_a_value(tmp_path):
+    """Ranges in bands of 50 m, aspects in bands of 30 degrees; the means are over both seeds."""
+    paths = [run_files(tmp_path, "seen", "A:VT", 0.7, seed=seed)[0] for seed in (0, 1)]
+    runs = [Evaluated(path) for path in paths]
+    test = runs[0].test
+    values = np.where(np.arange(len(test)) % 7 == 0, np.nan, 49.9 + 0.1 * (np.arange(len(test)) % 5))
+    right = np.mean([run.test.correct for run in runs], axis=0)
+    rows = list(tables.band_rows(runs, lambda found: values, 50))
+    for row, (start, chosen) in zip(rows, ((0, values < 50), (50, values >= 50)), strict=True):
+        assert row == [f"{start}", f"{start + 50}", f"{100 * right[chosen].mean():.4f}", chosen.sum()]
+    tables.write(runs, ["A:VT"], {}, tmp_path, 1)
+    for name, column, width in (("ranges", test.range_m, 50), ("aspects", test.aspect_deg, 30)):
+        found = read_rows(tmp_path / f"{name}.csv")
+        firsts = sorted(set((column // width * width).astype(int).tolist()))
+        assert [(row["from"], row["to"]) for row in found] == [(f"{one}", f"{one + width}") for one in firsts]
+        assert sum(int(row["samples"]) for row in found) == len(test)
+
+
 def test_tables_do_without_published_accuracies(tmp_path):
     paths = [run_files(tmp_path, "seen", scheme, 0.9)[0] for scheme in ("A:VRP+TRP+VT", "ABC:VRP+TRP+VT")]
     main(["tables", "--settings", '{"seed": 1}', "--predictions", *map(str, paths), "--out", str(tmp_path / "out")])
