@@ -190,12 +190,12 @@ def slow_length(levels, line_m):
 
 
 def test_the_length_of_blades_is_that_of_the_slow_search():
-    rng, told = stream(6, "levels"), []
+    rng, told = stream(9, "levels"), []
     for number in range(15):
         line_m, reach = rng.uniform(0.9, 1.1, 1 + number % 3), int(rng.integers(3, 25))
         edge, depth = rng.uniform(0.5, 1.2 * reach), 10 ** rng.uniform(-3, -0.5)
         levels = [
-            np.where(np.arange(1, reach + 1) <= edge / step, 1.0, depth) * rng.gamma(2, 0.5, reach) for step in line_m
+            np.where(np.arange(1, reach + 1) <= edge / step, 1.0, depth) * rng.gamma(0.5, 2.0, reach) for step in line_m
         ]
         found, wanted = rotor_blades.length_of(levels, line_m), slow_length(levels, line_m)
         told.append(wanted is not None)
