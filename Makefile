@@ -188,7 +188,7 @@ choices: $(SETUP)  ## recipes of training compared on validation alone: results/
 	$(SNAKEMAKE) -- choices
 
 invented: $(SETUP)  ## the default's schemes trained also on craft and birds of sizes that no maker has built: results/with-invented
-	$(SNAKEMAKE) -- data
+	$(SNAKEMAKE) -- prepared training_samples
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
 	$(SNAKEMAKE) --configfile config/with-invented.yaml $(OVERLAY)
 
@@ -205,8 +205,7 @@ $(METHODS): $(SETUP)
 	touch $@
 
 methods: $(METHODS)  ## methods that people ask about, on the default's data: fusions, networks on signals, classical ones on features: results/methods
-	$(SNAKEMAKE) -- data
-	$(SNAKEMAKE) -- slow_times training_samples
+	$(SNAKEMAKE) -- prepared slow_times training_samples
 	$(SNAKEMAKE) --configfile config/methods.yaml
 	$(SNAKEMAKE) --configfile config/methods.yaml -- accuracy_cost
 

@@ -131,6 +131,37 @@ def test_heights_of_another_run_come_from_its_own_tracks_shard_by_shard(overlay,
     assert options.extra(None, Inputs(extra="a b", extra_tracks="c d")) == "--extra a b --extra-tracks c d"
 
 
+@pytest.mark.parametrize("name", ["invented", "track-invented", "methods"])
+def test_a_target_on_the_default_s_data_first_makes_all_that_its_run_reads_there(name):
+    """Clouds, motion, shards and benchmarks come with every data set; all else must be asked for by name."""
+    folder = finished_invented()
+    for kind in ("views/24", "tracks"):
+        (folder / kind).mkdir(parents=True)
+        for part in (0, 1):
+            (folder / f"{kind}/seen-train-0000{part}.npz").touch()
+    recipe = re.search(rf"^{name}:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)[1]
+    asked = re.search(r" -- (.+)", recipe)[1].split()
+    config = re.findall(r"--configfile (\S+)", recipe)[-1]
+    _, default, _ = parts()
+    made = {
+        "prepared": default.prepared(None), "tracks": default.tracks(None), "slow_times": default.slow_times(None),
+        "training_samples": [*default.own_views(None), "results/default/SHA256SUMS", "results/default/config.yaml"],
+        "data": default.data(None),
+    }  # fmt: skip
+    run, products, _ = parts(load_yaml(config))
+    jobs = [
+        SimpleNamespace(run=run.name, scheme=scheme.slug, protocol="seen", train_seed="0") for scheme in run.trained
+    ]
+    read = [products.report(jobs[0]), *({**products.training_samples(job), "": products.frozen(job)} for job in jobs)]
+    paths = {
+        path for files in read for given in files.values() for path in ([given] if isinstance(given, str) else given)
+    }
+    always = ("benchmarks", "clouds", "motion", "shards")
+    wanted = {path for path in paths if path.startswith("results/default/") and path.split("/")[2] not in always}
+    assert run.data == "default" and "results/default/distances.csv" in wanted
+    assert wanted <= {path for target in asked for path in made[target]}
+
+
 def test_signals_of_another_run_come_from_its_own_slow_times():
     folder = finished_invented()
     block = METHODS | {"extra": ["invented"]}
