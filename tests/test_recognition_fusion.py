@@ -6,7 +6,7 @@ from torch import nn
 
 from lowalt.common.errors import InputError
 from lowalt.recognition import network, spectrogram_transformer
-from lowalt.recognition.fusion import ConcatenationFusion, VotingFusion
+from lowalt.recognition.fusion import ConcatenationFusion, Fusion, VotingFusion
 from lowalt.recognition.schemes import FUSIONS
 from test_recognition import images, recogniser
 
@@ -39,6 +39,37 @@ def test_every_fusion_learns_from_all_stations_and_from_each_alone(fusion):
     assert together.shape == (2, 4) and alone.shape == (6, 4)
     (together.sum() + alone.sum()).backward()
     assert all(value.grad is not None for value in model.parameters())
+
+
+@pytest.mark.parametrize("cued", [False, True])
+def test_one_pass_over_the_spectra_gives_both_decisions_of_the_attention_fusion(cued):
+    """Both decisions, by the definition of each; with dropout the draws stay those of two passes."""
+    model = recogniser(fusion="attention").double().train()
+    fusion, classifier = model.fusion, model.classifier
+    tokens = torch.randn(4, 3, 3, fusion.width, dtype=torch.float64, requires_grad=True)
+    cue = torch.randn(4, 3, fusion.width, dtype=torch.float64) if cued else None
+    layers = [layer for layer in fusion.modules() if isinstance(layer, nn.TransformerEncoderLayer)]
+    calls = []
+    for layer in layers:
+        layer.register_forward_pre_hook(lambda layer, _: calls.append(layer))
+
+    def decided(both):
+        calls.clear()
+        torch.manual_seed(5)
+        found = both(fusion, tokens, classifier, cue)
+        return [
+            *found,
+            *torch.autograd.grad(sum((k + 1) * value.square().sum() for k, value in enumerate(found)), tokens),
+        ]
+
+    for dropout, passes in ((False, 3), (True, 4)):
+        fusion.draws = dropout
+        for layer in layers:
+            layer.dropout.p = layer.dropout1.p = layer.dropout2.p = layer.self_attn.dropout = 0.3 * dropout
+        found, ran = decided(type(fusion).both), len(calls)
+        expected = decided(Fusion.both)
+        assert ran == passes and len(calls) == 4
+        torch.testing.assert_close(found, expected, rtol=1e-10, atol=1e-12)
 
 
 @torch.inference_mode()

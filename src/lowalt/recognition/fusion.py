@@ -4,6 +4,7 @@ Axes: B samples, K stations, V views of a station (spectra; one for a signal), t
     forward        tokens (B, K, V, features) -> fused feature (B, width)
     decided        tokens and the classifier -> logits (B, classes)
     each_station   tokens (B, K, V, features) -> tokens of B * K samples, each as if one station were the only one
+    both           the logits of all stations together, and of each alone
 """
 
 import math
@@ -41,6 +42,14 @@ class Fusion(nn.Module):
         """Tokens (B, K, V, features) -> (B * K, 1, V, features), station by station."""
         return tokens.flatten(0, 1).unsqueeze(1)
 
+    def both(
+        self, tokens: torch.Tensor, classifier: nn.Module, cue: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Tokens (B, K, V, features), perhaps with cues -> logits (B, classes), and (B * K, classes) of each station
+        as if it were the only one."""
+        own = None if cue is None else cue.flatten(0, 1).unsqueeze(1)
+        return self.decided(tokens, classifier, cue), self.decided(self.each_station(tokens), classifier, own)
+
 
 class AttentionFusion(Fusion):
     """The paper's fusion: spectra of a station by encoder and mean pool, stations by encoder and max pool."""
@@ -55,6 +64,7 @@ class AttentionFusion(Fusion):
             raise InputError(f"network: heads is {block['heads']}, expected a divisor of the {width} features")
         self.modality = nn.Parameter(torch.empty(views, width))
         nn.init.trunc_normal_(self.modality, std=0.02)
+        self.draws = block["dropout"] > 0
         shape = (block["heads"], block["feed_forward"], block["dropout"])
         self.intra = encoder(width, block["intra_depth"], *shape)
         self.inter = encoder(width, block["inter_depth"], *shape)
@@ -64,11 +74,23 @@ class AttentionFusion(Fusion):
 
         cue (B, K, features): added to the station's token before the stations meet; the paper has none.
         """
-        samples, stations = tokens.shape[:2]
-        tokens = tokens + self.modality
-        station = self.intra(tokens.flatten(0, 1)).mean(dim=1)
-        station = station.unflatten(0, (samples, stations))
-        return self.inter(station if cue is None else station + cue).amax(dim=1)
+        return self.inter(self._stations(tokens, cue)).amax(dim=1)
+
+    def _stations(self, tokens: torch.Tensor, cue: torch.Tensor | None) -> torch.Tensor:
+        """Tokens (B, K, V, features), perhaps with cues -> one token a station (B, K, features)."""
+        station = self.intra((tokens + self.modality).flatten(0, 1)).mean(dim=1)
+        station = station.unflatten(0, tokens.shape[:2])
+        return station if cue is None else station + cue
+
+    def both(
+        self, tokens: torch.Tensor, classifier: nn.Module, cue: torch.Tensor | None = None
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """As `Fusion.both`. The encoder over spectra runs once, except where dropout draws anew for each part."""
+        if self.draws and self.training:
+            return super().both(tokens, classifier, cue)
+        station = self._stations(tokens, cue)
+        alone = station.flatten(0, 1).unsqueeze(1)
+        return classifier(self.inter(station).amax(dim=1)), classifier(self.inter(alone).amax(dim=1))
 
 
 class MeanFusion(Fusion):
@@ -155,8 +177,5 @@ class Fused(nn.Module):
         once.
         """
         tokens, cue = self.tokens(inputs), self.cue(inputs)
-        logits = self.fusion.decided(tokens, self.classifier, cue)
-        if not alone:
-            return logits
-        own = None if cue is None else cue.flatten(0, 1).unsqueeze(1)
-        return logits, self.fusion.decided(self.fusion.each_station(tokens), self.classifier, own)
+        decide = self.fusion.both if alone else self.fusion.decided
+        return decide(tokens, self.classifier, cue)

@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from timm.utils import ModelEmaV3
 from torch import nn
 
 from lowalt.common.csv_tables import write_csv
@@ -22,7 +21,9 @@ from lowalt.recognition import checkpoint, network
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
+from lowalt.recognition.moving_average import MovingAverage
 from lowalt.recognition.objective import descent
 from lowalt.recognition.order import batches, epoch_order, with_fresh
 from lowalt.recognition.reader import Reader
@@ -70,16 +71,16 @@ class Trainer:
             network.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
-        self.model = shared.to(machine.device, memory_format=layout)
-        self.ema = ModelEmaV3(self.model, decay=self.block["ema"])
+        plain = machine.precision == "fp32" and machine.device.type == "cpu" and not self.block["compile"]
+        self.model = (as_products(shared) if plain else shared).to(machine.device, memory_format=layout)
+        self.ema = MovingAverage(self.model, self.block["ema"])
         self.optimiser = optimiser(self.model, self.block)
-        self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model)
+        self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
         # Readers keep their workers over all epochs and validations.
         gpu, workers = machine.device.type == "cuda", self.block["workers"]
         reader = Reader(self.train, columns, self.augmentation, (self.seed, *keys), machine)
-        self.read, self.read_validation = (
-            ReadAhead(read, workers, pin=gpu) for read in (reader, Unchanged(self.validation))
-        )
+        readers = (reader, Unchanged(self.validation))
+        self.read, self.read_validation = (ReadAhead(read, workers, pin=gpu) for read in readers)
         self.best_weights: dict = {}
         self.waited_s, self.validates_first = 0.0, False
         self.metrics: Metrics | None = None
@@ -144,7 +145,6 @@ class Trainer:
 
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         """Take one optimiser step on a batch and update the moving average of the weights."""
-        self.step_model.train()
         images = images.to(self.machine.device, non_blocking=True)
         labels = labels.to(self.machine.device, non_blocking=True)
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
