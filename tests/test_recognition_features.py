@@ -176,6 +176,18 @@ def test_every_feature_is_that_of_its_definition(symbols):
     np.testing.assert_allclose(found, [slow_features(look) for look in looks], rtol=2e-5, atol=1e-6)
 
 
+def test_the_first_peak_is_high_enough_also_where_all_peaks_are_negative_and_the_first_lag_where_there_is_none():
+    """From lag 2 on; peaks of at least half the highest, or at most half as much below zero again."""
+    rows = np.array([
+        [1, 0.9, -0.5, -0.7, -0.3, -0.4, -0.2, -0.6, -0.9],  # Peaks of -0.3 and -0.2.
+        [1, 0.1, 0.2, 0.1, 0.39, 0.3, 0.4, 0.3, 0.9],  # Peaks of 0.2, 0.39 and 0.4; the last lag has no neighbour.
+        [1, 0.1, 0.19, 0.1, 0.39, 0.3, 0.4, 0.3, 0.9],
+        [1, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.2],
+    ])  # fmt: skip
+    lags, heights = features._first_peak(rows, 2, 0.5)
+    assert lags.tolist() == [4, 2, 4, 2] and heights.tolist() == [-0.3, 0.2, 0.39, 0.8]
+
+
 def test_a_look_without_envelope_has_small_finite_features():
     """Of a line alone the envelope is constant: its variation is the square root of the floor of 1e-12."""
     found = dict(zip(features.NAMES, features.features(body(1.0)[None], FREQUENCY_HZ, INTERVAL_S)[0], strict=True))
