@@ -23,7 +23,7 @@ from queue import Queue
 
 import numpy as np
 from mutation.candidates import Mutant, draw, of_file
-from mutation.coverage_map import Coverage, joined, measure, naming, shown_tests
+from mutation.coverage_map import Coverage, joined, measure, naming, shown_tests, unmapped
 from mutation.forked import LIBRARIES, TRAINING, load
 from mutation.kept import Kept
 from mutation.survivors import earlier, survivor_row
@@ -125,6 +125,8 @@ def looks(
 
     def mapped(names: list[str]) -> Coverage | None:
         """The map of files of tests."""
+        if asked.files:
+            return unmapped(root, names, {mutant.file for mutant in faults})
         return measure(root, names, asked.kept.resolve() / "map", asked.jobs, lambda: time.monotonic() < until)
 
     def that_name(names: list[str], some: list[Mutant]) -> set[str]:
@@ -200,6 +202,7 @@ def main(argv: list[str] | None = None) -> None:
     parser.add_argument("--count", type=int, default=25, help="faults a room")
     parser.add_argument("--rooms", nargs="*", help="these rooms only")
     parser.add_argument("--near", action="store_true", help="only files of tests named after these rooms, see NEAR")
+    parser.add_argument("--files", action="store_true", help="whole files of tests that name a module, without a map")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--limit", type=float, default=40, help="seconds of tests shown to a fault")

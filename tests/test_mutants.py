@@ -11,7 +11,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from mutants import room_of, room_rows, wilson, with_others
 from mutation.candidates import Mutant, draw, mutated, of_file
-from mutation.coverage_map import Coverage, naming, shown_tests
+from mutation.coverage_map import Coverage, naming, shown_tests, unmapped
 from mutation.kept import Kept
 from mutation.survivors import changed, earlier, survivor_row
 from mutation.trials import Outcome, copy_of_tree, trial
@@ -184,6 +184,10 @@ def test_tests_that_name_a_module_are_found_by_their_text_and_else_those_that_na
     told = {name: naming(tree, names, f"src/lowalt/room/{name}.py") for name in ("reach", "more", "far", "lonely")}
     assert told["reach"] == told["far"] == {"test_a.py", "test_b.py", "test_c.py"}
     assert told["more"] == {"test_b.py", "test_e.py"} and told["lonely"] == set(names)
+    # Without a map, a line has the whole files of tests that name its module.
+    found = unmapped(tree, names, {"src/lowalt/room/far.py", "src/lowalt/room/more.py"})
+    assert shown_tests(tree, found, "src/lowalt/room/far.py", 1, 9.0) == [f"tests/test_{name}.py" for name in "abc"]
+    assert shown_tests(tree, found, "src/lowalt/room/more.py", 1, 1.0) == ["tests/test_b.py"]
 
 
 def test_rates_have_wilson_s_interval():

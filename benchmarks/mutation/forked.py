@@ -63,6 +63,7 @@ def _child(tree: Path, tests: list[str], edited: str, good: bytes) -> None:
         if "cache=True" not in Path(edited).read_text(encoding="utf-8"):
             caching._hash_source_file = lambda path, *rest: good if path == edited else of_file(path, *rest)
         options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "no:cov"]
+        options += ["-m", "not slow and not workflow"]
         status = pytest.main([*options, *tests])
     finally:
         os._exit(int(status))
