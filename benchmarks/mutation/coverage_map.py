@@ -181,7 +181,7 @@ def shown_tests(root: Path, found: Coverage, file: str, line: int, limit: float)
     names |= {test for lines in near for tests in lines.values() for test in tests}
     files = {name for name in names if "::" not in name}
     names |= {test for test in found.seconds if test.partition("::")[0] in files}
-    order = sorted(names & found.seconds.keys(), key=lambda test: (not _of_room(test, file), found.seconds[test]))
+    order = sorted(names & found.seconds.keys(), key=lambda test: (not _of_room(test, file), found.seconds[test], test))
     chosen, total = [], 0.0
     for name in order:
         if total + found.seconds[name] <= limit:
