@@ -41,10 +41,10 @@ _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download",
            "plan", "portable", "splits", "turns", "workflow_board")  # fmt: skip
 _MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "physics", "echo_command", "echo_hard",
             "command", "recognition_price", "recognition_stream")  # fmt: skip
-_RECOGNITION = ("own_backbone", *(f"recognition{name}" for name in (
+_RECOGNITION = ("own_backbone", "command_options", *(f"recognition{name}" for name in (
     ".py", "_augment", "_choose", "_classical", "_data", "_distances", "_faults", "_features", "_fusion", "_gpus",
-    "_height_cue", "_made", "_nodes", "_null_space", "_predictions", "_rates", "_rotor", "_shards", "_sharing",
-    "_signals", "_start", "_stream", "_tables", "_track", "_training", "_transfer")))  # fmt: skip
+    "_height_cue", "_made", "_nodes", "_null_space", "_predictions", "_rates", "_recipe", "_rotor",
+    "_schemes", "_shards", "_sharing",    "_signals", "_start", "_stream", "_tables", "_track", "_training", "_transfer")))  # fmt: skip
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
@@ -59,7 +59,7 @@ NEAR = {
     "noise": ("noise", "laws"),
     "tiles": ("tiles", "spectra"),
     "report": ("report", "gallery"),
-    "workflow": ("workflow", "invented_sizes", "command.py"),
+    "workflow": ("workflow", "invented_sizes", "command.py", "command_options"),
 }
 """How the names of files of tests of a room begin, where not by the room's name alone."""
 

@@ -41,6 +41,29 @@ def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
     assert products.first_motion(CHUNK) == [f"results/default/motion/{group}-00000.csv" for group in ("seen", "unseen")]
 
 
+def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
+    run, products, _ = parts({"report": {"cost": False, "effects": False, "accuracy": "", "measured": ""}})
+    base, page = "results/default", products.report(CHUNK)
+    named = ("index", "gallery", "motion", "distances", "seeds", "ranges", "aspects")
+    assert {name: page[name] for name in named} == {
+        "index": f"{base}/shards/index.json", "gallery": f"{base}/clouds.png",
+        "motion": f"{base}/motion/seen-00000.csv",
+        "distances": f"{base}/distances.csv", "seeds": f"{base}/seeds.csv", "ranges": f"{base}/ranges.csv",
+        "aspects": f"{base}/aspects.csv",
+    }  # fmt: skip
+    assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
+    assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
+    assert not {"transfer", "echo_cost", "effects", "accuracy_cost", "measured"} & set(page)
+    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": "a.csv", "measured": "m.csv"},
+                            "recognition": {"transfer": ["other"]}})  # fmt: skip
+    more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
+    assert more == {
+        "transfer": f"{base}/transfer.csv", "echo_cost": f"{base}/cost.csv", "echo_pixels": f"{base}/cost_pixels.csv",
+        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": "a.csv",
+        "effects_figure": f"{base}/effects.png", "measured": "m.csv",
+    }  # fmt: skip
+
+
 def test_the_network_asked_about_effects_sees_the_most_images_and_knows_all_subtypes():
     assert run_of().asked.name == "ABC:VRP+TRP+VT"
     with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
