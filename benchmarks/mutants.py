@@ -44,7 +44,8 @@ _MEASURE = ("measure", "limits", "report.py", "report_cost", "report_effects", "
 _RECOGNITION = ("own_backbone", "command_options", *(f"recognition{name}" for name in (
     ".py", "_augment", "_choose", "_classical", "_data", "_distances", "_faults", "_features", "_fusion", "_gpus",
     "_height_cue", "_made", "_nodes", "_null_space", "_predictions", "_rates", "_recipe", "_rotor",
-    "_schemes", "_shards", "_sharing",    "_signals", "_start", "_stream", "_tables", "_track", "_training", "_transfer")))  # fmt: skip
+    "_schemes", "_shards", "_sharing", "_signals", "_start", "_stream", "_tables", "_track", "_training",
+    "_transfer")))  # fmt: skip
 _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling", "record_schema", "records")
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
