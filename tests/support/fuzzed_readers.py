@@ -6,6 +6,7 @@ import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import yaml
@@ -137,6 +138,7 @@ def _arrays() -> list[Reader]:
     import torch
 
     from lowalt.recognition import checkpoint, predictions, samples
+    from lowalt.recognition.tracked import Tracked
     from lowalt.shards import recipe, table
     from lowalt.shards.index import load as load_index
     from lowalt.shards.table import map_samples, read_header
@@ -154,6 +156,8 @@ def _arrays() -> list[Reader]:
         np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
     )  # fmt: skip
     cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
+    ones, measured = np.ones((count, 3)), SimpleNamespace(facts=facts, size=16)
+    heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
     index = {"format": "lowalt-shards-2", "shards": [], "kind": "image"}
@@ -163,6 +167,7 @@ def _arrays() -> list[Reader]:
     return [
         Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud),
         Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")})),
+        Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1))),
         Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p))),
         Reader("index", "index.json", json.dumps(index).encode(), load_index),
         Reader("tiles", "a.npz", _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"), lambda p: [*_all(Tiles(p))]),
