@@ -76,14 +76,23 @@ def side(i, j, k, p, q, r, a, b, c, spread):
 
 
 @INLINED
+def sides(a0, a1, a2, b0, b1, b2, c0, c1, c2, a, b, c, spread):
+    """The least and the largest `side` of a triangle's three edges for rays in the direction a, b, c.
+
+    a0, a1, a2, then b0 to c2: its corners from the rays' start. No ray meets it where they are -1 and 1.
+    """
+    one = side(a0, a1, a2, b0, b1, b2, a, b, c, spread)
+    two = side(b0, b1, b2, c0, c1, c2, a, b, c, spread)
+    three = side(c0, c1, c2, a0, a1, a2, a, b, c, spread)
+    return min(one, min(two, three)), max(one, max(two, three))
+
+
+@INLINED
 def reached(vertices, tree, f, x, y, z, a, b, c, spread):
     """Whether any of the rays of `met` can meet triangle f: they pass no two edges on different sides."""
     i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
     a0, a1, a2 = vertices[i, 0] - x, vertices[i, 1] - y, vertices[i, 2] - z
     b0, b1, b2 = vertices[j, 0] - x, vertices[j, 1] - y, vertices[j, 2] - z
     c0, c1, c2 = vertices[k, 0] - x, vertices[k, 1] - y, vertices[k, 2] - z
-    one = side(a0, a1, a2, b0, b1, b2, a, b, c, spread)
-    two = side(b0, b1, b2, c0, c1, c2, a, b, c, spread)
-    three = side(c0, c1, c2, a0, a1, a2, a, b, c, spread)
-    least, most = min(one, min(two, three)), max(one, max(two, three))
+    least, most = sides(a0, a1, a2, b0, b1, b2, c0, c1, c2, a, b, c, spread)
     return least >= 0 or most <= 0

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
 from lowalt.effects.channel.ray_grid import RayGrid
-from lowalt.effects.channel.ray_tests import side
+from lowalt.effects.channel.ray_tests import sides
 
 SYMBOLS = 64
 """Symbols whose rays are judged together."""
@@ -30,10 +30,7 @@ def _met(vertices, tree, f, x, y, z, a, b, c, spread):
     a0, a1, a2 = vertices[i, 0] - x, vertices[i, 1] - y, vertices[i, 2] - z
     b0, b1, b2 = vertices[j, 0] - x, vertices[j, 1] - y, vertices[j, 2] - z
     c0, c1, c2 = vertices[k, 0] - x, vertices[k, 1] - y, vertices[k, 2] - z
-    one = side(a0, a1, a2, b0, b1, b2, a, b, c, spread)
-    two = side(b0, b1, b2, c0, c1, c2, a, b, c, spread)
-    three = side(c0, c1, c2, a0, a1, a2, a, b, c, spread)
-    least, most = min(one, min(two, three)), max(one, max(two, three))
+    least, most = sides(a0, a1, a2, b0, b1, b2, c0, c1, c2, a, b, c, spread)
     if (least < 0 and most > 0) or (tree.closed[f] and least < 0):
         return FREE
     if least == 0 and most == 0:
