@@ -48,7 +48,7 @@ def arriving(
         for first in range(0, len(numbers), together):
             some = np.arange(first, min(first + together, len(numbers)))
             paths = [at_rows(path, some) for path in held]
-            given = _part_of(view, some), paths, on, rows_of(factor, some), numbers[some]
+            given = view.at_symbols(some), paths, on, rows_of(factor, some), numbers[some]
             found.append(_in_orders(echo, *given, within, allowed))
         still, samples = (np.concatenate(every) for every in zip(*found, strict=True))
     else:
@@ -83,17 +83,6 @@ def _within(echo: TargetEcho, view: View, on: frozenset[str], count: int) -> Wit
     if "wavefront" in on:
         order = gain_times.order(view, moving.complex_motion(view), count, echo.error / 10)
     return Within(order, moving.nodes_s(view, count), moving.farther_m(view))
-
-
-def _part_of(view: View, rows: np.ndarray) -> View:
-    """The view at some of its symbols, with what is known of the motion."""
-    part, known = view.at(view.times_s[rows]), view.__dict__
-    if "motion" in known:
-        turned, moved = known["motion"].rotation[rows], known["motion"].translation[rows]
-        part.__dict__["motion"] = known["motion"]._replace(rotation=turned, translation=moved)
-    if "places" in known:
-        part.__dict__["places"] = known["places"][rows]
-    return part
 
 
 def _in_orders(

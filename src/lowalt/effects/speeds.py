@@ -9,16 +9,18 @@ interpolation in time needs.
 import math
 from functools import cached_property
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lowalt.effects.view import View
+if TYPE_CHECKING:
+    from lowalt.effects.view import View
 
 
 class Speeds:
     """Bounds of a target's motion during the look; shapes (P,) are by part."""
 
-    def __init__(self, view: View):
+    def __init__(self, view: "View"):
         self.view, self.cloud, self.row = view, view.cloud, view.row
 
     @cached_property

@@ -10,7 +10,9 @@ import numpy as np
 from lowalt.common.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.effects.antenna import Element, gain
+from lowalt.effects.perturbations import at_times, summed
 from lowalt.effects.rigid_loops import carry
+from lowalt.effects.speeds import Speeds
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.targets.cloud import Cloud
 
@@ -57,8 +59,13 @@ class View:
     @cached_property
     def motion(self) -> Rigid:
         """Poses of all parts: rotation (N, P, 3, 3), translation (N, P, 3) m, with the cloud's points."""
-        moved = summed([_at(item, self.grid_s, self.times_s) for item in self.perturbations])
+        moved = summed([at_times(item, self.grid_s, self.times_s) for item in self.perturbations])
         return Rigid(*poses(self.cloud, self.row, self.times_s, moved), self.cloud.points, self.cloud.part)
+
+    @cached_property
+    def speeds(self) -> Speeds:
+        """Bounds of the motion, which do not depend on its instants."""
+        return Speeds(self)
 
     @cached_property
     def places(self) -> np.ndarray:
@@ -148,13 +155,25 @@ class View:
         """Yield the same target seen at each row of times (Q, K) s; poses of TOGETHER rows are computed in one go."""
         for first in range(0, len(times_s), TOGETHER):
             some = times_s[first : first + TOGETHER]
-            motion, count = self.at(some.ravel()).motion, times_s.shape[1]
+            together, count = self.at(some.ravel()), times_s.shape[1]
             for number, row in enumerate(some):
-                rows, later = slice(number * count, (number + 1) * count), self.at(row)
-                later.__dict__["motion"] = motion._replace(
-                    rotation=motion.rotation[rows], translation=motion.translation[rows]
-                )
-                yield later
+                rows = slice(number * count, (number + 1) * count)
+                yield self.at(row)._knowing(motion=together._motion_at(rows))
+
+    def at_symbols(self, rows: np.ndarray) -> "View":
+        """Return the same target seen at the symbols `rows` (K,) alone, with what is known of its motion and places."""
+        known = {"motion": self._motion_at(rows)} if "motion" in self.__dict__ else {}
+        known |= {"places": self.places[rows]} if "places" in self.__dict__ else {}
+        return self.at(self.times_s[rows])._knowing(**known)
+
+    def _motion_at(self, rows: np.ndarray | slice) -> Rigid:
+        """The poses of some symbols."""
+        return self.motion._replace(rotation=self.motion.rotation[rows], translation=self.motion.translation[rows])
+
+    def _knowing(self, **known) -> "View":
+        """This view, with values of its cached properties that another view has computed."""
+        self.__dict__.update(known)
+        return self
 
     def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
         """Return the same target, at the same instants and under the same beams, seen from another place (3,) m.
@@ -169,11 +188,9 @@ class View:
 
     def of(self, station: Station) -> "View":
         """Return the same target, at the same instants and under the same beams, as another station hears it."""
-        other = replace(self, station=station)
         # The motion does not depend on the station.
         known = {name: self.__dict__[name] for name in ("motion", "places", "normals") if name in self.__dict__}
-        other.__dict__.update(known)
-        return other
+        return replace(self, station=station)._knowing(**known)
 
     def ends(self) -> list["View"]:
         """Return the target as the sender and as the receiver of a link see it alone; a station's own view is both."""
@@ -220,29 +237,3 @@ class View:
         ends = [end for end in (self.station, self.station.transmitter) if end is not None]
         centres = [np.linalg.norm(self.middles - np.asarray(end.position_m), axis=2) for end in ends]
         return np.maximum(np.min(centres, axis=0) - self.radii, 0.0)
-
-
-def _at(item: Perturbation, grid_s: np.ndarray, times_s: np.ndarray) -> Perturbation:
-    """A perturbation at other times: linear between the symbols, exact on them."""
-
-    def table(values: np.ndarray | None) -> np.ndarray | None:
-        """Values (G, 3) at the times (K,): (K, 3)."""
-        if values is None:
-            return None
-        return np.stack([np.interp(times_s, grid_s, values[:, axis]) for axis in range(3)], axis=1)
-
-    angles = {part: np.interp(times_s, grid_s, angle) for part, angle in (item.angle_rad or {}).items()}
-    return Perturbation(angles, table(item.offset_m), table(item.tilt_rad))
-
-
-def summed(items: list[Perturbation]) -> Perturbation | None:
-    """Return the sum of perturbations, None for none."""
-    if not items:
-        return None
-    angles: dict[int, np.ndarray] = {}
-    for item in items:
-        for part, angle in (item.angle_rad or {}).items():
-            angles[part] = angles[part] + angle if part in angles else angle
-    offsets = [item.offset_m for item in items if item.offset_m is not None]
-    tilts = [item.tilt_rad for item in items if item.tilt_rad is not None]
-    return Perturbation(angles, sum(offsets) if offsets else None, sum(tilts) if tilts else None)

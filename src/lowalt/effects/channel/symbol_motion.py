@@ -10,7 +10,6 @@ from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects import interpolation
 from lowalt.effects.elements import farthest_m, mean_distance_m
-from lowalt.effects.speeds import Speeds
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -42,7 +41,7 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
     The rest of the phase, up to half the band away, enters by its power series, which gives expm1.
     """
     network, radio = view.network, radar(view.network, view.station)
-    path = _speeds(view).travel_m(duration_s(view))
+    path = view.speeds.travel_m(duration_s(view))
     spherical = "wavefront" in others
     near = np.maximum(view.nearest_m() - path - (farthest_m(network) if spherical else 0.0), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -52,13 +51,6 @@ def bound(settings: dict, view: View, others: frozenset[str] = frozenset()) -> n
         stretch = (1.0 + path / near) ** 2 - 1.0
         louder = (1.0 + farthest_m(network) / near) ** 2 if spherical else 1.0
         return np.nan_to_num(louder * ((1.0 + stretch) * (phase + edge) + stretch), nan=np.inf)
-
-
-def _speeds(view: View) -> Speeds:
-    """The bounds of the view's motion, which do not depend on its instants and so are kept with it."""
-    if "speeds" not in view.__dict__:
-        view.__dict__["speeds"] = Speeds(view)
-    return view.__dict__["speeds"]
 
 
 def _frames(view: View) -> np.ndarray:
@@ -127,7 +119,7 @@ def farther_m(view: View) -> float:
     With squint ranges count to an array's middle, which changes by the point's travel over its range times the array's
     size. Images move as far as their points and are no nearer.
     """
-    travel = float(_speeds(view).travel_m(duration_s(view)).max())
+    travel = float(view.speeds.travel_m(duration_s(view)).max())
     room = float(view.nearest_m().min()) - travel - farthest_m(view.network)
     return travel * (1.0 + farthest_m(view.network) / room) if room > 0.0 else np.inf
 
@@ -148,7 +140,7 @@ def complex_motion(view: View) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     The bounds (m): least range (P,) of each part's points, how far positions move (E, P), how large their imaginary
     parts are (E, P).
     """
-    speeds, half = _speeds(view), 0.5 * duration_s(view)
+    speeds, half = view.speeds, 0.5 * duration_s(view)
     near, rho = view.nearest_m().min(axis=0), ELLIPSES[:, None]
     wide, high = 0.5 * (rho + 1.0 / rho), 0.5 * (rho - 1.0 / rho)
     beyond = speeds.imaginary_m(high[:, 0] * half)
