@@ -155,10 +155,10 @@ def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
 
 def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud]) -> list[TargetEcho]:
     """Return the echo of every target other than that of `chain`, under the same beams at the same instants."""
-    view = chain.view
-    mine = [one for one in chain.channel if not isinstance(one.module, (AddsTargets, AddsEchoes))]
+    view, adding = chain.view, providing(scene.effects, AddsTargets)
+    mine = [one for one in chain.channel if not isinstance(one.module, (AddsTargets, AddsEchoes))] if adding else []
     result = []
-    for effect in providing(scene.effects, AddsTargets):
+    for effect in adding:
         found = effect.module.companions(effect.settings, cloud, row, clouds, scene.stream(effect.name, row))
         for given, at in found:
             # A companion of the target's own subtype has its cross sections already.

@@ -6,6 +6,8 @@ multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, 
 Turbulence, velocity, place and thrust are one linear process, discretised exactly.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from lowalt.common import portable
@@ -87,8 +89,12 @@ def process(scale: float, longitudinal: bool, response: float, lag: float) -> tu
     return drift, np.array([1.0, 0, 0, 0, 0]), outputs
 
 
+@lru_cache(maxsize=4096)
 def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[Steps, np.ndarray, np.ndarray]:
-    """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its outputs (4, 5)."""
+    """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its outputs (4, 5).
+
+    Answers are kept: all stations ask for the same axes of a target.
+    """
     drift, noise, outputs = process(scale, longitudinal, response, lag)
     return steps(drift, noise), root_of(stationary(drift, noise)), outputs
 

@@ -44,24 +44,44 @@ def root_of(covariance: np.ndarray) -> np.ndarray:
     return scale[:, None] * root
 
 
-def exponential(matrix: np.ndarray) -> np.ndarray:
+@PLAIN
+def exponential(matrix):
     """Return the exponential of a matrix (K, K) whose largest column sum of sizes is at most 2."""
     result = np.eye(len(matrix))
     for order in range(_ORDER, 0, -1):
-        result = np.eye(len(matrix)) + portable.product(matrix, result) / order
+        before = result.copy()
+        for i in range(len(matrix)):
+            for j in range(len(matrix)):
+                total = matrix[i, 0] * before[0, j]
+                for k in range(1, len(matrix)):
+                    total += matrix[i, k] * before[k, j]
+                result[i, j] = (1.0 if i == j else 0.0) + total / order
     return result
+
+
+@PLAIN
+def _eliminate(table):
+    """Turn the first K columns of table (K, K + 1) into the identity by elimination with pivots."""
+    for place in range(len(table)):
+        pivot = place
+        for row in range(place + 1, len(table)):
+            pivot = row if abs(table[row, place]) > abs(table[pivot, place]) else pivot
+        for column in range(table.shape[1]):
+            table[place, column], table[pivot, column] = table[pivot, column], table[place, column]
+        largest = table[place, place]
+        for column in range(table.shape[1]):
+            table[place, column] /= largest
+        for row in range(len(table)):
+            share = 0.0 if row == place else table[row, place]
+            for column in range(table.shape[1]):
+                table[row, column] -= share * table[place, column]
 
 
 def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Return x with matrix x = right, (K, K) and (K,), by elimination with pivots of rows that are scaled alike."""
     scale = np.abs(matrix).max(axis=1)
     table = np.concatenate([matrix, right[:, None]], axis=1) / scale[:, None]
-    for place in range(len(table)):
-        pivot = place + int(np.argmax(np.abs(table[place:, place])))
-        table[[place, pivot]] = table[[pivot, place]]
-        table[place] = table[place] / table[place, place]
-        others = np.arange(len(table)) != place
-        table[others] = table[others] - table[others, place, None] * table[place]
+    _eliminate(table)
     return table[:, -1]
 
 
