@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import gain_times
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
@@ -40,6 +41,31 @@ def test_sums_of_other_instants_keep_their_error(range_m, error):
     # Sums that stayed as they were would err by more than the smaller errors.
     first, last = (direct(view.at(view.times_s + delays[at]).places, array) for at in (0, -1))
     assert abs(first - last).max() / 64 > 1e-6
+
+
+def test_the_bound_is_the_sum_of_all_coefficients_that_are_left_out_on_its_best_ellipse():
+    _, view, _ = scene(x_m=60.0)
+    radio = view.network
+    near, moves = 50.0, {2.0: 0.3, 5.0: 0.7, 9.0: 6.0}
+    diagonal = np.hypot(15, 3) * SPEED_OF_LIGHT / radio.carrier_hz / 2
+    top_hz = radio.carrier_hz + radio.subcarriers * radio.subcarrier_spacing_hz
+    motion = np.array(list(moves)), np.array([near]), np.array(list(moves.values()))[:, None], None
+    for points in (2, 3, 5):
+        found = []
+        for rho, moved in moves.items():
+            direction = 2.5 * (diagonal / 2) / (near - moved)
+            rate = 2 * np.pi * top_hz / SPEED_OF_LIGHT * direction + 3.5 * direction / (near - moved)
+            most = 1.5 * (np.exp(rate * (moved - diagonal)) - 1)
+            found.append(sum(2 * most * rho**-order for order in range(points, 400)))
+        assert gain_times.best(view, motion, points) == pytest.approx(min(found), rel=1e-3)
+
+
+def test_as_few_instants_have_sums_of_their_own_as_the_bound_allows(monkeypatch):
+    _, view, _ = scene(x_m=60.0)
+    monkeypatch.setattr(gain_times, "best", lambda view, motion, points: 10.0**-points)
+    for error, points in ((0.05, 2), (0.005, 3), (0.0005, 4), (1e-12, 6)):
+        order = gain_times.order(view, None, 6, error)
+        assert sum(instant is None or instant.slot is not None for _, instant in order) == points
 
 
 def test_a_symbol_next_to_the_station_has_sums_of_its_own_at_every_instant():

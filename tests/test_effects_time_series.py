@@ -77,3 +77,56 @@ def test_no_range_differs_within_a_symbol_by_more_than_its_bound():
     station = np.asarray(view.station.position_m)
     moved = abs(np.linalg.norm(later.places - station, axis=2) - np.linalg.norm(view.places - station, axis=2)).max()
     assert 0.05 * symbol_motion.farther_m(view) < moved <= symbol_motion.farther_m(view)
+
+
+@pytest.mark.parametrize("first", [0, 7])
+def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(first, monkeypatch):
+    radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=130, transmit=(4, 2), receive=(4, 2))
+    cloud, row = target([[0.1, 0, 0], [-0.1, 0.02, 0]], rotor=True, x_m=120.0, vx_mps=40.0, rate_hz=60.0)
+    settings = {"symbol_motion": {}, "cyclic_prefix": {"prefix_s": 3e-7}, "ground_reflection": {}}
+    scene = Scene(radio, 3, None, tuple(called(settings)))
+    view = observe(scene, radio.stations[0], cloud, row)
+    chain = Chain(list(scene.effects), view, lambda name: scene.stream(name, row, "A"), 1.0)
+    rows = slice(first, None)
+    part = view.at(view.times_s[rows]) if first else view
+    assert part.places.shape == (130 - first, 2, 3)
+    factor = np.random.default_rng(3).uniform(0.2, 1.0, (130, 2))[rows]
+    given = chain.target, part, frozenset(("symbol_motion", "cyclic_prefix")), factor, rows
+    still, samples = arrivals.arriving(*given)
+    monkeypatch.setattr(arrivals, "TOGETHER", 1)
+    groups, in_orders = [], arrivals._in_orders
+    monkeypatch.setattr(arrivals, "_in_orders", lambda *now: (groups.append(len(now[1].times_s)), in_orders(*now))[1])
+    for one, other in zip(arrivals.arriving(*given), (still, samples), strict=True):
+        assert abs(other).max() > 0 and abs(one - other).max() < 1e-10 * abs(still).max()
+    assert groups == [100, len(part.times_s) - 100]
+
+
+@pytest.mark.parametrize("lit", [[0, 1, 2, 3, 4], [1, 3], []])
+def test_moments_are_the_plain_sums_over_points_with_and_without_strength(lit):
+    rng = np.random.default_rng(4)
+    out, back = rng.normal(size=(2, 2, 3, 5)) + 1j * rng.normal(size=(2, 2, 3, 5))
+    strength, ahead, home = np.zeros((3, 5)), *rng.uniform(-1, 1, (2, 3, 5))
+    strength[:, lit] = rng.choice([-1e-9, 2e-9, 3.0], (3, len(lit)))
+    middle, found = rng.uniform(-0.1, 0.1, 3), np.empty((3, 2, 2, 8))
+    moment_loops.moments(strength, out, back, 2.0, ahead, home, middle, 0.5, 1.5, found)
+    place = (0.5 * (ahead + home) - middle[:, None]) / 1.5
+    terms = (-1j) ** np.arange(8)[:, None, None] * np.cos(np.arange(8)[:, None, None] * np.arccos(place))
+    truth = np.einsum("pnl,qnl->nqp", terms, 2.0 * strength * out * back)
+    assert found[:, 0] + 1j * found[:, 1] == pytest.approx(truth, rel=1e-12, abs=1e-20)
+
+
+def test_the_number_of_instants_counts_a_part_by_its_share_of_the_amplitudes(monkeypatch):
+    chain, on = moving(None, False)
+    view, given, count = chain.view, [], symbol_motion.count
+    alone, errors = np.array([0.0, 1.0]), np.geomspace(1e-12, 1e-2, 60)
+    # The rotor needs the most instants, and it alone has as many as where the shares are unknown.
+    assert [count(view, error, alone) for error in errors] == [count(view, error) for error in errors]
+    assert [count(view, error, 0.01 * alone) for error in errors] == [count(view, 100 * error) for error in errors]
+    assert count(view, 1e-9, 1.0 - alone) < count(view, 1e-9)
+    monkeypatch.setattr(symbol_motion, "count", lambda *asked: (given.append(asked[2]), count(*asked))[1])
+    strengths = chain.target.strengths * np.linspace([1.0, 3.0], [2.0, 1.0], len(view.times_s)) + 1e-9
+    chain.target.__dict__["strengths"] = strengths
+    chain.cells(on)
+    # A part's share is that of its largest amplitude in the look.
+    assert (given[0] * strengths.sum(axis=1).max() >= (1 - 1e-12) * strengths).all()
+    assert given[0].sum() < 2
