@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import arrivals, interpolation, moment_loops, time_series
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import called
@@ -79,17 +80,18 @@ def test_no_range_differs_within_a_symbol_by_more_than_its_bound():
     assert 0.05 * symbol_motion.farther_m(view) < moved <= symbol_motion.farther_m(view)
 
 
-@pytest.mark.parametrize("first", [0, 7])
-def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(first, monkeypatch):
+@pytest.mark.parametrize(("first", "more"), [(0, {"ground_reflection": {}}), (7, {})])
+def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(first, more, monkeypatch):
     radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=130, transmit=(4, 2), receive=(4, 2))
     cloud, row = target([[0.1, 0, 0], [-0.1, 0.02, 0]], rotor=True, x_m=120.0, vx_mps=40.0, rate_hz=60.0)
-    settings = {"symbol_motion": {}, "cyclic_prefix": {"prefix_s": 3e-7}, "ground_reflection": {}}
+    # The target crosses the range that the prefix covers at the fiftieth symbol.
+    settings = {"symbol_motion": {}, "cyclic_prefix": {"prefix_s": 2 * 125.0 / SPEED_OF_LIGHT}} | more
     scene = Scene(radio, 3, None, tuple(called(settings)))
     view = observe(scene, radio.stations[0], cloud, row)
     chain = Chain(list(scene.effects), view, lambda name: scene.stream(name, row, "A"), 1.0)
     rows = slice(first, None)
     part = view.at(view.times_s[rows]) if first else view
-    assert part.places.shape == (130 - first, 2, 3)
+    assert len(part.motion.rotation) == 130 - first
     factor = np.random.default_rng(3).uniform(0.2, 1.0, (130, 2))[rows]
     given = chain.target, part, frozenset(("symbol_motion", "cyclic_prefix")), factor, rows
     still, samples = arrivals.arriving(*given)
@@ -99,6 +101,17 @@ def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(f
     for one, other in zip(arrivals.arriving(*given), (still, samples), strict=True):
         assert abs(other).max() > 0 and abs(one - other).max() < 1e-10 * abs(still).max()
     assert groups == [100, len(part.times_s) - 100]
+
+
+def test_a_view_at_some_symbols_has_the_motion_and_the_places_of_these():
+    view, rows = moving(None, False)[0].view, np.array([3, 1])
+    fresh, later = view.at(view.times_s), view.at(view.times_s[rows])
+    for known in ("motion", "places"):
+        getattr(fresh, known)
+        part = fresh.at_symbols(rows)
+        assert known in vars(part) and (part.times_s == view.times_s[rows]).all()
+        assert (part.motion.rotation == later.motion.rotation).all() and (part.places == later.places).all()
+        assert (part.motion.translation == later.motion.translation).all()
 
 
 @pytest.mark.parametrize("lit", [[0, 1, 2, 3, 4], [1, 3], []])
