@@ -27,3 +27,9 @@ def test_the_largest_jobs_that_fit_the_cores_run_together():
     found = space.need(jobs, figures, PLAN, CONFIG, 5)
     assert (found.memory, found.largest_job, found.largest_rule) == (14.0, 7.0, "b")
     assert space.need([], figures, PLAN, CONFIG, 5) == space.Need(0.0, 0.0, "", 0.0, 0, ())
+
+
+def test_temporary_files_count_as_the_two_largest_a_core():
+    figures = {name: space.Figures(size, 0.0, 0.0, 0.0, True) for name, size in (("a", 5.0), ("b", 7.0), ("c", 6.0))}
+    jobs = [space.PlannedJob(name, {}) for name in "abcab"]
+    assert [space.need(jobs, figures, PLAN, CONFIG, cores).disk for cores in (1, 2, 3)] == [14.0, 25.0, 30.0]
