@@ -1,6 +1,7 @@
 """The step that compiles machine code ahead runs the stages' own commands, and fails loudly where they do."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -34,3 +35,17 @@ def test_a_stage_that_fails_is_no_success(config, monkeypatch):
     monkeypatch.setattr(kernels.sys, "executable", "/bin/false")
     with pytest.raises(InputError, match="failed"):
         kernels.main([])
+
+
+def test_one_stage_is_compiled_here_and_several_in_processes_of_their_own(config, monkeypatch):
+    done, started = [], []
+    monkeypatch.setattr(kernels, "tiles", lambda given, folder: done.append((given == config, folder.is_dir())))
+    ended = SimpleNamespace(wait=lambda: 0)
+    monkeypatch.setattr(kernels.subprocess, "Popen", lambda command: started.append(command[1:]) or ended)
+    kernels.main(["tiles"])
+    assert done == [(True, True)] and not started
+    for asked in ([], ["echo", "tiles"]):
+        kernels.main(asked)
+        assert started == [["-m", "lowalt.workflow.kernels", stage] for stage in ("echo", "tiles")]
+        started.clear()
+    assert len(done) == 1

@@ -54,6 +54,13 @@ def test_each_wait_is_a_fifth_longer_than_the_last_up_to_half_a_minute(mended):
     assert waits == pytest.approx([min(3 * 1.2**number, 30) for number in range(len(waits))], rel=1e-9)
 
 
+def test_a_wait_that_is_asked_for_again_stays_as_it_is(mended):
+    one = object.__new__(mended)
+    one._next_seconds_between_status_checks = 20.0
+    one.next_seconds_between_status_checks = 20.0
+    assert one.next_seconds_between_status_checks == 20.0
+
+
 def test_a_profile_that_asks_rarely_is_not_asked_more_often(mended):
     one = object.__new__(mended)
     one._next_seconds_between_status_checks = 60.0
