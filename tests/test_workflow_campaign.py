@@ -137,6 +137,7 @@ def test_a_campaign_numbers_its_trials_makes_all_disturbances_and_keeps_only_fol
     monkeypatch.setattr(campaigns, "filled", lambda trial, megabytes: rooms.append(megabytes) or [{"kind": "disk"}])
     monkeypatch.setattr(campaigns, "_small_disk", lambda folder: contextlib.nullcontext(folder))
     monkeypatch.setattr(campaigns.subprocess, "run", lambda line, check: rooms.append(line[:3]))
+    monkeypatch.setattr(campaigns.shutil, "disk_usage", lambda folder: SimpleNamespace(used=5_000_000))
     options = SimpleNamespace(seed=1, memory_group=None, configfile=["tiny.yaml"], targets=["data"], disks=1, kills=5,
                               kills_per_run=2)  # fmt: skip
     rows = list(campaigns.campaign(options, tmp_path))
@@ -144,7 +145,8 @@ def test_a_campaign_numbers_its_trials_makes_all_disturbances_and_keeps_only_fol
     assert [row["identical"] for row in rows] == [*3 * ["yes"], *2 * ["no: 1 files, first other"], "yes"]
     assert {row["configuration"] for row in rows} == {"tiny.yaml data"} and rows[0]["kind"] == "disk"
     assert sorted(row["kind"] for row in rows[1:4]) == sorted({row["kind"] for row in rows[1:4]})
-    assert rooms[0][:2] == ["mount", "-o"] and 0 < rooms[1] < 10
+    # The disk has room for what it holds already, 5 MB, and for what the run is to fill.
+    assert rooms[0] == ["mount", "-o", f"remount,size={5_000_000 + int(1e6 * rooms[1])}"] and 0 < rooms[1] < 10
     assert {path.parent.name for path in tmp_path.glob("*/kept")} == {"undisturbed", "kill-3"}
     assert {path.name for path in tmp_path.iterdir()} == {"project", "undisturbed", "disk-1", "kill-2", "kill-3",
                                                           "kill-4"}  # fmt: skip

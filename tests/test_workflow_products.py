@@ -64,6 +64,16 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     }  # fmt: skip
 
 
+def test_samples_made_on_the_spot_need_clouds_and_surfaces_only_where_points_are_hidden():
+    made, wildcards = {"cache": False, "input": "dataset"}, SimpleNamespace(scheme="a-vrp-trp-vt")
+    run, products, _ = parts({"recognition": made})
+    clouds = [f"results/default/clouds/{subtype}.npz" for subtype in run.subtypes]
+    assert products.samples(wildcards) == {"dataset": "results/default/config.yaml", "clouds": clouds}
+    _, products, _ = parts({"recognition": made, "effects": {"occlusion": {}}})
+    surfaces = [f"results/default/occluders/{subtype}.npz" for subtype in run.subtypes]
+    assert products.samples(wildcards)["surfaces"] == surfaces
+
+
 def test_the_network_asked_about_effects_sees_the_most_images_and_knows_all_subtypes():
     assert run_of().asked.name == "ABC:VRP+TRP+VT"
     with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):

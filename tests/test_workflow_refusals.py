@@ -51,7 +51,7 @@ def test_schemes_on_signals_ask_for_a_cache_and_the_symbols_of_a_signal():
 
 def test_a_measured_height_stands_in_its_way_with_nothing_else():
     refusals.refuse_height(config(), HEIGHT)
-    faults = {"input": config(input="dataset"),  "timed": config(timed=["x height"]),
+    faults = {"input": config(input="dataset"), "timed": config(timed=["x height"]),
               "training.stream": config(training={"stream": 0.5}), "effects": config() | {"effects": {"adc": {}}},
               "links": config() | {"network": {"stations": {"A": {}, "B": {"transmit": "A"}}}}}  # fmt: skip
     for key, wrong in faults.items():
