@@ -6,7 +6,7 @@ from torch import nn
 
 from lowalt.common.errors import InputError
 from lowalt.recognition import network, spectrogram_transformer
-from lowalt.recognition.fusion import ConcatenationFusion, Fusion, VotingFusion
+from lowalt.recognition.fusion import AttentionFusion, ConcatenationFusion, Fusion, VotingFusion
 from lowalt.recognition.schemes import FUSIONS
 from test_recognition import images, recogniser
 
@@ -97,3 +97,9 @@ def test_the_audio_spectrogram_transformer_is_a_backbone_and_the_published_one_h
         recogniser(backbone="ast_micro", weights="hub")
     with pytest.raises(InputError, match="at 4 pixels, expected at least 6"):
         spectrogram_transformer.backbone("ast_micro", 4)
+
+
+def test_attention_draws_random_numbers_only_where_it_drops_out():
+    block = {"heads": 2, "feed_forward": 2, "intra_depth": 1, "inter_depth": 1}
+    for dropout in (0.0, 0.1):
+        assert AttentionFusion(8, 3, {**block, "dropout": dropout}).draws == (dropout > 0)
