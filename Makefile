@@ -192,9 +192,10 @@ invented: $(SETUP)  ## the default's schemes trained also on craft and birds of 
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
 	$(SNAKEMAKE) --configfile config/with-invented.yaml $(OVERLAY)
 
-# On the data of `make confirm` instead: make track-invented OVERLAY=config/track-invented-confirm.yaml
+# On the data of `make confirm` instead: make track-invented OVERLAY=config/track-invented-confirm.yaml; of a second fresh
+# root seed: track-invented-confirm-again.yaml.
 track-invented: $(SETUP)  ## networks with measured heights, trained also on invented sizes and their heights: results/track-invented
-	$(SNAKEMAKE) $(if $(findstring confirm,$(OVERLAY)),--configfile config/confirm.yaml) -- prepared training_samples tracks
+	$(SNAKEMAKE) $(if $(OVERLAY),--configfile $(subst track-invented-,,$(OVERLAY))) -- prepared training_samples tracks
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples tracks
 	$(SNAKEMAKE) --configfile config/track-invented.yaml $(OVERLAY)
 
