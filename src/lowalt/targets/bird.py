@@ -114,11 +114,12 @@ def parts(record: dict) -> tuple[list[Part], dict]:
     result = [Part("body", "body", _body(length, f))]
     for side, name in ((1, "right"), (-1, "left")):
         place = np.diag([float(side), 1.0, 1.0])
+        root = (side * shoulder[0], shoulder[1], shoulder[2])
         inner, outer = (tuple(shell.mapped(place) for shell in shells) for shells in segments)
         # The hinge's axis is -y on the right and +y on the left, so that a positive angle lifts the tip.
         axis = (0.0, -float(side), 0.0)
         bend = (side * wrist[0], shoulder[1], shoulder[2])
-        result.append(Part(f"{name} inner wing", "wing", inner, tuple(place @ shoulder), axis, weight=f["wrist"]))
+        result.append(Part(f"{name} inner wing", "wing", inner, root, axis, weight=f["wrist"]))
         parent = len(result) - 1
         result.append(Part(f"{name} outer wing", "wing", outer, bend, axis, parent=parent, weight=1 - f["wrist"]))
     return result, {"flap": FLAP | record.get("flap", {}), "wing_span_m": 2 * half_span}

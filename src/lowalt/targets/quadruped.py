@@ -36,8 +36,8 @@ def stride_hz(mass_kg: float, speed_mps: float) -> float:
 
     Source: the module's; the root is an estimate between a fixed rate and a fixed stride.
     """
-    fastest = 5.5 * mass_kg**0.24 / 3.6
-    return 269 / 60 * mass_kg**-0.14 * float(np.sqrt(speed_mps / fastest))
+    fastest = 5.5 * portable.power(mass_kg, 0.24) / 3.6
+    return float(269 / 60 / portable.power(mass_kg, 0.14) * np.sqrt(speed_mps / fastest))
 
 
 def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
@@ -47,7 +47,8 @@ def _foot(phase: np.ndarray, stride_m: float, lift_m: float) -> np.ndarray:
     swing = np.clip((at - STANCE) / (1 - STANCE), 0, 1)
     # Leaves and meets the ground at its speed: a cubic from -half to half with both end slopes those of stance.
     slope = -2 * half / STANCE * (1 - STANCE)
-    cubic = -half + slope * swing + (6 * half - 3 * slope) * swing**2 + (2 * slope - 4 * half) * swing**3
+    # Products, since the last bit of a library's cube depends on the processor.
+    cubic = -half + swing * (slope + swing * (6 * half - 3 * slope + swing * (2 * slope - 4 * half)))
     y = np.where(at < STANCE, half - 2 * half * at / STANCE, cubic)
     sine = portable.sine_cosine_turns(swing / 2)[0]
     return np.stack([np.zeros(len(at)), y, lift_m * sine * sine], 1)
