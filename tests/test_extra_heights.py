@@ -179,7 +179,7 @@ def test_samples_of_another_kind_length_or_number_of_stations_are_refused(runs, 
     with np.load(path) as data:
         kept = dict(data)
     np.savez(path, **{**kept, "signals": kept["signals"][:, :, :4]})
-    with pytest.raises(InputError, match="signals: lengths 8 and 4, expected one length"):
+    with pytest.raises(InputError, match="samples: sizes 8 and 4, expected one size"):
         extra.joined(own, [str(path)], None, SIGNALS, TRAIN)
     np.savez(path, **{**kept, **{key: np.repeat(kept[key], 2, axis=1) for key in ("signals", "range_m", "aspect_rad")}})
     with pytest.raises(InputError, match="--extra: samples of 6 stations, expected 3 as the run's own"):

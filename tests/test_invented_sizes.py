@@ -143,7 +143,7 @@ def test_joined_samples_keep_images_and_labels_and_share_no_motion_model(tmp_pat
     assert both.facts.model.tolist() == [0, 0, 3, 4, 6]
     assert len(first.facts) == 3 and second.facts.model.tolist() == [0, 2]
     second.size = 24
-    with pytest.raises(InputError, match="image sizes 16 and 24"):
+    with pytest.raises(InputError, match="samples: sizes 16 and 24, expected one size"):
         with_extra(first, second)
 
 

@@ -91,14 +91,21 @@ def test_tracks_are_read_by_schemes_with_the_cue_alone_from_the_data_set_s_own_r
         _ = run.asked
 
 
-def finished_invented():
-    """A finished run of invented sizes in the working folder, as far as another run looks at it, with two shards."""
+def finished_invented(*kinds):
+    """A finished run of invented sizes in the working folder, as far as another run sees it: two shards to train on.
+
+    kinds: folders with a file for each of these shards.
+    """
     folder = Path("results/invented")
     (folder / "shards").mkdir(parents=True)
     made = merge(load_yaml(ROOT / "config/default.yaml"), load_yaml(ROOT / "config/invented.yaml"))
     (folder / "config.yaml").write_text(yaml.safe_dump(made))
     for shard in ("seen-train-00000", "seen-train-00001", "seen-val-00000"):
         (folder / f"shards/{shard}.tar").touch()
+    for kind in kinds:
+        (folder / kind).mkdir(parents=True)
+        for part in (0, 1):
+            (folder / f"{kind}/seen-train-0000{part}.npz").touch()
     return folder
 
 
@@ -134,11 +141,7 @@ def test_heights_of_another_run_come_from_its_own_tracks_shard_by_shard(overlay,
 @pytest.mark.parametrize("name", ["invented", "track-invented", "methods"])
 def test_a_target_on_the_default_s_data_first_makes_all_that_its_run_reads_there(name):
     """Clouds, motion, shards and benchmarks come with every data set; all else must be asked for by name."""
-    folder = finished_invented()
-    for kind in ("views/24", "tracks"):
-        (folder / kind).mkdir(parents=True)
-        for part in (0, 1):
-            (folder / f"{kind}/seen-train-0000{part}.npz").touch()
+    finished_invented("views/24", "tracks")
     recipe = re.search(rf"^{name}:.*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)[1]
     asked = re.search(r" -- (.+)", recipe)[1].split()
     config = re.findall(r"--configfile (\S+)", recipe)[-1]
@@ -206,11 +209,7 @@ def test_a_dry_run_makes_tracks_for_schemes_with_the_cue_alone(tmp_path):
 @pytest.mark.workflow
 @pytest.mark.slow
 def test_a_dry_run_trains_with_the_heights_of_another_run_and_evaluates_without(tmp_path):
-    folder = finished_invented()
-    for kind in ("views/24", "tracks"):
-        (folder / kind).mkdir(parents=True)
-        for part in (0, 1):
-            (folder / f"{kind}/seen-train-0000{part}.npz").touch()
+    folder = finished_invented("views/24", "tracks")
     (folder / "SHA256SUMS").touch()
     block = HEIGHT | {"extra": ["invented"], "protocols": ["unseen"], "seeds": [0, 1]}
     text = dry_run(tmp_path, block, "results/mine/accuracy.csv")

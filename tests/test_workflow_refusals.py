@@ -20,7 +20,7 @@ def config(**recognition):
             "network": {"symbols": 400, "stations": {"A": {}, "B": {}}}}  # fmt: skip
 
 
-def refused(words, function, *given):
+def assert_refused(words, function, *given):
     with pytest.raises(InputError, match=words):
         function(*given)
 
@@ -29,24 +29,26 @@ def test_sizes_of_motion_models_rise_and_stand_without_effects():
     given = {"motion": {"sizes_m": {"UAV": [0.3, 0.3], "Bird": [0.1, 0.4]}}, "effects": {}}
     refusals.refuse_sizes(given)
     refusals.refuse_sizes({"motion": {}, "effects": {"adc": {}}})
-    refused(r"sizes_m: given together with effects \['adc'\]", refusals.refuse_sizes, {**given, "effects": {"adc": {}}})
+    assert_refused(
+        r"sizes_m: given together with effects \['adc'\]", refusals.refuse_sizes, {**given, "effects": {"adc": {}}}
+    )
     given["motion"]["sizes_m"]["Bird"] = [0.4, 0.1]
-    refused("Bird from 0.4 to 0.1 m", refusals.refuse_sizes, given)
+    assert_refused("Bird from 0.4 to 0.1 m", refusals.refuse_sizes, given)
 
 
 def test_samples_made_on_the_spot_have_no_cache():
     refusals.refuse_input(config(input="dataset", cache=False))
     refusals.refuse_input(config(input="shards"))
-    refused("'dataset' together with recognition.cache true", refusals.refuse_input, config(input="dataset"))
+    assert_refused("'dataset' together with recognition.cache true", refusals.refuse_input, config(input="dataset"))
 
 
 def test_schemes_on_signals_ask_for_a_cache_and_the_symbols_of_a_signal():
     refusals.refuse_signals(config(), SIGNALS)
     refusals.refuse_signals(config(), Scheme("x", (0,), (), method="svm"))
-    refused("sees signals, expected cache: true", refusals.refuse_signals, config(cache=False), SIGNALS)
+    assert_refused("sees signals, expected cache: true", refusals.refuse_signals, config(cache=False), SIGNALS)
     short = config()
     short["network"]["symbols"] = 399
-    refused("size 400, expected the 399 symbols", refusals.refuse_signals, short, SIGNALS)
+    assert_refused("size 400, expected the 399 symbols", refusals.refuse_signals, short, SIGNALS)
 
 
 def test_a_measured_height_stands_in_its_way_with_nothing_else():
@@ -56,18 +58,20 @@ def test_a_measured_height_stands_in_its_way_with_nothing_else():
               "links": config() | {"network": {"stations": {"A": {}, "B": {"transmit": "A"}}}}}  # fmt: skip
     for key, wrong in faults.items():
         refusals.refuse_height(wrong, IMAGES)
-        refused(f"cue 'height' and {key} is .*, expected no {key}", refusals.refuse_height, wrong, HEIGHT)
+        assert_refused(f"cue 'height' and {key} is .*, expected no {key}", refusals.refuse_height, wrong, HEIGHT)
 
 
 def test_starts_come_from_trainings_of_this_run_that_met_no_test_sample_and_go_in_no_circle():
     trained = {"seen/a", "seen/b", "unseen/a", "unseen/b"}
     refusals.refuse_starts({"seen/a": {"from": "unseen/a"}, "seen/b": {"from": "seen/a"}}, trained)
-    refused("seen/a from 'seen/c', expected one of", refusals.refuse_starts, {"seen/a": {"from": "seen/c"}}, trained)
-    refused(
+    assert_refused(
+        "seen/a from 'seen/c', expected one of", refusals.refuse_starts, {"seen/a": {"from": "seen/c"}}, trained
+    )
+    assert_refused(
         "which trains on samples that 'unseen' tests", refusals.refuse_starts, {"unseen/a": {"from": "seen/a"}}, trained
     )
     circle = {"seen/a": {"from": "seen/b"}, "seen/b": {"from": "seen/a"}}
-    refused("seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained)
+    assert_refused("seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained)
 
 
 def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(monkeypatch):
@@ -83,7 +87,7 @@ def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_
     monkeypatch.setattr(refusals, "missing_inputs", lambda records, inputs: sorted(set(records) - there))
     refusals.refuse_no_files({"where_missing": "builtin"}, "folder")
     there.clear()
-    refused(r"inputs: folder, expected .* one of \['Crow', 'Walk'\]", refusals.refuse_no_files,
+    assert_refused(r"inputs: folder, expected .* one of \['Crow', 'Walk'\]", refusals.refuse_no_files,
             {"where_missing": "builtin"}, "folder")  # fmt: skip
     assert asked == ["refuse"] * 2
     for other in ({"where_missing": "refuse"}, {}):
@@ -94,17 +98,17 @@ def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_
 
 def test_flight_heights_are_of_subtypes_and_classes():
     refusals.refuse_heights({"Crow": 1, "UAV": 2, "Glider": 3}, {"Crow": {}}, ("Glider",))
-    refused(r"height_m: \['Kite'\]", refusals.refuse_heights, {"Crow": 1, "Kite": 2}, {"Crow": {}}, ("Glider",))
+    assert_refused(r"height_m: \['Kite'\]", refusals.refuse_heights, {"Crow": 1, "Kite": 2}, {"Crow": {}}, ("Glider",))
 
 
 def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, monkeypatch):
     own = load_yaml("config/default.yaml") | {"run": "own"}
     monkeypatch.chdir(tmp_path)
     refusals.refuse_data(own)
-    refused("data: no results/made/config.yaml", refusals.refuse_data, own | {"data": "made"})
+    assert_refused("data: no results/made/config.yaml", refusals.refuse_data, own | {"data": "made"})
     (tmp_path / "results/made").mkdir(parents=True)
     kept = tmp_path / "results/made/config.yaml"
     kept.write_text(yaml.safe_dump(own | {"run": "made", "recognition": {}, "cost": 1}))
     refusals.refuse_data(own | {"data": "made"})
     kept.write_text(yaml.safe_dump(own | {"run": "made", "seed": own["seed"] + 1, "more": 1}))
-    refused(r"other settings of \['more', 'seed'\]", refusals.refuse_data, own | {"data": "made"})
+    assert_refused(r"other settings of \['more', 'seed'\]", refusals.refuse_data, own | {"data": "made"})

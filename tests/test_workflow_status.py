@@ -31,6 +31,7 @@ def test_a_file_that_another_run_has_swept_away_meanwhile_is_no_fault(tmp_path, 
     dead = {"pid": 2**22 + 1, "process": 1, "state": "running", "written": 0.0}
     monkeypatch.setattr(status, "read", lambda folder: [dead])
     status._sweep(tmp_path)
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_run_without_a_failed_job_is_told_apart_ended_failed_or_interrupted(tmp_path, monkeypatch):

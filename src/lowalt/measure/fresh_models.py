@@ -24,7 +24,7 @@ from lowalt.recognition import choose, predictions, runs
 from lowalt.recognition.intervals import bootstrap
 from lowalt.recognition.made import opened
 from lowalt.recognition.recipe import OPTIONAL
-from lowalt.recognition.samples import ViewSamples, joined_views
+from lowalt.recognition.samples import ViewSamples, joined_sources
 from lowalt.recognition.schemes import named
 from lowalt.recognition.stream import Stream, Streamed
 from lowalt.recognition.trial import part_of
@@ -86,7 +86,7 @@ def measure(config: dict, folder: Path, table: choose.Choices, out: Path) -> lis
         fresh.shared, fresh.cost = shared, cost
         train = Streamed(parts["train"], fresh)
         into = out / slug(name)
-        asked = joined_views(parts["held"], parts["validation"])
+        asked = joined_sources(parts["held"], parts["validation"])
         settings = {**settled, "seed": config["seed"], "colour_map": config["images"]["colour_map"]}
         settings["classes"] = list(dataset.classes)
         before = cost["s"]

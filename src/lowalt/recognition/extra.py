@@ -13,9 +13,9 @@ import numpy as np
 
 from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
-from lowalt.recognition.samples import ViewSamples, joined_views
+from lowalt.recognition.samples import ViewSamples, joined_sources
 from lowalt.recognition.schemes import Scheme
-from lowalt.recognition.slow_time import SlowTimeSamples, joined_signals
+from lowalt.recognition.slow_time import SlowTimeSamples
 from lowalt.recognition.tracked import Tracked
 
 
@@ -112,4 +112,4 @@ def with_extra(own: Any, extra: Any) -> Any:
         raise InputError(f"--extra: samples of {stations[1]} stations, expected {stations[0]} as the run's own")
     later = copy.copy(extra)
     later.facts = replace(extra.facts, model=extra.facts.model + 1 + own.facts.model.max())
-    return (joined_signals if isinstance(own, SlowTimeSamples) else joined_views)(own, later)
+    return joined_sources(own, later)

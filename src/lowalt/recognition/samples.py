@@ -14,7 +14,7 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -109,6 +109,8 @@ def cached(path: Path, what: str, folds: set[tuple[str, str]], *names: str) -> C
 class ViewSamples:
     """Samples held in memory, read from cache files; the scheme's columns only."""
 
+    HELD = "images"
+
     def __init__(self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]) -> None:
         """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
 
@@ -148,15 +150,15 @@ class ViewSamples:
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
-def joined_views(first: ViewSamples, second: ViewSamples) -> ViewSamples:
-    """Return the samples of two sources as one.
+def joined_sources(first: Any, second: Any) -> Any:
+    """Return the samples of two sources of one kind, images, signals or features, as one source.
 
-    Raises: InputError where their images differ in size.
+    Raises: InputError where their samples differ in size.
     """
     if first.size != second.size:
-        raise InputError(f"views: image sizes {first.size} and {second.size}, expected one size")
+        raise InputError(f"samples: sizes {first.size} and {second.size}, expected one size")
     found = copy.copy(first)
-    found.images = np.concatenate([first.images, second.images])
+    setattr(found, first.HELD, np.concatenate([getattr(first, first.HELD), getattr(second, first.HELD)]))
     found.facts = joined([first.facts, second.facts])
     return found
 

@@ -7,7 +7,6 @@ A cache file (.npz) holds, for the samples of one shard in its order,
 `SlowTimeSamples` answers the same calls as `ViewSamples`.
 """
 
-import copy
 import sys
 from pathlib import Path
 
@@ -72,6 +71,8 @@ def cache_shard(index: str | Path, name: str, out: str | Path, source: Noisy | N
 class SlowTimeSamples:
     """Signals or features held in memory, read from cache files; some stations, groups and folds only."""
 
+    HELD = "values"
+
     def __init__(self, paths: list[str | Path], kind: str, stations: list[int], folds: set[tuple[str, str]]) -> None:
         """paths: cache files; kind: "signals" or "features"; stations: numbers to keep; folds: (group, fold) pairs.
 
@@ -98,19 +99,6 @@ class SlowTimeSamples:
     def sha256(self) -> str:
         """Return the SHA-256 of all that a training sees of these samples."""
         return fingerprint(self.facts, np.ascontiguousarray(self.values).view(np.uint8).data)
-
-
-def joined_signals(first: SlowTimeSamples, second: SlowTimeSamples) -> SlowTimeSamples:
-    """Return the signals or features (samples, stations, size) of two sources as one source.
-
-    Raises: InputError where their lengths differ.
-    """
-    if first.size != second.size:
-        raise InputError(f"signals: lengths {first.size} and {second.size}, expected one length")
-    found = copy.copy(first)
-    found.values = np.concatenate([first.values, second.values])
-    found.facts = joined([first.facts, second.facts])
-    return found
 
 
 def _load(path: Path, kind: str, stations: list[int], folds: set) -> tuple[np.ndarray, Facts] | None:

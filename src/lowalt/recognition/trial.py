@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.common.command import parser, pick, run
 from lowalt.recognition import choose, runs
 from lowalt.recognition.extra import opened, with_extra
-from lowalt.recognition.samples import ViewSamples, joined_views
+from lowalt.recognition.samples import ViewSamples, joined_sources
 from lowalt.recognition.schemes import TABLE, Scheme, named, refuse_cues
 from lowalt.recognition.sources import of_size
 
@@ -53,7 +53,7 @@ def trial(
     given = {"train": parts["train"], "validation": parts["validation"]}
     block |= {"seed": seed, "colour_map": colour_map, "classes": classes}
     runs.train(given, scheme, f"without fold {fold}", block, out)
-    asked = joined_views(parts["held"], parts["validation"])
+    asked = joined_sources(parts["held"], parts["validation"])
     about = {"candidate": name, "fold": fold, "held": held}
     runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
 
