@@ -12,7 +12,8 @@ from PIL import Image
 from lowalt.common.errors import InputError
 from lowalt.tiles import colour_map, decode, encode, paint
 from lowalt.tiles.filters import apply_paeth, undo
-from lowalt.tiles.huffman import MATCH_BITS, MATCH_EXTRA, MATCH_SYMBOL, code_lengths, zlib_compress
+from lowalt.tiles.huffman import MATCH_BITS, MATCH_EXTRA, MATCH_SYMBOL, zlib_compress
+from lowalt.tiles.huffman_code import code_lengths
 
 BYTES = [
     np.zeros(0, np.uint8),

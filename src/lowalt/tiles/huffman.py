@@ -9,11 +9,12 @@ import struct
 
 import deflate
 import numpy as np
-from numba import njit
+
+from lowalt.common.jit import PLAIN
+from lowalt.tiles.huffman_code import LONGEST, canonical_codes, code_lengths
 
 END = 256
 SYMBOLS = 286
-LONGEST = 15
 WORD = 8
 # A shorter run of zeros is cheaper as literals, each of which costs about a bit where zeros are that common.
 RUN_WORDS = 3
@@ -38,65 +39,7 @@ MATCH_SYMBOL, MATCH_EXTRA, MATCH_BITS = _lengths_of_matches()
 CODE_ORDER = np.array([16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15])
 
 
-@njit(cache=True)
-def code_lengths(counts, longest):
-    """Lengths of a Huffman code for `counts`, at most `longest` bits, 0 for symbols that do not occur.
-
-    Ties go to the lower symbol. Where the best code is too long, counts are halved until it fits.
-    """
-    size = counts.size
-    weights = counts.copy()
-    result = np.zeros(size, np.int64)
-    while True:
-        used = np.flatnonzero(weights)
-        if used.size < 2:
-            result[used] = 1
-            return result
-        order = used[np.argsort(weights[used], kind="mergesort")]
-        nodes = order.size
-        weight = np.zeros(2 * nodes, np.int64)
-        parent = np.zeros(2 * nodes, np.int64)
-        weight[:nodes] = weights[order]
-        leaf, inner = 0, nodes
-        for new in range(nodes, 2 * nodes - 1):
-            for _ in range(2):
-                # Two queues in rising order: leaves, and inner nodes as they are made.
-                if leaf < nodes and (inner >= new or weight[leaf] <= weight[inner]):
-                    child = leaf
-                    leaf += 1
-                else:
-                    child = inner
-                    inner += 1
-                weight[new] += weight[child]
-                parent[child] = new
-        depth = np.zeros(2 * nodes, np.int64)
-        for node in range(2 * nodes - 3, -1, -1):
-            depth[node] = depth[parent[node]] + 1
-        if depth[:nodes].max() <= longest:
-            result[order] = depth[:nodes]
-            return result
-        for symbol in used:
-            weights[symbol] = weights[symbol] // 2 + 1
-
-
-@njit(cache=True)
-def canonical_codes(lengths):
-    """Codes of these lengths by RFC 1951, section 3.2.2, bits already turned round for writing."""
-    codes = np.zeros(lengths.size, np.uint64)
-    code = 0
-    for length in range(1, LONGEST + 1):
-        for symbol in range(lengths.size):
-            if lengths[symbol] == length:
-                turned = 0
-                for bit in range(length):
-                    turned |= ((code >> bit) & 1) << (length - 1 - bit)
-                codes[symbol] = turned
-                code += 1
-        code <<= 1
-    return codes
-
-
-@njit(cache=True)
+@PLAIN
 def _zero_words(words, start):
     """Number of zero words in a row from `start`."""
     end = start
@@ -105,7 +48,7 @@ def _zero_words(words, start):
     return end - start
 
 
-@njit(cache=True)
+@PLAIN
 def _count(data, words):
     """How often each symbol occurs, (286,)."""
     # Four tables, since equal neighbours would wait for each other's count.
@@ -134,10 +77,12 @@ def _count(data, words):
     for byte in range(words.size * WORD, data.size):
         tables[0, data[byte]] += 1
     tables[0, END] += 1
-    return tables.sum(axis=0)
+    for symbol in range(SYMBOLS):
+        tables[0, symbol] += tables[1, symbol] + tables[2, symbol] + tables[3, symbol]
+    return tables[0]
 
 
-@njit(cache=True)
+@PLAIN
 def _put(out, state, code, length):
     """Append `length` bits, at most 60, without a branch; state: word being filled, bits in it, its number."""
     word, bits = state[0], state[1]
@@ -150,7 +95,7 @@ def _put(out, state, code, length):
     state[2] += ends
 
 
-@njit(cache=True)
+@PLAIN
 def _put_words(data, table, first, last, out, state):
     """Append the codes of the bytes of words first .. last - 1, four bytes at a time (at most 60 bits)."""
     low, shift, six, one, full = U64(0x7FFF), U64(16), U64(6), U64(1), U64(63)
@@ -171,16 +116,16 @@ def _put_words(data, table, first, last, out, state):
     state[0], state[1], state[2] = word, bits, number
 
 
-@njit(cache=True)
+@PLAIN
 def _put_symbol(out, state, table, symbol):
     """Append the code of one symbol."""
     _put(out, state, table[symbol] & U64(0x7FFF), table[symbol] >> U64(16))
 
 
-@njit(cache=True)
+@PLAIN
 def _put_run(out, state, table, run):
     """Append `run` words of zeros: one literal, then matches at distance 1 and what is left of them."""
-    _put_symbol(out, state, table, 0)
+    _put_symbol(out, state, table, np.int64(0))
     left = run * WORD - 1
     while left >= 3:
         step = min(left, 258)
@@ -189,26 +134,31 @@ def _put_run(out, state, table, run):
         _put(out, state, U64(MATCH_EXTRA[step]), U64(MATCH_BITS[step] + 1))
         left -= step
     for _ in range(left):
-        _put_symbol(out, state, table, 0)
+        _put_symbol(out, state, table, np.int64(0))
 
 
-@njit(cache=True)
+@PLAIN
 def _table(counts, longest):
     """Code and length of every symbol in one number: code | length << 16."""
     lengths = code_lengths(counts, longest)
     codes = canonical_codes(lengths)
-    return codes | lengths.astype(np.uint64) << U64(16)
+    for symbol in range(codes.size):
+        codes[symbol] |= U64(lengths[symbol]) << U64(16)
+    return codes
 
 
-@njit(cache=True)
+@PLAIN
 def _encode(data, words, counts, order, out):
     """Write one final block with its own Huffman code to `out` (uint64); return its size in bytes."""
-    table = _table(counts, LONGEST)
-    lengths = np.append(table >> U64(16), U64(1))
+    table = _table(counts, np.int64(LONGEST))
+    # The one distance code comes last, one bit long.
+    lengths = np.ones(SYMBOLS + 1, np.int64)
     header = np.zeros(19, np.int64)
-    for length in lengths:
-        header[length] += 1
-    header_table = _table(header, 7)
+    header[1] = 1
+    for symbol in range(SYMBOLS):
+        lengths[symbol] = table[symbol] >> U64(16)
+        header[lengths[symbol]] += 1
+    header_table = _table(header, np.int64(7))
     state = np.zeros(3, np.uint64)
     # Final block, dynamic code, 286 literal and length codes, one distance code, 19 lengths of the header's code.
     for value, width in ((1, 1), (2, 2), (SYMBOLS - 257, 5), (0, 5), (15, 4)):
@@ -217,7 +167,8 @@ def _encode(data, words, counts, order, out):
         _put(out, state, header_table[symbol] >> U64(16), U64(3))
     for length in lengths:
         _put_symbol(out, state, header_table, length)
-    place, pending = 0, 0
+    # As typed numbers: a function that is given a plain 0 is compiled once more for it.
+    place, pending = np.int64(0), np.int64(0)
     while place < words.size:
         if words[place] == 0:
             run = _zero_words(words, place)
@@ -230,8 +181,8 @@ def _encode(data, words, counts, order, out):
         place += 1
     _put_words(data, table, pending, place, out, state)
     for byte in range(words.size * WORD, data.size):
-        _put_symbol(out, state, table, data[byte])
-    _put_symbol(out, state, table, END)
+        _put_symbol(out, state, table, np.int64(data[byte]))
+    _put_symbol(out, state, table, np.int64(END))
     out[state[2]] = state[0]
     return state[2] * U64(8) + (state[1] + U64(7)) // U64(8)
 

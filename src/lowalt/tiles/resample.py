@@ -103,7 +103,10 @@ def _resize(images, source, weights, columns, shares, out):
     values = np.empty(out.shape[1:], np.float32)
     plain = np.empty(images.shape[1:], np.float32)
     for n in range(len(images)):
-        plain[:] = images[n]
+        # In loops: assigning a whole array takes as long to compile as all the rest of the stage.
+        for j in range(plain.shape[0]):
+            for c in range(plain.shape[1]):
+                plain[j, c] = images[n, j, c]
         across_rows(plain, source, weights, between)
         along_rows(between, columns, shares, values)
         for j in range(values.shape[0]):

@@ -76,8 +76,8 @@ def sum_points(scene, lay, radar, q, n, r, geometry, placing, degrees, plan, blo
             vector_loops.near_geometry(offsets, geometry, plan.functions.excess, plan.functions.inverse, size, strip)
         else:
             vector_loops.geometry(offsets, geometry, size, strip)
-        vector_loops.horner(strip.psi, work.typed, 0, degrees[0], strip.gain_h, size)
-        vector_loops.horner(strip.omega, work.typed, 1, degrees[1], strip.gain_v, size)
+        vector_loops.horner(strip.psi, work.typed, np.int64(0), degrees[0], strip.gain_h, size)
+        vector_loops.horner(strip.omega, work.typed, np.int64(1), degrees[1], strip.gain_v, size)
         a, b = add_amplitudes(strip, work.share, point, plan.functions, size)
         total += a
         second += b

@@ -40,10 +40,10 @@ def fit_gains(segment, aims, gains, error, unit, fold, work):
     """
     centre_h, centre_v = segment[PSI_CENTRE] - aims[0], segment[OMEGA_CENTRE] - aims[1]
     degree_h, bound_h = fit_gain(
-        gains.weights_h, gains.rates_h, centre_h, segment[PSI_HALF], error, unit, fold, work, 0
+        gains.weights_h, gains.rates_h, centre_h, segment[PSI_HALF], error, unit, fold, work, np.int64(0)
     )
     degree_v, bound_v = fit_gain(
-        gains.weights_v, gains.rates_v, centre_v, segment[OMEGA_HALF], error, unit, fold, work, 1
+        gains.weights_v, gains.rates_v, centre_v, segment[OMEGA_HALF], error, unit, fold, work, np.int64(1)
     )
     return degree_h, degree_v, bound_h + bound_v + bound_h * bound_v
 
