@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lowalt.effects import gain_times, interpolation, time_series, waveform
+from lowalt.effects import gain_times, interpolation, lit_points, time_series, waveform
 from lowalt.effects.gain_times import Instant
 from lowalt.effects.near_field import SYMBOLS
 from lowalt.effects.response import ImagePath
@@ -98,8 +98,8 @@ def _in_orders(
     within = within or Within([(0, None)], np.zeros(1), 0.0)
     count = len(within.order)
     found: list[list[time_series.Moments]] = [[[]] * count for _ in groups]
-    first, paired = None, []
-    for (number, _), rays in zip(within.order, _rays(echo, view, held, on, within), strict=True):
+    first, paired, lit = None, [], lit_points.lit(factor)
+    for (number, _), rays in zip(within.order, _rays(echo, view, held, on, within, lit), strict=True):
         if first is None:
             first, paired = rays, [rays.paired(strength) for _, strength, _ in groups]
         for mine, own in zip(found, paired, strict=True):
@@ -145,11 +145,13 @@ def _groups(
 
 
 def _rays(
-    echo: TargetEcho, view: View, held: Sequence[ImagePath], on: frozenset[str], within: Within
-) -> Iterator[Steered]:
+    echo: TargetEcho, view: View, held: Sequence[ImagePath], on: frozenset[str], within: Within,
+    lit: np.ndarray | None = None,
+) -> Iterator[Steered]:  # fmt: skip
     """Yield the one-way factors at each instant of `within`, in its order.
 
-    held: all paths but the direct one. Visibility and reflection coefficients stay during a symbol; only places move.
+    held: all paths but the direct one; lit: as in `Steered`. Visibility and reflection coefficients stay during a
+    symbol; only places move.
     """
     kept: dict = {}
     asked = {"squint": "squint" in on, "wavefront": "wavefront" in on, "error": echo.error, "kept": kept}
@@ -162,7 +164,7 @@ def _rays(
         paths = held
         if held and later is not view:
             paths = echo.moved(later, held)
-        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant)
+        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant, lit=lit)
         if span is not None:
             first = first or rays
         yield rays

@@ -8,6 +8,7 @@ import numpy as np
 from lowalt.common.network import Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
+from lowalt.effects import lit_points
 from lowalt.effects.gain_times import Instant
 from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
@@ -18,7 +19,7 @@ def echo(view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float
 
     Where beams are turned, the arrays' weights keep the phase of the arrays' middles.
     """
-    return Steered(view, paths, **asked).echo(factor)
+    return Steered(view, paths, **asked, lit=lit_points.lit(factor)).echo(factor)
 
 
 class SameSymbols(NamedTuple):
@@ -34,20 +35,24 @@ class Steered:
     def __init__(
         self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
         error: float = 1e-14, kept: dict | None = None, like: "Steered | None" = None, span: SameSymbols | None = None,
-        instant: Instant | None = None,
+        instant: Instant | None = None, lit: np.ndarray | None = None,
     ):  # fmt: skip
         """Prepare the factors; kept, like and instant: as in `response.OneWayFactors`, for every beam.
 
-        span: of the symbols, where the view is one of several instants in them.
+        span: of the symbols, where the view is one of several instants in them; lit: the only points (N, W) of each
+        symbol that have any strength (`lit_points.lit`), None for all.
         """
-        self.view = view
+        self.view, self.lit = view, lit
+        places = view.places
+        if lit is not None:
+            places, paths = lit_points.places_at(places, lit), [lit_points.path_at(path, lit) for path in paths]
         asked = {"squint": squint, "wavefront": wavefront, "error": error, "instant": instant}
         asked["farther_m"] = 0.0 if span is None else span.farther_m
         given, self.steady = (view.network, view.station), not view.turning
         if self.steady:
             out, back = view.aims_m
             asked["like"] = None if like is None else like.beams[0][2]
-            rays = OneWayFactors(*given, view.places, back, paths, sender_aim_m=out, kept=kept, **asked)
+            rays = OneWayFactors(*given, places, back, paths, sender_aim_m=out, kept=kept, **asked)
             self.beams = [(slice(None), 1.0, rays)]
             return
         self.beams = []
@@ -56,7 +61,7 @@ class Steered:
             own = None if kept is None else kept.setdefault(number, {})
             asked["like"] = None if like is None else like.beams[place][2]
             rays = OneWayFactors(
-                *given, view.places[rows], aims[1], some, sender_aim_m=aims[0], kept=own, **asked
+                *given, places[rows], aims[1], some, sender_aim_m=aims[0], kept=own, **asked
             )  # fmt: skip
             self.beams.append((rows, _kept_phase(view, aims), rays))
 
@@ -73,6 +78,9 @@ class Steered:
         They serve all instants of the same symbols.
         """
         roots = np.sqrt(self.view.cloud.rcs_m2)
+        if self.lit is not None:
+            roots, factor = roots[self.lit], lit_points.at_points(factor, self.lit)
+            return [rays.paired(rows_of(roots * factor, rows)) for rows, _, rays in self.beams]
         return [rays.paired(roots * rows_of(factor, rows)) for rows, _, rays in self.beams]
 
     def moments(self, paired: list[list[np.ndarray]]) -> list[list[np.ndarray]]:

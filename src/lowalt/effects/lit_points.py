@@ -1,0 +1,86 @@
+"""The points of a target that echo in a symbol at all: one-way factors are computed for them alone.
+
+Surfaces hide half of a target's points or more. A symbol's points with any strength come first, and then as many
+without as fill the table, so that all symbols have equally many.
+"""
+
+import numpy as np
+
+from lowalt.common.jit import LEAN
+from lowalt.effects.moment_loops import BLOCK
+from lowalt.effects.one_way import ImagePath
+
+MOST = 0.85
+"""Largest share of points in any symbol at which gathering them saves time."""
+
+
+@LEAN
+def _sorted(strength, numbers):
+    """Fill numbers (N, L) with points, those with any strength (R, N, L) first; return the most that a symbol has."""
+    routes, symbols, count = strength.shape
+    most = 0
+    for n in range(symbols):
+        first, last = 0, count
+        for l in range(count):  # noqa: E741
+            lit = False
+            for r in range(routes):
+                lit = lit or strength[r, n, l] != 0.0
+            if lit:
+                numbers[n, first] = l
+                first += 1
+            else:
+                last -= 1
+                numbers[n, last] = l
+        most = max(most, first)
+    return most
+
+
+@LEAN
+def _gathered(planes, numbers, out):
+    """Fill out (N, K, W) with planes (N, K, L) at each symbol's points `numbers` (N, W)."""
+    for n in range(len(out)):
+        for k in range(out.shape[1]):
+            for i in range(out.shape[2]):
+                out[n, k, i] = planes[n, k, numbers[n, i]]
+
+
+def lit(factor: np.ndarray | float) -> np.ndarray | None:
+    """Return the numbers (N, W) int64 of the points of each symbol that echo, W <= L; None where nearly all do.
+
+    factor: on the points' amplitudes, a number, (N or 1, L), or further axes for routes before these, as in
+    `response.response`.
+    """
+    if np.ndim(factor) < 2 or factor.shape[-2] < 2:
+        return None
+    numbers = np.empty(factor.shape[-2:], np.int64)
+    most = _sorted(np.ascontiguousarray(factor, np.float64).reshape(-1, *numbers.shape), numbers)
+    width = max(-(-most // BLOCK) * BLOCK, BLOCK)
+    return np.ascontiguousarray(numbers[:, :width]) if width <= MOST * numbers.shape[1] else None
+
+
+def at_points(values: np.ndarray | complex, numbers: np.ndarray) -> np.ndarray | complex:
+    """Return values (..., N or 1, L) at each symbol's points `numbers` (N, W), (..., N, W).
+
+    A value that all points share stays as it is.
+    """
+    if np.ndim(values) < 2 or values.shape[-1] == 1:
+        return values
+    values = np.broadcast_to(values, (*values.shape[:-2], len(numbers), values.shape[-1]))
+    planes = np.ascontiguousarray(values).reshape(-1, len(numbers), 1, values.shape[-1])
+    out = np.empty((len(planes), len(numbers), 1, numbers.shape[1]), planes.dtype)
+    for one, own in zip(planes, out, strict=True):
+        _gathered(one, numbers, own)
+    return out.reshape(*values.shape[:-1], numbers.shape[1])
+
+
+def places_at(places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+    """Return places (N, L, 3) m of each symbol's points `numbers` (N, W): (N, W, 3), ordered as in `carry`."""
+    out = np.empty((len(numbers), 3, numbers.shape[1]))
+    _gathered(np.ascontiguousarray(places.swapaxes(1, 2)), numbers, out)
+    return out.swapaxes(1, 2)
+
+
+def path_at(path: ImagePath, numbers: np.ndarray) -> ImagePath:
+    """Return a path to each symbol's points `numbers` (N, W) alone."""
+    sender = None if path.sender is None else path_at(path.sender, numbers)
+    return ImagePath(places_at(path.places, numbers), at_points(path.coefficient, numbers), path.station_m, sender)

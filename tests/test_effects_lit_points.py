@@ -1,0 +1,70 @@
+"""Echoes of the points that have any strength alone, held against echoes of all points."""
+
+import numpy as np
+import pytest
+
+from lowalt.effects import lit_points, steering
+from lowalt.effects.catalogue import called
+from lowalt.effects.received import Scene, observe
+from test_effects import network, target
+
+RADIO = network(transmit=(16, 4), receive=(8, 2), symbols=40)
+POINTS = 24
+
+
+@pytest.mark.parametrize("routes", [(), (3,), (2, 2)])
+def test_every_point_with_any_strength_is_listed_once_and_first(routes):
+    rng = np.random.default_rng(1)
+    factor = rng.random((*routes, 40, POINTS)) * (rng.random((*routes, 40, POINTS)) < 0.2)
+    numbers = lit_points.lit(factor[..., :15])
+    wanted = (factor[..., :15] != 0).reshape(-1, 40, 15).any(axis=0)
+    if numbers is None:
+        assert 4 * -(-wanted.sum(axis=1).max() // 4) > 0.85 * 15
+        return
+    for row, mine in zip(numbers, wanted, strict=True):
+        assert len(set(row)) == len(row)
+        assert set(row[: mine.sum()]) == set(np.flatnonzero(mine))
+
+
+@pytest.mark.parametrize("factor", [1.0, np.ones((1, POINTS)), np.ones((40, POINTS)), np.ones((2, 40, POINTS))])
+def test_nothing_is_gathered_where_all_points_echo(factor):
+    assert lit_points.lit(factor) is None
+
+
+def test_one_symbol_of_a_look_decides_how_many_points_are_kept():
+    factor = np.zeros((40, POINTS))
+    assert lit_points.lit(factor).shape == (40, 4)
+    factor[17, :9] = 1.0
+    assert lit_points.lit(factor).shape == (40, 12)
+    factor[3] = 1.0
+    assert lit_points.lit(factor) is None
+
+
+@pytest.mark.parametrize("routes", [(), (2,)])
+@pytest.mark.parametrize("update_s", [None, 0.02])
+@pytest.mark.parametrize("physics", [{}, {"squint": True, "wavefront": True}])
+def test_points_without_strength_change_no_echo(routes, update_s, physics):
+    cloud, row = target(np.random.default_rng(4), points=POINTS)
+    pointing = {} if update_s is None else {"pointing_error": {"sigma_deg": 0.1, "update_s": update_s}}
+    effects = tuple(called({"ground_reflection": {}, **pointing}))
+    station = RADIO.stations[0]
+    view = observe(Scene(RADIO, 5, None, effects), station, cloud, row)
+    assert view.turning == (update_s is not None)
+    ground = next(effect for effect in effects if effect.name == "ground_reflection")
+    paths = ground.module.paths(ground.settings, view)
+    rng = np.random.default_rng(1)
+    factor = rng.random((*routes, 40, POINTS)) * (rng.random((40, POINTS)) < 0.3)
+    assert lit_points.lit(factor).shape[1] < POINTS
+    found = steering.echo(view, paths, factor, **physics)
+    wanted = steering.Steered(view, paths, **physics).echo(factor)
+    np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-12 * abs(wanted).max())
+
+
+def test_a_symbol_in_which_no_point_echoes_is_zero():
+    cloud, row = target(np.random.default_rng(4), points=POINTS)
+    view = observe(Scene(RADIO, 5, None, ()), RADIO.stations[0], cloud, row)
+    factor = np.zeros((40, POINTS))
+    factor[:20, 5] = 1.0
+    found = steering.echo(view, (), factor)
+    assert not found[20:].any()
+    assert found[:20].all()
