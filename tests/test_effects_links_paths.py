@@ -166,17 +166,17 @@ def test_a_point_hidden_from_one_image_echoes_by_the_other_ways():
     below = [np.asarray(end.position_m) * [1, 1, -1] for end in (A, B)]
     path = ImagePath(view.places, 1.0, below[1], ImagePath(view.places, 1.0, below[0]))
 
-    def visible(effect, one):
-        """A factor that says from where a point is seen: 2 from A, 3 from its image, 5 from B and 7 from its image."""
+    def product(effects, one):
+        """A factor that says of the place from which it is seen: 2 at A, 3 at its image, 5 at B, 7 at its image."""
         table = {A.position_m: 2.0, tuple(below[0]): 3.0, B.position_m: 5.0, tuple(below[1]): 7.0}
         ends = [table[tuple(end.station.position_m)] for end in one.ends()]
-        return np.full((len(one.times_s), count), np.sqrt(np.prod(ends)) if len(ends) == 2 else ends[0])
+        return np.full((len(one.times_s), count), np.sqrt(np.prod(ends)) if len(ends) == 2 else ends[0]) ** len(effects)
 
     weighing = called({"occlusion": {}})
-    found = reflected_aspect.routes(settings, view, [path], weighing, visible)
+    found = reflected_aspect.routes(settings, view, [path], weighing, product)
     assert found.shape == (2, 2, len(view.times_s), count)
     assert found[:, :, 0, 0] ** 2 == pytest.approx(np.array([[2 * 5, 2 * 7], [3 * 5, 3 * 7]]))
-    blind = reflected_aspect.routes({"follow": ["fluctuation"]}, view, [path], weighing, visible)
+    blind = reflected_aspect.routes({"follow": ["fluctuation"]}, view, [path], weighing, product)
     assert blind**2 == pytest.approx(10.0)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lowalt.effects.channel import occlusion, shadow_rays, still_rays
+from lowalt.effects.channel.ray_tests import cross
 from lowalt.targets.surfaces import Surface
 from test_effects_occlusion import NETWORK, scene
 
@@ -67,3 +68,9 @@ def test_points_that_are_judged_for_many_symbols_are_hidden_in_all_or_none_of_th
     assert 0.0 < shares[2] < 0.8
     monkeypatch.setattr(shadow_rays, "judged", lambda *values: np.full(given[0].shape, still_rays.OPEN, np.int8))
     assert (found == occlusion.hidden(view)).all()
+
+
+def test_cross_products_are_numpys_to_the_last_bit():
+    rng = np.random.default_rng(3)
+    for a, b in rng.normal(size=(200, 2, 3)):
+        np.testing.assert_array_equal(cross(a, b), np.cross(a, b))

@@ -128,7 +128,7 @@ class SetsCrossSections(Protocol):
 
 @runtime_checkable
 class WeighsPoints(Protocol):
-    """Channel: an effect that changes the points' amplitudes (occlusion, aspect)."""
+    """Channel: an effect on points' amplitudes; optional visible_of(settings, view, dark) skips points dark (N, L)."""
 
     def visible(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         """Return the real factor on every point's two-way amplitude, (N, L) or (N, 1)."""
@@ -140,9 +140,9 @@ class WeighsRoutes(Protocol):
 
     def routes(
         self, settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
-        visible: Callable[[NamedEffect, View], np.ndarray],
+        product: Callable[[Sequence[NamedEffect], View], np.ndarray | float],
     ) -> np.ndarray:  # fmt: skip
-        """Return the factors (R, N, L) on two-way amplitudes by each path; visible: gives that of one of `weighing`."""
+        """Return the factors (R, N, L) on two-way amplitudes by each path; product: that of some of `weighing`."""
 
 
 @runtime_checkable

@@ -1,6 +1,6 @@
 """The echo of one moving target at one station over all paths, as subcarriers or as time samples of each symbol."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -30,13 +30,26 @@ class TargetEcho:
         self.error = EXACT
         self.by_need = {effect.name: effect for effect in providing(channel, BoundsItself)}
         self._seen: dict[str, np.ndarray] = {}
+        self._products: dict[tuple[str, ...], np.ndarray | float] = {}
         self.factor: np.ndarray | float = self.weight(view)
 
     def weight(self, view: View) -> np.ndarray | float:
         """Return the product (N, L) of all factors on the points' amplitudes, as the station of `view` hears them."""
+        return self._product(providing(self.channel, WeighsPoints), view)
+
+    def _product(self, effects: Sequence[NamedEffect], view: View) -> np.ndarray | float:
+        """The product (N, L) of the factors of some effects on the points' amplitudes, seen as in `view`."""
+        names = tuple(effect.name for effect in effects)
+        if view is self.view and names in self._products:
+            return self._products[names]
         result: np.ndarray | float = 1.0
-        for effect in providing(self.channel, WeighsPoints):
-            result = result * self._visible(effect, view)
+        for effect in effects:
+            # A product stays zero whatever the effects after it say of the point.
+            whole = view.station.transmitter is None and np.shape(result) == view.places.shape[:2]
+            dark = result == 0.0 if whole else None
+            result = result * self._visible(effect, view, dark)
+        if view is self.view:
+            self._products[names] = result
         return result
 
     @property
@@ -58,7 +71,7 @@ class TargetEcho:
         if not told or not self.paths:
             return self.factor
         weighing = providing(self.channel, WeighsPoints)
-        return told[0].module.routes(told[0].settings, self.view, self.paths, weighing, self._visible)
+        return told[0].module.routes(told[0].settings, self.view, self.paths, weighing, self._product)
 
     @cached_property
     def direct(self) -> np.ndarray:
@@ -161,8 +174,13 @@ class TargetEcho:
         """The paths over the whole look that carry anything, except the direct one."""
         return [path for path, lit in zip(self._whole, self._lit, strict=True) if lit]
 
-    def _visible(self, effect: NamedEffect, view: View) -> np.ndarray:
-        """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time."""
+    def _visible(self, effect: NamedEffect, view: View, dark: np.ndarray | None = None) -> np.ndarray:
+        """The factor of one effect on the points' amplitudes, seen as in `view`; its draws are the same each time.
+
+        dark: points (N, L) whose factor does not matter, None for no such.
+        """
+        if dark is not None and hasattr(effect.module, "visible_of"):
+            return effect.module.visible_of(effect.settings, view, dark)
         if view is self.view and effect.name in self._seen:
             return self._seen[effect.name]
         if view.station.transmitter is not None and effect.name in BY_END:

@@ -15,6 +15,7 @@ from scipy.special import j1
 from lowalt.common.jit import LEAN
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.effects.kept_by_arrays import KeptByArrays
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
@@ -25,6 +26,9 @@ SOURCE = (
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"strength": 1.0, "power": 1.0, "blades": "facet"}
+
+_FACETS = KeptByArrays()
+"""Points and facets of the blades of each target."""
 
 
 def idle(settings: dict) -> bool:
@@ -105,8 +109,14 @@ def _cosines(normals, places, station, out):
 
 def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:
     """Points (indices) of each rotor with more than one point, and their facets' radius (m)."""
-    found = [np.flatnonzero(cloud.part == part) for part in cloud.parts_of("rotor")]
-    return [(mine, facet_radius_m(cloud.points[mine])) for mine in found if len(mine) > 1]
+    rotors = cloud.parts_of("rotor")
+
+    def facets() -> list[tuple[np.ndarray, float]]:
+        """The same, worked out."""
+        found = [np.flatnonzero(cloud.part == part) for part in rotors]
+        return [(mine, facet_radius_m(cloud.points[mine])) for mine in found if len(mine) > 1]
+
+    return _FACETS.of([cloud.points, cloud.part], facets, *rotors)
 
 
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:

@@ -13,6 +13,7 @@ from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects.channel.capsules import capsules
 from lowalt.effects.channel.shadow_rays import cast_rays
 from lowalt.effects.channel.surface_tree import whole_tree
+from lowalt.effects.kept_by_arrays import KeptByArrays
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
 
@@ -23,6 +24,9 @@ SOURCE = (
 )
 DEFAULTS = {"strength": 1.0, "blades": "bent"}
 
+_BLADES = KeptByArrays()
+"""Widths and radii of the blades of each target."""
+
 
 def idle(settings: dict) -> bool:
     """Return whether hidden points echo as if nothing were before them."""
@@ -31,6 +35,13 @@ def idle(settings: dict) -> bool:
 
 def blades_m(cloud: Cloud, surfaces: dict) -> dict[int, tuple[float, float]]:
     """Return each rotor's mean blade width and its radius (m), by part: one side's area over its diameter."""
+    arrays = [surfaces[name] for name in ("vertices", "vertex_part", "faces", "closed")]
+    rotors = cloud.parts_of("rotor")
+    return _BLADES.of([*arrays, cloud.hinges, cloud.axes], lambda: _measured_blades(cloud, surfaces), *rotors)
+
+
+def _measured_blades(cloud: Cloud, surfaces: dict) -> dict[int, tuple[float, float]]:
+    """The result of `blades_m`, worked out."""
     corners = surfaces["vertices"][surfaces["faces"]]
     area = 0.5 * np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     part = surfaces["vertex_part"][surfaces["faces"][:, 0]]
@@ -110,15 +121,23 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
     a station at its end has: a point hidden from either end by opaque surfaces does not echo.
     Raises: InputError where the target's surfaces are not given or are another target's.
     """
+    return visible_of(settings, view, None)
+
+
+def visible_of(settings: dict, view: View, dark: np.ndarray | None) -> np.ndarray:
+    """Return the factor (N, L) of `visible`; of points that are `dark` (N, L) without it, as if surfaces hid them.
+
+    No ray is cast for dark points. dark: None for no such points; raises as `visible`.
+    """
     ends = view.ends()
     if len(ends) == 2:
-        out, back = (visible(settings, end) for end in ends)
+        out, back = (visible_of(settings, end, dark) for end in ends)
         return np.sqrt(out * back)
     if settings["blades"] == "opaque" or view.nodes or not view.cloud.parts_of("rotor"):
-        return 1.0 - settings["strength"] * hidden(view)
+        return 1.0 - settings["strength"] * hidden(view, known=dark)
     if settings["blades"] == "bent":
-        rest = hidden(view, "rest")
+        rest = hidden(view, "rest", dark)
         lost = np.where(rest, 1.0, (1.0 - through_blades(view)) * hidden(view, "blades", rest))
     else:
-        lost = hidden(view, "rest")
+        lost = hidden(view, "rest", dark)
     return 1.0 - settings["strength"] * lost

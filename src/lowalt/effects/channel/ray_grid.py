@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
+from lowalt.effects.channel.ray_tests import cross
 from lowalt.effects.channel.surface_tree import Tree
 
 SYMBOLS = 64
@@ -169,9 +170,9 @@ def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> R
         ahead = some[len(some) // 2]
         far[k] = np.linalg.norm(ahead)
         way[k] = np.linalg.norm(some - ahead, axis=1).max()
-        right = np.cross(ahead, np.eye(3)[abs(ahead).argmin()])
+        right = cross(ahead, np.eye(3)[abs(ahead).argmin()])
         right /= np.linalg.norm(right)
-        axes[k] = ahead / far[k], right, np.cross(ahead / far[k], right)
+        axes[k] = ahead / far[k], right, cross(ahead / far[k], right)
     way[far < NEAREST * (radius_m + way)] = -1.0
     grid = RayGrid(
         axes, middle, radius_m, far, way, np.empty((count, 2)), np.empty((count, 2)), cells, symbols,

@@ -47,28 +47,28 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 def routes(
     settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
-    visible: Callable[[NamedEffect, View], np.ndarray],
+    product: Callable[[Sequence[NamedEffect], View], np.ndarray | float],
 ) -> np.ndarray:  # fmt: skip
     """Return the factors (R, N, L) on two-way amplitudes, there and back by the direct path and each of `paths`.
 
     Of a link (R, R, N, L), by the path of its sender and that of its receiver.
     """
     if view.station.transmitter is not None:
-        return between(settings, view, paths, weighing, visible)
-    shape = view.places.shape[:2]
-    own = {effect.name: visible(effect, view) for effect in weighing}
-    result = np.ones((1 + len(paths), *shape))
+        return between(settings, view, paths, weighing, product)
+    following = [effect for effect in weighing if effect.name in settings["follow"]]
+    others = [effect for effect in weighing if effect not in following]
+    result = np.empty((1 + len(paths), *view.places.shape[:2]))
     for number, path in enumerate((None, *paths)):
-        mirrored = None if path is None or path.station_m is None else view.seen_from(path.station_m)
-        for effect in weighing:
-            follows = mirrored is not None and effect.name in settings["follow"]
-            result[number] *= visible(effect, mirrored) if follows else own[effect.name]
+        if path is None or path.station_m is None:
+            result[number] = product(weighing, view)
+        else:
+            result[number] = product(others, view) * product(following, view.seen_from(path.station_m))
     return result
 
 
 def between(
     settings: dict, view: View, paths: Sequence[ImagePath], weighing: Sequence[NamedEffect],
-    visible: Callable[[NamedEffect, View], np.ndarray],
+    product: Callable[[Sequence[NamedEffect], View], np.ndarray | float],
 ) -> np.ndarray:  # fmt: skip
     """Return the factors (R, R, N, L) on a link's amplitudes, by the path of its sender and that of its receiver.
 
@@ -78,12 +78,12 @@ def between(
     result = np.ones((1 + len(paths), 1 + len(paths), *view.places.shape[:2]))
     senders = [path.sender or path for path in paths]
     for effect in weighing:
-        own = visible(effect, view)
+        own = product([effect], view)
         if effect.name not in settings["follow"]:
             result *= own
             continue
         out, back = (
-            [visible(effect, end if place is None else end.seen_from(place)) for place in (None, *images)]
+            [product([effect], end if place is None else end.seen_from(place)) for place in (None, *images)]
             for end, images in zip(
                 view.ends(), ([path.station_m for path in some] for some in (senders, paths)), strict=True
             )
@@ -94,5 +94,5 @@ def between(
             elif a == 0 or paths[a - 1].station_m is None:
                 result[a, b] *= own
             else:
-                result[a, b] *= visible(effect, view.seen_from(paths[a - 1].station_m, senders[a - 1].station_m))
+                result[a, b] *= product([effect], view.seen_from(paths[a - 1].station_m, senders[a - 1].station_m))
     return result

@@ -5,12 +5,12 @@ next, up to one node a part. Nodes stand in depth-first order: a node's contents
 after them. Source: Morton, A Computer Oriented Geodetic Data Base, IBM 1966, for the curve.
 """
 
-import weakref
 from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.common.jit import kernel
+from lowalt.effects.kept_by_arrays import KeptByArrays
 
 LOOPS = kernel(error_model="numpy")
 
@@ -88,19 +88,14 @@ def fill(low, high, begin, end, node, centre, half, radius_m, skip, face):
     return start[leaves]
 
 
-_TREES: dict[tuple[int, ...], tuple[list[weakref.ref], Tree]] = {}
-"""Trees of all triangles of a target, with the arrays they are of, by these arrays' identities."""
+_TREES = KeptByArrays()
+"""Trees of all triangles of a target."""
 
 
 def whole_tree(surfaces: dict) -> Tree:
     """Return the tree of all triangles of a target's surfaces, made once as long as their arrays live."""
     arrays = [surfaces[name] for name in ("vertices", "vertex_part", "faces", "closed")]
-    key = tuple(map(id, arrays))
-    held, found = _TREES.get(key, ([], None))
-    if found is None or any(reference() is not array for reference, array in zip(held, arrays, strict=True)):
-        found = tree(surfaces, surfaces["faces"])
-        _TREES[key] = [weakref.ref(array, lambda _: _TREES.pop(key, None)) for array in arrays], found
-    return found
+    return _TREES.of(arrays, lambda: tree(surfaces, surfaces["faces"]))
 
 
 def tree(surfaces: dict, faces: np.ndarray) -> Tree:

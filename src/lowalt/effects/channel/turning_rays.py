@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from lowalt.common.jit import INLINED, LEAN
-from lowalt.effects.channel.ray_tests import first_hit
+from lowalt.effects.channel.ray_tests import cross, first_hit
 from lowalt.effects.channel.surface_tree import Tree
 
 BINS = 96
@@ -166,11 +166,11 @@ def cast(
     done = np.zeros(len(points), np.bool_)
     for p in parts:
         along = axes[p] / np.linalg.norm(axes[p])
-        right = np.cross(along, np.eye(3)[abs(along).argmin()])
+        right = cross(along, np.eye(3)[abs(along).argmin()])
         right /= np.linalg.norm(right)
         count = int(tree.count[p])
         _cast(
-            np.ascontiguousarray(station[:, p]), np.stack([along, right, np.cross(along, right)]), p, points, part,
+            np.ascontiguousarray(station[:, p]), np.stack([along, right, cross(along, right)]), p, points, part,
             toward, vertices, tree, np.empty(BINS + 1, np.int64), np.empty(ROOM * count + BINS, np.int64),
             np.empty((count, 2), np.int64), np.empty((3, 3)), done, found,
         )  # fmt: skip
