@@ -9,7 +9,7 @@ import pytest
 
 import lowalt
 from forks import printed
-from lowalt.common.jit import _DigestCache, digest
+from lowalt.common.jit import INNER, LEAN, _DigestCache, digest
 from lowalt.echo.fast.driver import run
 from lowalt.effects.response_loops import one_way
 
@@ -72,6 +72,21 @@ def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
     for compiled in (run, one_way):
         key = compiled._cache._index_key(("signature",), Codegen())
         assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key
+
+
+def test_a_kernel_without_an_entry_for_python_refuses_a_call_and_serves_kernels():
+    """Without the refusal numba would jump to address 0, which ends the process."""
+    inner = INNER(times_three)
+    outer = LEAN(lambda x: inner(x) + 1.0)
+    assert outer(2.0) == 7.0
+    with pytest.raises(TypeError, match="times_three has no entry for Python"):
+        inner(2.0)
+    # Kept code without the entry is not taken for code with one.
+    assert LEAN(times_three)(2.0) == 6.0
+
+
+def times_three(x):
+    return 3.0 * x
 
 
 def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):

@@ -14,6 +14,7 @@ from test_echo import cloud_in_motion, network
 from test_echo_hard import CASES
 
 sine_cosine, dirichlet = LEAN(sines.sine_cosine.py_func), LEAN(sines.dirichlet.py_func)
+to_odd = LEAN(nearest.to_odd.py_func)
 
 
 def exact(pair) -> mpmath.mpf:
@@ -111,7 +112,7 @@ def test_a_value_is_computed_again_only_where_its_bound_leaves_the_nearest_singl
 
 
 def test_a_sum_of_two_doubles_rounds_once():
-    to_odd, bits = LEAN(nearest.to_odd.py_func), np.empty(1, np.int64)
+    bits = np.empty(1, np.int64)
     rng = np.random.default_rng(4)
     singles = rng.normal(size=50).astype(np.float32)
     for single in (*singles, np.float32(1e-42)):
@@ -140,7 +141,7 @@ def units(scene, lay, radio, found, n, work) -> tuple[float, float]:
     quick = complex(*double.cell_value(scene, lay, radio, n, found.cells[n], work))
     real, imag = sums.cell_value(scene, lay, radio, n, found.cells[n], work)
     away = abs(complex((real[0] - quick.real) + real[1], (imag[0] - quick.imag) + imag[1])) / found.totals[n]
-    return away / double.share(len(lay.root)), away * 2.0**53
+    return away / double.share.py_func(len(lay.root)), away * 2.0**53
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -186,7 +187,6 @@ def test_sums_in_double_decide_most_and_never_another_value():
     work, bits, every = np.empty((sums.ROWS, len(lay.root) + 4)), np.empty(1, np.int64), np.arange(200)
     twice, still = nearest.compute_again(scene, lay, radio, every, found, work, bits)
     assert 0 < twice < 20 and still == 0
-    to_odd = LEAN(nearest.to_odd.py_func)
     for n in every:
         real, imag = sums.cell_value(scene, lay, radio, n, found.cells[n], work)
         stored = complex(to_odd(*real, bits), to_odd(*imag, bits))
@@ -195,7 +195,7 @@ def test_sums_in_double_decide_most_and_never_another_value():
 
 def test_a_sum_that_is_a_double_and_one_whose_last_bit_is_one_stay():
     bits = np.zeros(1, np.int64)
-    assert nearest.to_odd(2.0, 0.0, bits) == 2.0 and nearest.to_odd(0.0, 1e-300, bits) == 0.0
-    assert nearest.to_odd(2.0, 1e-30, bits) == np.nextafter(2.0, 3) and nearest.to_odd(2.0, -1e-30, bits) < 2.0
+    assert to_odd(2.0, 0.0, bits) == 2.0 and to_odd(0.0, 1e-300, bits) == 0.0
+    assert to_odd(2.0, 1e-30, bits) == np.nextafter(2.0, 3) and to_odd(2.0, -1e-30, bits) < 2.0
     odd = np.nextafter(2.0, 3)
-    assert nearest.to_odd(odd, 1e-30, bits) == odd == nearest.to_odd(odd, -1e-30, bits)
+    assert to_odd(odd, 1e-30, bits) == odd == to_odd(odd, -1e-30, bits)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
+from lowalt.common.jit import LEAN
 from lowalt.echo import Path, Rigid, echo_signal, method_text
 from lowalt.echo.fast import driver
 from lowalt.echo.radar import radar
@@ -139,7 +140,7 @@ def test_moments_move_with_the_place_they_are_about():
     z, v, away, turned = rng.normal(size=9) + 1j * rng.normal(size=9), rng.uniform(-1, 1, 9), -0.3, 0.2
     old = z @ v[:, None] ** np.arange(8)
     found = np.ones((2, 8))
-    driver.add_slow(np.stack([old.real, old.imag]), turned, away, 3.0, found)
+    LEAN(driver.add_slow.py_func)(np.stack([old.real, old.imag]), turned, away, 3.0, found)
     truth = 3 * np.exp(-2j * np.pi * turned) * z @ (v[:, None] + away) ** np.arange(8)
     assert abs(found[0] + 1j * found[1] - (1 + 1j) - truth).max() < 1e-13
     assert abs(truth[2] - 3 * np.exp(-2j * np.pi * turned) * sum(

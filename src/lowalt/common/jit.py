@@ -11,11 +11,13 @@ import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
+from numba.core.registry import CPUDispatcher
 from numba.core.runtime import rtsys
 
 from lowalt.common.turns import Turn
@@ -88,6 +90,8 @@ class _DigestCache(FunctionCache):
 
     counted = True
     """Whether the function may use counted references, and so allocate."""
+    inner = False
+    """Whether the function has no entry for Python."""
 
     def __init__(self, function):
         super().__init__(function)
@@ -95,8 +99,9 @@ class _DigestCache(FunctionCache):
         self._turn = Turn(Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock")
 
     def _index_key(self, sig, codegen):
-        """Numba's key, the digest of the code, and the fields of named tuples among the arguments."""
-        return (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
+        """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""
+        key = (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
+        return (*key, "inner") if self.inner else key
 
     def load_overload(self, sig, target_context):
         """Return finished machine code for a signature, or None where this process must compile it.
@@ -137,14 +142,29 @@ class _DigestCache(FunctionCache):
         return None
 
 
-def kernel(**options) -> Callable:
-    """Return a decorator like `numba.njit(**options)` whose on-disk cache follows everything that is compiled."""
+class _Inner(CPUDispatcher):
+    """A kernel that only kernels call: it is compiled without an entry for Python."""
+
+    def __call__(self, *_arguments, **_named):
+        """Raise TypeError: without this, numba would jump to an entry that is not there."""
+        raise TypeError(f"{self.py_func.__qualname__} has no entry for Python, only kernels call it")
+
+
+def kernel(inner: bool = False, **options) -> Callable:
+    """Return a decorator like `numba.njit(**options)` whose on-disk cache follows everything that is compiled.
+
+    inner: only kernels call the function. Calling it from Python raises TypeError.
+    """
+    # Entries for Python and for C take a fifth of all compilation. No kernel is ever handed to C.
+    options |= {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
 
     def wrap(function: Callable) -> Callable:
         """Compile a function and give it a cache of this module."""
         compiled = njit(**options)(function)
         compiled._cache = _DigestCache(function)
         compiled._cache.counted = options.get("_nrt", True)
+        if inner:
+            compiled.__class__, compiled._cache.inner = _Inner, True
         return compiled
 
     return wrap
@@ -152,9 +172,15 @@ def kernel(**options) -> Callable:
 
 PLAIN = kernel()
 """Every operation is done as written."""
-LEAN = kernel(error_model="numpy", _nrt=False)
+_LEAN: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
+LEAN = kernel(**_LEAN)
 """As PLAIN, but without counted references, which took a quarter of the time. Such a function cannot allocate."""
-INLINED = kernel(error_model="numpy", _nrt=False, forceinline=True)
-"""As LEAN, and copied into its callers, so that named tuples of arrays are not copied at each call."""
-VECTOR = kernel(error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"})
+INNER = kernel(inner=True, **_LEAN)
+"""As LEAN, for functions that only kernels call."""
+INLINED = kernel(inner=True, forceinline=True, **_LEAN)
+"""As INNER, and copied into its callers, so that named tuples of arrays are not copied at each call."""
+_REORDERED = {"contract", "reassoc", "nsz"}
+VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""
+INNER_VECTOR = kernel(inner=True, fastmath=_REORDERED, **_LEAN)
+"""As VECTOR, for functions that only kernels call."""

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.common.jit import VECTOR
+from lowalt.common.jit import INNER_VECTOR, VECTOR
 from lowalt.echo.fast.vector_loops import horner
 
 STRIP = 256
@@ -48,7 +48,7 @@ def halvings(largest: float) -> int:
     return max(0, math.ceil(math.log2(max(largest, 1e-300) / STRETCH)))
 
 
-@VECTOR
+@INNER_VECTOR
 def arctangent(below, above, square, turn, angle, size):
     """Fill angle[:size] with the arctangent of below / above, both at least 0; zero where both are 0."""
     for i in range(size):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import LEAN, VECTOR
+from lowalt.common.jit import INNER, INNER_VECTOR, LEAN
 
 MOST = 8
 """Range cells of a symbol that are worked out one by one; a transform gives all cells in the time of about as many."""
@@ -12,7 +12,7 @@ ROOM = 1e-7
 """Share of a symbol's magnitude added to the bound on its cells: a difference of squares loses half the digits."""
 
 
-@VECTOR
+@INNER_VECTOR
 def _apart(before, after):
     """The gain from a symbol before (M,) to after (M,) that fits best, and the root of the squares that remain."""
     own, new, re, im = 0.0, 0.0, 0.0, 0.0
@@ -28,7 +28,7 @@ def _apart(before, after):
     return math.sqrt(cross) / own, math.sqrt(max(new - cross / own, 0.0)) + ROOM * math.sqrt(new)
 
 
-@LEAN
+@INNER
 def _cell(response, wave, q):
     """Range cell q of a response (M,); four sums run next to each other, each in the order of the subcarriers."""
     count = len(response)

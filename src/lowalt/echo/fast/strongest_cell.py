@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN, VECTOR
+from lowalt.common.jit import INLINED, INNER_VECTOR, LEAN
 from lowalt.echo.fast.cell_kernel import SIDE
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 
@@ -12,7 +12,7 @@ CERTAIN, UNCERTAIN = 0, 1
 """State of a symbol: its strongest cell is proved, or it must be computed again by the exact plan or pointwise."""
 
 
-@VECTOR
+@INNER_VECTOR
 def cell_sums(kernels, place, moments, first, last, sums):
     """Fill rows first..last of sums (2 SIDE + 1, 2), which start at cell -SIDE, with real and imaginary parts."""
     place = np.uint64(place)
@@ -24,7 +24,7 @@ def cell_sums(kernels, place, moments, first, last, sums):
         sums[j, 0], sums[j, 1] = re, im
 
 
-@VECTOR
+@INNER_VECTOR
 def _product(sines, place, moments, shift):
     """Return |sum of z sin(pi u) v^shift|, the sine's series cut after the last moment there is."""
     re, im = 0.0, 0.0

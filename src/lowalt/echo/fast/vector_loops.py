@@ -10,11 +10,11 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import VECTOR
+from lowalt.common.jit import INNER_VECTOR
 from lowalt.echo.fast.strip import MULTIPLE
 
 
-@VECTOR
+@INNER_VECTOR
 def horner(x, c, row, degree, out, size):
     """Fill out[:size] with the sum of c[row, k] x^k for k up to `degree`, four orders a pass over the strip."""
     top = c[row, degree]
@@ -45,7 +45,7 @@ def horner(x, c, row, degree, out, size):
         k -= 4
 
 
-@VECTOR
+@INNER_VECTOR
 def place_part(px, py, pz, low, size, pose, placing, offsets, at):
     """Fill the offsets from `at` with `size` points of a part from `low`, and with up to MULTIPLE - 1 beyond.
 
@@ -66,7 +66,7 @@ def place_part(px, py, pz, low, size, pose, placing, offsets, at):
         ez[at + i] = c * z_scale + z_shift
 
 
-@VECTOR
+@INNER_VECTOR
 def place_still(pose, placing, size, offsets, at):
     """Do as `place_part` for a part whose matrix is zero, as a node's is: all its points stand at its offset."""
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
@@ -79,7 +79,7 @@ def place_still(pose, placing, size, offsets, at):
         eps[at + i], ey[at + i], ez[at + i] = e, y, z
 
 
-@VECTOR
+@INNER_VECTOR
 def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offsets):
     """Do as `place_part` for `size` points from `low` that are parts of their own, relative to the point q."""
     hx, hy, hz, y_scale, y_shift, z_scale, z_shift = placing
@@ -95,7 +95,7 @@ def place_nodes(translation, n, q, low, size, cosine, sine, scale, placing, offs
         ez[i] = c * z_scale + z_shift
 
 
-@VECTOR
+@INNER_VECTOR
 def geometry(offsets, constants, size, strip):
     """Fill psi, omega, cells, turn and square of the strip, by one root and one quotient a point.
 
@@ -118,7 +118,7 @@ def geometry(offsets, constants, size, strip):
         square[i] = f * f
 
 
-@VECTOR
+@INNER_VECTOR
 def near_geometry(offsets, constants, excess, inverse, size, strip):
     """Do as `geometry`, with polynomials in eps for the range difference over eps (degree 4) and r_ref / r (3)."""
     cp, co, su, cu, td, tp, to, t0 = constants
@@ -139,7 +139,7 @@ def near_geometry(offsets, constants, excess, inverse, size, strip):
         square[i] = f * f
 
 
-@VECTOR
+@INNER_VECTOR
 def amplitudes(strip, share, first, cosine, sine, size):
     """Fill real and imag of the strip: share of amplitude times gains times (cosine, sine) of the turn.
 
@@ -168,7 +168,7 @@ def amplitudes(strip, share, first, cosine, sine, size):
     return total, second
 
 
-@VECTOR
+@INNER_VECTOR
 def moments(strip, at, size):
     """Return the sums of real and of imag times 1, v, v^2, v^3, v = cells, over `size` points from `at`.
 

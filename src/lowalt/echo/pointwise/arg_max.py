@@ -5,13 +5,13 @@ Each kernel has its own bound for the cells that it did not compute.
 
 import math
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INNER
 
 NEAR_TIE = 1e-12
 """Relative gap below which the two strongest cells count as a near-tie."""
 
 
-@LEAN
+@INNER
 def strongest_of(sums, first, last):
     """Return the largest |sum| of the rows first..last of sums (cells, 2), the second largest, and the largest's row.
 

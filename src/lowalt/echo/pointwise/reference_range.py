@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from lowalt.common import double_double
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INNER, LEAN
 from lowalt.echo.radar import Radar
 
 X, Y, Z, RANGE, TURN, CELL, REST = range(7)
@@ -20,7 +20,7 @@ two_sum = LEAN(double_double.two_sum)
 two_product = LEAN(double_double.two_product)
 
 
-@LEAN
+@INNER
 def _fraction(r, r_lo, k, k_lo):
     """Whole part and fraction, within about [-1/2, 1/2], of (r + r_lo) (k + k_lo)."""
     p, q = two_product(r, k)

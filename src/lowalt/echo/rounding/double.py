@@ -10,7 +10,7 @@ import numpy as np
 from lowalt.common.exact.arithmetic import scale
 from lowalt.common.exact.constants import taylor
 from lowalt.common.exact.sines import fraction, odd_sign
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.echo.rounding.sums import AMPLITUDE, CELL, TURN, constants_of, patterns, phase_of, seen
 
 LANES = 8
@@ -56,7 +56,7 @@ def dirichlet(x, count):
     return sign * (count if zero else ratio)
 
 
-@LEAN
+@INNER
 def times_dirichlet(work, row, count, twice, points):
     """Multiply the amplitudes (row AMPLITUDE) by U_{count-1} of a row's half turns, or by its square."""
     row, below = np.uint64(row), np.uint64(row + 1)
@@ -65,7 +65,7 @@ def times_dirichlet(work, row, count, twice, points):
         work[AMPLITUDE, i] *= u * u if twice else u
 
 
-@LEAN
+@INNER
 def wave(work, points):
     """Replace row CELL and the row below it by the real and imaginary parts of all points."""
     for i in range(np.uint64(points)):

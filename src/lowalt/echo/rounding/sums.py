@@ -8,7 +8,7 @@ import numpy as np
 
 from lowalt.common.exact.arithmetic import add, divide, multiply, product, root, subtract, two_sum
 from lowalt.common.exact.sines import dirichlet, sine_cosine
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.echo.radar import constants
 
 constants_of = INLINED(constants)
@@ -19,7 +19,7 @@ array phase per element, horizontally and vertically, turns of phase, distance f
 ROWS = 16
 
 
-@LEAN
+@INNER
 def place(scene, lay, station, n, work):
     """Fill rows X, Y, Z with the vectors from the station to all points at symbol n; padding stands at one metre."""
     for i in range(work.shape[1]):
@@ -53,7 +53,7 @@ def cosines(x, y, z, constants):
     return r, inverse, multiply(across, inverse), multiply(z, inverse)
 
 
-@LEAN
+@INNER
 def geometry(work, root_rcs, rcs_m2, constants, aims, cell, count):
     """Fill rows SIDE to AMPLITUDE from X, Y, Z; aims: the beams' direction cosines; cell, count: whole doubles."""
     for i in range(np.uint64(len(root_rcs))):
@@ -90,7 +90,7 @@ def patterns(radar):
     )
 
 
-@LEAN
+@INNER
 def times_dirichlet(work, row, count, twice, points):
     """Multiply the amplitudes by U_{count-1} of a row's half turns, or by its square."""
     row, below = np.uint64(row), np.uint64(row + 1)
@@ -101,7 +101,7 @@ def times_dirichlet(work, row, count, twice, points):
         work[AMPLITUDE, i], work[AMPLITUDE + 1, i] = multiply((work[AMPLITUDE, i], work[AMPLITUDE + 1, i]), u)
 
 
-@LEAN
+@INNER
 def wave(work, points):
     """Replace rows TURN and CELL by the real and imaginary parts of all points."""
     for i in range(np.uint64(points)):
@@ -117,7 +117,7 @@ def phase_of(cell, count):
     return sine_cosine(divide((float((count - 1) * cell % (2 * count)), 0.0), (2.0 * count, 0.0)))
 
 
-@LEAN
+@INNER
 def seen(scene, lay, radar, n, cell, work):
     """Fill rows X to AMPLITUDE with how the station sees all points at symbol n; cell: the range cell's index."""
     x, y = two_sum(scene.aim[0], -radar.station[0]), two_sum(scene.aim[1], -radar.station[1])

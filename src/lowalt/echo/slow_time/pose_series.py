@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.common.jit import PLAIN, VECTOR
+from lowalt.common.jit import INNER_VECTOR, PLAIN
 from lowalt.echo.fast.range_bounds import norm
 
 BLOCK = 512
@@ -72,7 +72,7 @@ def candidates(rotation, lay, steps, turns, enough):
     return result & (counts >= enough)
 
 
-@VECTOR
+@INNER_VECTOR
 def _column(project, back, values, found, column):
     """Fit values (B,) into found[:, column]; returns the largest difference at any symbol. values is overwritten."""
     worst = 0.0

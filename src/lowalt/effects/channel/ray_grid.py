@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.effects.channel.ray_tests import cross
 from lowalt.effects.channel.surface_tree import Tree
 
@@ -84,7 +84,7 @@ def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
     return True
 
 
-@LEAN
+@INNER
 def _filled(vertices, tree, p, axes, middle, radius_m, far, way, images, shown, low, wide, cells, start, pool):
     """Fill one grid of part p; images (F, 4) and shown (F,) are work. Return whether there is room for it."""
     first, count = tree.first[p], tree.count[p]

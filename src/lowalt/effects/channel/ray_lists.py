@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER
 from lowalt.effects.channel.ray_tests import first_hit, met, reached
 
 SLOTS = 1 << 14
@@ -64,7 +64,7 @@ def _slot(keys, key):
     return slot
 
 
-@LEAN
+@INNER
 def _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, spread):
     """Fill the free slot of the list `key` with the triangles of part p that the rays of `met` can meet; return it."""
     mask = len(lists.key) - 1

@@ -11,7 +11,7 @@ triangles are found by the tree ray by ray. A point is compared first with the t
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.echo import Rigid
 from lowalt.effects.channel import ray_grid, turning_rays
 from lowalt.effects.channel.ray_grid import RayGrid, cell_of
@@ -70,7 +70,7 @@ def _in_part(rotation, translation, x, y, z):
     )
 
 
-@LEAN
+@INNER
 def _balls(rotation, translation, tree, order, balls):
     """Fill balls (P, 3) with the places of the balls around all triangles of the parts `order`, in the global frame."""
     for turn in range(len(order)):

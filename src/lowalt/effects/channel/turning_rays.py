@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
+from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.effects.channel.ray_tests import cross, first_hit
 from lowalt.effects.channel.surface_tree import Tree
 
@@ -96,7 +96,7 @@ def _band(station, axes, x, y, z, found, l):  # noqa: E741
     return low, high
 
 
-@LEAN
+@INNER
 def _sorted(vertices, tree, p, axes, x, y, z, low, high, start, pool, ends, corners):
     """Fill start (BINS + 1,) and pool with the triangles of part p by azimuth; return whether there is room."""
     first, count = tree.first[p], tree.count[p]
