@@ -2,13 +2,15 @@
 
 Machine code is compiled once on each machine (`lowalt.common.jit`), which takes most of a minute of processor time. The
 first jobs of the echo and tiles stages would compile it one stage after the other. Here two processes do so at the same
-time: each runs its stage's own command on very small inputs. A job that starts meanwhile waits for them.
+time, with about as much work each: they run the stages' own commands on very small inputs. A job that starts meanwhile
+waits for them.
 """
 
 import json
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +21,13 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import masts_m, station_names
 
 CONFIGURATION = Path("config/default.yaml")
-STAGES = ("echo", "tiles")
+STAGES = ("echo", "tiles", "tolerances")
+PROCESSES = (("echo",), ("tiles", "tolerances"))
+"""What is compiled in which order by each process."""
 
 
-def echo(config: dict, folder: Path) -> None:
-    """Make the echoes of a motion model of each category, exactly and at the cost table's tolerances, in a folder."""
+def echo(config: dict, folder: Path, tolerances: Sequence[float | None] = (None,)) -> None:
+    """Make the echoes of a motion model of each category in a folder, exactly or at these tolerances."""
     from lowalt.echo.__main__ import main as echoes
     from lowalt.motion.__main__ import main as motion
     from lowalt.targets.__main__ import main as cloud
@@ -40,7 +44,7 @@ def echo(config: dict, folder: Path) -> None:
     table = str(folder / "motion.csv")
     span = ["--group", "seen", "--first", "0", "--count", "1"]
     motion(["--settings", json.dumps(settings), "--clouds", *clouds, *span, "--out", table])
-    for tolerance in (None, *config["cost"]["tolerances"]):
+    for tolerance in tolerances:
         settings = json.dumps({"network": config["network"], "tolerance": tolerance})
         station, out = station_names(config["network"])[0], str(folder / "echo.npy")
         try:
@@ -48,6 +52,11 @@ def echo(config: dict, folder: Path) -> None:
         except InputError:
             # A tolerance below the floor of one of the samples: what it needs is compiled all the same.
             continue
+
+
+def tolerances(config: dict, folder: Path) -> None:
+    """Make the echoes of a motion model of each category in a folder, at the cost table's tolerances."""
+    echo(config, folder, config["cost"]["tolerances"])
 
 
 def tiles(config: dict, folder: Path) -> None:
@@ -64,19 +73,20 @@ def tiles(config: dict, folder: Path) -> None:
 
 
 def main(arguments: list[str]) -> None:
-    """Compile for the named stages; without a name for all, each in a process of its own."""
+    """Compile for the named stages, one after the other; without a name for all, in two processes."""
     unknown = sorted(set(arguments) - set(STAGES))
     if unknown:
         raise InputError(f"lowalt.workflow.kernels: {unknown}, expected some of {STAGES}")
-    if len(arguments) != 1:
+    if not arguments:
         command = [sys.executable, "-m", "lowalt.workflow.kernels"]
-        started = [subprocess.Popen([*command, stage]) for stage in arguments or STAGES]
+        started = [subprocess.Popen([*command, *stages]) for stages in PROCESSES]
         if any([process.wait() for process in started]):
             raise InputError("lowalt.workflow.kernels: a stage failed, see above")
         return
     config = load_yaml(CONFIGURATION)
     with tempfile.TemporaryDirectory() as folder:
-        {"echo": echo, "tiles": tiles}[arguments[0]](config, Path(folder))
+        for stage in arguments:
+            {"echo": echo, "tiles": tiles, "tolerances": tolerances}[stage](config, Path(folder))
 
 
 if __name__ == "__main__":
