@@ -14,14 +14,19 @@ from functools import cache
 from pathlib import Path
 
 _HELPER = """
-import json, os, sys
+import gc, json, os, sys
 
+gc.disable()
 import snakemake.cli
 import scipy.optimize, scipy.spatial, scipy.special, yaml, numba, jsonschema
 from snakemake.scheduling import job_scheduler
 from snakemake.persistence import file
 
 assert not any(name.split(".")[0] == "lowalt" for name in sys.modules)
+# Looking for garbage among all that is imported takes a fifth of a run.
+gc.freeze()
+gc.enable()
+gc.set_threshold(100_000)
 for line in sys.stdin:
     order = json.loads(line)
     child = os.fork()
