@@ -12,6 +12,7 @@ from lowalt.common.streams import stream
 from lowalt.recognition import augment, checkpoint, inference, predictions, recipe, runs, statistics, tables
 from lowalt.recognition import training as loop
 from lowalt.recognition.evaluated import Evaluated
+from lowalt.recognition.flat_weights import FlatAdamW
 from lowalt.recognition.objective import objective
 from lowalt.recognition.reader import Reader
 from made_predictions import facts, read_rows, run_files
@@ -30,7 +31,7 @@ class Trace:
 
     def __init__(self, monkeypatch):
         self.rates, self.norms, self.weights, self.averages = [], [], [], []
-        step, trainer_step = torch.optim.AdamW.step, loop.Trainer._step
+        step, trainer_step = FlatAdamW.step, loop.Trainer._step
 
         def seen(optimiser, *given):
             gradients = [value.grad for group in optimiser.param_groups for value in group["params"]]
@@ -43,7 +44,7 @@ class Trace:
             self.weights.append(trainer.model.classifier[0].weight.detach().double().clone())
             self.averages.append(trainer.ema.module.classifier[0].weight.detach().double().clone())
 
-        monkeypatch.setattr(torch.optim.AdamW, "step", seen)
+        monkeypatch.setattr(FlatAdamW, "step", seen)
         monkeypatch.setattr(loop.Trainer, "_step", stepped)
 
 

@@ -57,6 +57,11 @@ class Machine:
             distributed.init_process_group("nccl" if gpu else "gloo")
         return cls(device, arithmetic(precision, device.type), int(os.environ.get("RANK", "0")), ranks)
 
+    @property
+    def gpu(self) -> bool:
+        """Whether the device is a GPU."""
+        return self.device.type == "cuda"
+
     def autocast(self) -> contextlib.AbstractContextManager:
         """Return the context of mixed precision (bfloat16), or none for fp32."""
         if self.precision == "fp32":

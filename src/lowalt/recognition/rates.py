@@ -87,7 +87,7 @@ def losses(trainer: Trainer, rates: np.ndarray) -> Iterator[float]:
         if not math.isfinite(loss) or smoothed[-1] > END * smoothed.min():
             return
         yield loss
-        if math.isfinite(float(nn.utils.clip_grad_norm_(model.parameters(), block["clip"]))):
+        if math.isfinite(float(nn.utils.clip_grad_norm_(trainer.weights, block["clip"]))):
             trainer.optimiser.step()
         trainer.optimiser.zero_grad(set_to_none=True)
 

@@ -63,24 +63,26 @@ class Trainer:
         self.train, self.validation = samples["train"], samples["validation"]
         self.columns, self.keys, self.name, self.folder, self.machine = columns, keys, name, Path(folder), machine
         classes = settings["classes"]
-        missing = set(range(len(classes))) - set(np.unique(self.train.facts.label).tolist())
+        missing = sorted(set(range(len(classes))) - set(np.unique(self.train.facts.label).tolist()))
         if missing:
-            names = [classes[label] for label in sorted(missing)]
-            raise InputError(f"training: no training sample of {names}, expected some of each class")
+            raise InputError(
+                f"training: no training sample of {[classes[one] for one in missing]}, expected some of each"
+            )
         if self.block["activation_checkpointing"]:
             network.checkpoint_activations(model)
         layout = torch.channels_last if self.block["channels_last"] else torch.contiguous_format
         shared = over_ranks(model) if machine.ranks > 1 else model
-        plain = machine.precision == "fp32" and machine.device.type == "cpu" and not self.block["compile"]
-        self.model = (as_products(shared) if plain else shared).to(machine.device, memory_format=layout)
+        cpu = not machine.gpu and not self.block["compile"]
+        shared = as_products(shared) if cpu and machine.precision == "fp32" else shared
+        self.model = shared.to(machine.device, memory_format=layout)
+        self.optimiser = optimiser(self.model, self.block, flat=cpu and machine.ranks == 1)
+        self.weights = [value for group in self.optimiser.param_groups for value in group["params"]]
         self.ema = MovingAverage(self.model, self.block["ema"])
-        self.optimiser = optimiser(self.model, self.block)
         self.step_model = machine.parallel(torch.compile(self.model) if self.block["compile"] else self.model).train()
         # Readers keep their workers over all epochs and validations.
-        gpu, workers = machine.device.type == "cuda", self.block["workers"]
         reader = Reader(self.train, columns, self.augmentation, (self.seed, *keys), machine)
         readers = (reader, Unchanged(self.validation))
-        self.read, self.read_validation = (ReadAhead(read, workers, pin=gpu) for read in readers)
+        self.read, self.read_validation = (ReadAhead(read, self.block["workers"], pin=machine.gpu) for read in readers)
         self.best_weights: dict = {}
         self.waited_s, self.validates_first = 0.0, False
         self.metrics: Metrics | None = None
@@ -145,13 +147,12 @@ class Trainer:
 
     def _step(self, images: torch.Tensor, labels: torch.Tensor) -> None:
         """Take one optimiser step on a batch and update the moving average of the weights."""
-        images = images.to(self.machine.device, non_blocking=True)
-        labels = labels.to(self.machine.device, non_blocking=True)
+        images, labels = (part.to(self.machine.device, non_blocking=True) for part in (images, labels))
         rate = self.block["rate"] * schedule((self.at.steps + 1) / self.block["steps"], self.block["warmup"])
         for group in self.optimiser.param_groups:
             group["lr"] = rate * group["factor"]
         loss = descent(self.step_model, images, labels, self.block, self.machine)
-        norm = nn.utils.clip_grad_norm_(self.model.parameters(), self.block["clip"], foreach=True)
+        norm = nn.utils.clip_grad_norm_(self.weights, self.block["clip"], foreach=True)
         self.at.loss_sum += float(loss)
         self.at.loss_steps += 1
         self._finite()
@@ -245,6 +246,5 @@ class Trainer:
         if self.machine.rank:
             return
         checkpoint.save(self.folder / "model.pt", self.name, {"weights": self.best_weights, **extra})
-        history = [[repr(value) for value in row] for row in self.at.history]
-        write_csv(self.folder / "history.csv", HISTORY, history)
+        write_csv(self.folder / "history.csv", HISTORY, [[repr(value) for value in row] for row in self.at.history])
         (self.folder / "checkpoint.pt").unlink(missing_ok=True)
