@@ -62,18 +62,37 @@ def test_the_last_job_of_a_stage_says_so_and_an_unknown_job_nothing():
     assert board.line("echo", 99.0, lambda log, since: None) == "echo 2/2, done in 1:05"
 
 
+def test_a_stage_that_no_plan_holds_has_no_jobs_in_all_and_a_first_moment_no_rate():
+    board = Board({}, 100.0)
+
+    def none(log, since):
+        return None
+
+    board.start(1, Job("echo", "", "", 100.0))
+    assert board.line("echo", 100.0, none) == "echo 0/0"
+    assert board.finish(1, 100.0) == "echo" and board.total(100.0) == "all  1/0 jobs, 0:00 since the start"
+    # Two of ten jobs are done, but no time has passed, or half a second.
+    assert board_of().line("echo", 100.0, none) == "echo  2/10; seen/2"
+    assert board_of().line("echo", 100.5, none) == "echo  2/10, 4.0/s, 0:02 left; seen/2"
+
+
 def test_failed_jobs_are_counted_and_not_done():
     board = board_of(done=0, running=2)
     board.finish(0, 105.0, good=False)
     assert board.line("echo", 106.0, lambda log, since: None).startswith("echo  0/10, 1 failed")
 
 
-@pytest.mark.parametrize(("seconds", "text"), [(-1, "0:00"), (59.6, "1:00"), (3599, "59:59"), (7384, "2:03:04")])
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(-1, "0:00"), (59.6, "1:00"), (3599, "59:59"), (3600, "1:00:00"), (7384, "2:03:04")]
+)
 def test_durations_read_as_a_clock(seconds, text):
     assert span(seconds) == text
 
 
-@pytest.mark.parametrize(("rate", "text"), [(12.34, "12.3/s"), (0.5, "30.0/min"), (1 / 1800, "2.0/h"), (1e-5, "0.0/h")])
+@pytest.mark.parametrize(
+    ("rate", "text"),
+    [(12.34, "12.3/s"), (1, "1.0/s"), (0.5, "30.0/min"), (1 / 60, "1.0/min"), (1 / 1800, "2.0/h"), (1e-5, "0.0/h")],
+)
 def test_rates_are_in_the_unit_that_reads_best(rate, text):
     assert pace(rate) == text
 

@@ -203,7 +203,8 @@ def test_a_memory_limit_follows_what_is_held_until_one_process_is_killed_and_is_
     assert group.starve() == (killed_after is not None)
     assert limits[:3] == ["900", "810", "810"] and group.limit.read_text() == "-1"
     if killed_after:
-        assert len(limits) == killed_after
+        # Seven seconds pass at each look, and a fiftieth until the next.
+        assert len(limits) == killed_after and clock.now == pytest.approx(3 * 7.02)
     else:
         assert 60 <= clock.now < 68
 

@@ -1,11 +1,15 @@
-"""Jobs that a dead run left behind get a signal, time to end, and then another one."""
+"""Jobs that a dead run left behind get a signal, time to end, and then another one; a lock begins and ends."""
 
+import fcntl
+import os
 import signal
 from types import SimpleNamespace
 
 import pytest
 
+from lowalt.common.errors import InputError
 from lowalt.workflow import locks
+from lowalt.workflow.owner import TOKEN, Owner
 
 
 @pytest.mark.parametrize(("stubborn", "signals", "spent_s"), [
@@ -30,3 +34,63 @@ def test_jobs_have_ten_seconds_to_end_before_they_are_killed(stubborn, signals, 
     assert locks.end(owner) == [11, 12]
     assert sent == [(pid, number) for number in signals for pid in (11, 12)]
     assert now[0] == pytest.approx(spent_s, abs=0.11)
+
+
+def test_every_user_may_open_the_guard_and_a_system_without_locks_is_refused(tmp_path, monkeypatch):
+    before = os.umask(0)
+    try:
+        with locks.guarded(tmp_path):
+            pass
+    finally:
+        os.umask(before)
+    assert (tmp_path / "lowalt.guard").stat().st_mode & 0o777 == 0o666
+
+    def refuse(descriptor, how):
+        assert how == fcntl.LOCK_EX
+        raise OSError(37, "No locks available")
+
+    monkeypatch.setattr(locks.fcntl, "flock", refuse)
+    with pytest.raises(InputError, match=r"cannot lock files \(No locks available\)"), locks.guarded(tmp_path):
+        pytest.fail("the block runs without a lock")
+
+
+@pytest.mark.parametrize("left", [(), ("0.owner.json",), ("0.input.lock",), ("0.output.lock", "0.owner.json")])
+def test_what_a_crash_left_of_a_lock_is_removed(left, tmp_path):
+    for name in (*left, "1.output.lock"):
+        (tmp_path / name).touch()
+    locks.drop(tmp_path, 0)
+    assert [path.name for path in tmp_path.iterdir()] == ["1.output.lock"]
+
+
+def test_snakemake_s_lock_is_one_with_an_owner_for_the_length_of_its_block(tmp_path, monkeypatch):
+    persistence = pytest.importorskip("snakemake.persistence.file").FilePersistence
+    from snakemake.exceptions import WorkflowError
+    from snakemake.logging import logger
+
+    for name in ("lock", "lock_warn_only", "cleanup_locks"):
+        monkeypatch.setattr(persistence, name, getattr(persistence, name))
+    monkeypatch.setenv(TOKEN, "before")
+    said = []
+    monkeypatch.setattr(logger, "info", said.append)
+    locks.install()
+    folder = tmp_path / "deep/locks"
+
+    class Kept(SimpleNamespace):
+        @property
+        def locked(self):
+            return bool(locks.numbers(folder))
+
+    kept = Kept(path=tmp_path, _lockdir=folder, all_inputfiles=lambda: ["a", "b"], all_outputfiles=lambda: ["c"])
+    with persistence.lock_warn_only(kept):
+        assert not said
+    with persistence.lock(kept):
+        assert (folder / "0.input.lock").read_text() == "a\nb\n" and (folder / "0.output.lock").read_text() == "c\n"
+        assert Owner.read(folder / "0.owner.json") == Owner.current() and os.environ[TOKEN] == Owner.current().token
+        with pytest.raises(WorkflowError, match=f"process {os.getpid()} of .* is running"), persistence.lock(kept):
+            pytest.fail("two runs at once")
+        with persistence.lock_warn_only(kept):
+            assert f"process {os.getpid()}" in said[0]
+    assert locks.numbers(folder) == []
+    kept.path = tmp_path / "none"
+    with pytest.raises(WorkflowError, match="cannot write a lock"), persistence.lock(kept):
+        pytest.fail("a lock in a folder that is not there")

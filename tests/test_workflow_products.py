@@ -14,7 +14,8 @@ from configured import parts, run_of
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.workflow import options
-from lowalt.workflow.products import FIDELITY
+from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.products import FIDELITY, Products
 
 ROOT = Path(__file__).parent.parent
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
@@ -152,6 +153,30 @@ def test_recipe_shards_need_clean_echoes_and_neither_noise_nor_tiles():
     assert "shard" in made and not made & {"noise", "tiles"}
     _, usual, _ = parts({"shards": {"kind": "recipe"}})
     assert usual.shard_content(CHUNK)["powers"] == []
+
+
+@pytest.mark.parametrize(("kind", "cache"), [("image", True), ("signal", True), ("recipe", False)])
+def test_times_are_told_of_the_stages_that_a_run_of_this_kind_has(kind, cache):
+    run, products, _ = parts({"shards": {"kind": kind}, "recognition": {"cache": cache}})
+    made = [Path(path).relative_to("results/default/benchmarks").parts[0] for path in products.benchmarks(CHUNK)]
+    stages = ["cloud", "motion", "echo", "noise", "tiles", "shard", "index.jsonl", "views", "train", "evaluate",
+              "distances.jsonl", "tables.jsonl"]  # fmt: skip
+    without = {"image": set(), "signal": {"tiles"}, "recipe": {"noise", "tiles", "views"}}[kind]
+    assert list(dict.fromkeys(made)) == [stage for stage in stages if stage not in without]
+    assert made.count("shard") == len(run.plan.shards) and made.count("echo") == 3 * len(run.plan.sources)
+
+
+def test_fresh_samples_are_made_only_where_asked_for_and_an_own_backbone_is_read():
+    job = SimpleNamespace(run="default", scheme="abc-vrp-trp-vt", get=lambda key, default: "seen", train_seed="0")
+    for training, keys in (({"stream": 0}, []), ({"stream": 0.5}, ["stream", "clouds"])):
+        _, products, _ = parts({"recognition": {"training": training}})
+        assert list(products.training_samples(job)) == ["views", *keys]
+    own = {"network": {"backbone": "mine/net.py:made"}}
+    _, products, _ = parts({"recognition": own})
+    assert products.training_samples(job)["backbone"] == "mine/net.py"
+    run = run_of()
+    run.config["recognition"]["training"].pop("stream", None)
+    assert list(Products(run, EffectCalls(run)).training_samples(job)) == ["views"]
 
 
 def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signals():

@@ -72,6 +72,14 @@ def test_starts_come_from_trainings_of_this_run_that_met_no_test_sample_and_go_i
     )
     circle = {"seen/a": {"from": "seen/b"}, "seen/b": {"from": "seen/a"}}
     assert_refused("seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained)
+    # From outside of the circle, and round a circle of one.
+    circle = {"seen/c": {"from": "seen/a"}} | circle
+    assert_refused(
+        "seen/c from seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained | {"seen/c"}
+    )
+    assert_refused(
+        "start: seen/a from seen/a is a circle", refusals.refuse_starts, {"seen/a": {"from": "seen/a"}}, trained
+    )
 
 
 def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(monkeypatch):

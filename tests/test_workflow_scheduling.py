@@ -68,6 +68,26 @@ def test_many_rounds_leave_one_timer_and_a_new_one_follows_when_it_has_fired():
     assert rounds.acquire(timeout=5)
 
 
+@pytest.mark.parametrize(
+    ("fired", "lives", "follows"), [(False, True, False), (True, True, True), (False, False, True)]
+)
+def test_a_timer_follows_one_that_has_fired_or_is_dead_and_ends_with_its_run(fired, lives, follows):
+    old = SimpleNamespace(finished=SimpleNamespace(is_set=lambda: fired), is_alive=lambda: lives)
+    scheduler = SimpleNamespace(_open_jobs=threading.Semaphore(0), _next_round=old)
+    scheduling.one_timer(scheduler, 30)
+    assert (scheduler._next_round is not old) == follows
+    if follows:
+        assert scheduler._next_round.daemon
+        scheduler._next_round.cancel()
+
+
+def test_jobs_in_groups_are_one_kind_whatever_their_rules():
+    ready = jobs("short", 20) | jobs("long", 20, first=100)
+    for job in ready:
+        job.is_group = lambda: True
+    assert {job.jobid for job in scheduling.selectable(scheduler_of(ready))} == set(range(8))
+
+
 def test_a_round_chooses_among_the_first_jobs_of_every_rule():
     urgent, first, second = jobs("short", 3, priority=5, first=900), jobs("short", 500), jobs("long", 40, first=500)
     scheduler = scheduler_of(urgent | first | second)
@@ -91,7 +111,13 @@ def test_few_ready_jobs_are_all_looked_at(count, cores, limit):
 
 
 def test_a_cluster_s_round_can_start_as_many_jobs_as_its_rate_allows():
-    assert len(scheduling.selectable(scheduler_of(jobs("short", 5000), cores=sys.maxsize, limit=100))) >= 100
+    assert len(scheduling.selectable(scheduler_of(jobs("short", 5000), cores=sys.maxsize, limit=100))) == 2 * 100
+    free = scheduler_of(jobs("short", 5000), cores=7)
+    assert len(scheduling.selectable(free)) == 2 * 7
+    free.job_rate_limiter = None
+    assert len(scheduling.selectable(free)) == 2 * 7
+    free.global_resources = {}
+    assert len(scheduling.selectable(free)) == scheduling.LEAST == 8
 
 
 def test_unfinished_jobs_are_those_neither_finished_nor_running_nor_failed():

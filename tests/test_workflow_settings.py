@@ -1,4 +1,4 @@
-"""Settings of the stages, options of commands and the report's manifest, as they follow from a configuration."""
+"""Settings of stages (`lowalt.workflow.settings`), options of commands and the report's manifest, by configuration."""
 
 import json
 import re

@@ -154,10 +154,11 @@ def test_a_run_that_ends_on_a_full_disk_says_how_much_is_free(tmp_path, monkeypa
     monkeypatch.setattr(space_check, "free_bytes", lambda folder: 500_000)
     space_check.after(tmp_path)
     assert f"the disk of {(tmp_path / 'results').resolve()} is full (0.5 MB free)" in caplog.text
-    caplog.clear()
-    monkeypatch.setattr(space_check, "free_bytes", lambda folder: 2**20 - 1)
-    space_check.after(tmp_path)
-    assert "is full (1.0 MB free)" in caplog.text
+    for free, text in ((2**20 - 1, "1.0"), (250_000, "0.2"), (750_000, "0.8")):
+        caplog.clear()
+        monkeypatch.setattr(space_check, "free_bytes", lambda folder, free=free: free)
+        space_check.after(tmp_path)
+        assert f"is full ({text} MB free)" in caplog.text
     caplog.clear()
     monkeypatch.setattr(space_check, "free_bytes", lambda folder: 2**20)
     space_check.after(tmp_path)

@@ -5,6 +5,8 @@ import logging
 import os
 import time
 
+import pytest
+
 from lowalt.workflow import status
 from test_workflow_board import board_of, handler_of, record
 
@@ -59,3 +61,39 @@ def test_a_run_on_another_machine_lives_while_its_file_is_fresh(tmp_path):
     assert status.describe(there, kept["written"]).startswith(f"process {2**22 + 1} of login-2: running, 0:00 ago")
     unnamed = {key: value for key, value in kept.items() if key != "host"}
     assert status.elsewhere(there) == "login-2" and status.elsewhere(kept) == status.elsewhere(unnamed) == ""
+
+
+def test_a_run_that_ended_says_so_and_its_times_stop_at_its_last_word(tmp_path, monkeypatch):
+    folder = tmp_path / "status"
+    folder.mkdir()
+    status.write(board_of(), "running", folder)
+    (kept,) = status.read(folder)
+    kept |= {"written": 112.0}
+    dead = kept | {"pid": 2**22 + 1}
+    head, *rest = status.describe(dead | {"state": "failed"}, 172.0).splitlines()
+    assert head == f"process {2**22 + 1}: failed, 1:00 ago"
+    assert rest[-1] == "all   2/12 jobs, 0:12 since the start"
+    assert status.describe(kept, 172.0).endswith("all   2/12 jobs, 1:12 since the start")
+    # An owner whose start nobody could read is not taken for one that lives.
+    assert not status.alive(kept | {"process": None, "pid": 2**22 + 1})
+
+
+def test_the_command_shows_runs_that_live_or_else_the_one_that_ended_last(tmp_path, monkeypatch, capsys):
+    folder = tmp_path / "status"
+    folder.mkdir()
+    status.write(board_of(), "running", folder)
+    lives = json.loads((folder / f"{os.getpid()}.json").read_text())
+    status_of = []
+    monkeypatch.setattr(status, "read", lambda: status_of)
+    with pytest.raises(SystemExit) as stopped:
+        status.main()
+    assert stopped.value.code == 1 and "no run has started here" in capsys.readouterr().err
+    for number in (1, 2, 3):
+        status_of.append(lives | {"pid": 2**22 + number, "state": "ended"})
+    status.main()
+    assert [line for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
+        f"process {2**22 + 3}: ended, 0:00 ago"]  # fmt: skip
+    status_of.insert(1, lives)
+    status.main()
+    assert [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
+        f"process {os.getpid()}"]  # fmt: skip
