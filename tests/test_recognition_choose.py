@@ -47,7 +47,9 @@ def test_nothing_that_a_table_tests_on_is_opened():
     for wrong in (facts(folds=("train", "test")), facts(group="unseen")):
         with pytest.raises(InputError, match=r"choices: samples of .*, expected .* alone"):
             choose.parts(wrong, 0, 3)
-    for fold, count in ((3, 3), (0, 1), (0, 6)):
+    assert [choose.held_out(facts(), fold, 2)[:3] for fold in (0, 1)] == [["U 0", "U 2", "U 4"], ["U 1", "U 3", "B 1"]]
+    assert choose.held_out(facts(), 4, 5) == ["U 4", "B 4", "V 4", "P 4"]
+    for fold, count in ((3, 3), (-1, 3), (0, 1), (0, 6)):
         with pytest.raises(InputError, match=f"fold {fold} of {count}"):
             choose.held_out(facts(), fold, count)
 

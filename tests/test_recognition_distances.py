@@ -64,6 +64,9 @@ def test_swept_points_are_those_of_sixteen_instants_of_a_cycle_without_the_body_
     np.testing.assert_allclose(swept(cloud, moving), wanted, atol=1e-12)
     large = replace(cloud, points=np.repeat(cloud.points, 500, 0), part=np.repeat(cloud.part, 500))
     assert len(swept(large, moving)) == 1200 < 16 * len(large.points)
+    # Evenly taken from all, the first and the last included.
+    every = positions(large, still, np.arange(16) / 640).reshape(-1, 3)
+    np.testing.assert_allclose(swept(large, moving)[[0, -1]], every[[0, -1]], atol=1e-12)
 
 
 def test_rows_name_the_nearest_of_the_category_and_of_the_trained_with_distance_and_ratio_of_size():

@@ -76,5 +76,41 @@ def test_only_gpus_that_the_scheduler_gave_are_claimed(driver, monkeypatch):
 def test_a_machine_without_gpu_runs_the_module_as_it_is(tmp_path, monkeypatch):
     monkeypatch.setattr(gpus.shutil, "which", lambda name: None)
     assert gpus.visible() == []
-    with pytest.raises(InputError, match="expected COUNT MODULE"):
-        gpus.main(["train"])
+    for wrong in (["train"], ["1"], ["0", "train"], ["one", "train"]):
+        with pytest.raises(InputError, match="expected COUNT MODULE"):
+            gpus.main(wrong)
+    begun = []
+    monkeypatch.setattr(gpus.os, "execv", lambda program, line: begun.append(line))
+    monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
+    gpus.main(["2", "train", "--fast"])
+    assert begun == [[sys.executable, "-m", "train", "--fast"]] and "CUDA_VISIBLE_DEVICES" not in os.environ
+
+
+def test_all_gpus_may_be_claimed_at_once_by_a_job_of_any_user(driver, monkeypatch):
+    before = os.umask(0)
+    try:
+        held = gpus.claim(gpus.visible(), 3)
+    finally:
+        os.umask(before)
+    assert list(held) == [0, 1, 2]
+    locks = sorted(path for path in driver.iterdir() if path.suffix == ".lock")
+    assert [(path.name, path.stat().st_mode & 0o777) for path in locks] == [
+        (f"lowalt-gpu-{name}.lock", 0o644) for name in ("a", "b", "c", "turn")]  # fmt: skip
+    # Two asked for and one free: the one is given back, and the next look is a second later.
+    os.close(held.pop(1))
+    asked = []
+
+    def sleep(seconds):
+        asked.append(seconds)
+        os.close(held.pop(2))
+
+    monkeypatch.setattr(gpus.time, "sleep", sleep)
+    found = gpus.claim(gpus.visible(), 2)
+    assert list(found) == [1, 2] and asked == [1.0]
+    for descriptor in (*found.values(), *held.values()):
+        os.close(descriptor)
+
+
+def test_a_driver_that_fails_has_no_gpus(driver):
+    (driver / "bin/nvidia-smi").write_text("#!/bin/sh\necho 'no driver'\nexit 9\n")
+    assert gpus.visible() == []

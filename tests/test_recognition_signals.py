@@ -97,6 +97,22 @@ def test_networks_of_signals_keep_their_size_and_every_convolution_halves_the_sy
 
 
 @torch.inference_mode()
+def test_weights_begin_as_wide_as_their_sources_say_and_magnitudes_are_pooled():
+    """Complex weights of unit output power, places of a fiftieth; a piece of 16 symbols is the least signal."""
+    torch.manual_seed(3)
+    layer = signal_networks.ComplexConvolution(8, 64, 9, 1)
+    for part in (layer.real, layer.imaginary):
+        assert float(part.std()) == pytest.approx((2 * 8 * 9) ** -0.5, rel=0.03)
+    assert float(signal_networks.Pieces(4000).place.std()) == pytest.approx(0.02, rel=0.03)
+    assert signal_networks.Pieces(16)(signals(2, symbols=16)[:, 0]).shape == (2, 64)
+    with pytest.raises(InputError, match="signals of 15 symbols, expected at least 16"):
+        signal_networks.Pieces(15)
+    backbone, given = signal_networks.ComplexConvolutions(400), signals(2)[:, 0]
+    size = backbone.layers(given.unsqueeze(1)).abs()
+    torch.testing.assert_close(backbone(given), torch.cat([size.mean(-1), size.amax(-1)], 1), atol=2e-3, rtol=0)
+
+
+@torch.inference_mode()
 @pytest.mark.parametrize("method", METHODS)
 def test_the_size_of_a_signal_changes_nothing_and_stations_may_be_swapped(method):
     model, given = network(method), signals(3)

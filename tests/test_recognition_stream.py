@@ -11,6 +11,7 @@ from configured import Inputs, parts
 from lowalt.common.errors import InputError
 from lowalt.common.splits import fold
 from lowalt.recognition import checkpoint, order, recipe, runs, schemes
+from lowalt.recognition import stream as streams
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.made import opened
 from lowalt.recognition.samples import ViewSamples
@@ -71,6 +72,22 @@ def test_a_limited_stream_repeats_its_motion_models_at_other_snrs(dataset):
     for models in (1, count - 1):
         with pytest.raises(InputError, match=f"stream: {models} motion models of {count} subtypes"):
             Stream(dataset, COLUMNS, SIZE, ["seen", "unseen"], models=models)
+
+
+def test_images_of_models_that_repeat_are_kept_up_to_the_bound(dataset, monkeypatch):
+    """The bound is three and a half images; a stream of as many models as subtypes has just one of each."""
+    assert STRIDE == 2_147_483_648
+    monkeypatch.setattr(streams, "views_of", lambda *given: np.zeros((4, 5), np.uint8))
+    monkeypatch.setattr(streams, "CLEAN_BYTES", 70)
+    for models in (0, len(Stream(dataset, COLUMNS, SIZE, ["seen"]).subtypes)):
+        fresh = Stream(dataset, COLUMNS, SIZE, ["seen"], models=models)
+        fresh.views(np.arange(len(fresh.subtypes)))
+        assert len(fresh._made) == (3 if models else 0)
+        assert fresh.__getstate__()["_made"] == {}
+    monkeypatch.setattr(streams, "CLEAN_BYTES", 60)
+    fresh = Stream(dataset, COLUMNS, SIZE, ["seen"], models=models)
+    fresh.views(np.arange(len(fresh.subtypes)))
+    assert len(fresh._made) == 2
 
 
 def test_pixels_and_labels_are_those_of_the_data_set(dataset):
