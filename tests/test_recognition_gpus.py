@@ -76,11 +76,11 @@ def test_only_gpus_that_the_scheduler_gave_are_claimed(driver, monkeypatch):
 def test_a_machine_without_gpu_runs_the_module_as_it_is(tmp_path, monkeypatch):
     monkeypatch.setattr(gpus.shutil, "which", lambda name: None)
     assert gpus.visible() == []
+    begun = []
+    monkeypatch.setattr(gpus.os, "execv", lambda program, line: begun.append(line))
     for wrong in (["train"], ["1"], ["0", "train"], ["one", "train"]):
         with pytest.raises(InputError, match="expected COUNT MODULE"):
             gpus.main(wrong)
-    begun = []
-    monkeypatch.setattr(gpus.os, "execv", lambda program, line: begun.append(line))
     monkeypatch.delenv("CUDA_VISIBLE_DEVICES", raising=False)
     gpus.main(["2", "train", "--fast"])
     assert begun == [[sys.executable, "-m", "train", "--fast"]] and "CUDA_VISIBLE_DEVICES" not in os.environ

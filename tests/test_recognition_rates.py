@@ -48,8 +48,8 @@ def test_the_marks_are_the_steepest_fall_and_the_least_loss():
 def test_the_first_tenth_of_the_steps_and_all_after_the_least_loss_hold_no_mark():
     for count, first in ((20, 2), (18, 1), (9, 0)):
         steps, course = np.geomspace(1, 2, count), np.linspace(3.0, 2.5, count)
-        # A fall at every step: within the first tenth, one step later, and behind the least loss.
-        course[: first + 1] += 10 - np.arange(first + 1)
+        # The steepest fall is the first, whose slope reaches to the second step; then one later, and the least loss.
+        course[0] += 40
         course[first + 4 :] -= 1
         course[-3:] = course[-4] + np.array([5.0, 0.5, 0.1])
         wanted = np.gradient(course, np.log(steps))

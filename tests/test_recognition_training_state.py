@@ -101,11 +101,11 @@ def test_checkpoints_come_by_the_clock_and_time_for_data_is_counted(monkeypatch)
     """Each look at the clock takes a second: two around each read, one for the question whether to save."""
     clock = iter(range(1000))
     monkeypatch.setattr(loop, "time", SimpleNamespace(monotonic=lambda: float(next(clock))))
-    trainer = Looping(checkpoint_s=5, steps=6, validate_every=6)
+    trainer = Looping(checkpoint_s=6, steps=6, validate_every=6)
     trainer.fit()
-    # The clock says 1 at the beginning, 4 and 7 after two steps, 8 after the save, 11, 14 and so on.
+    # The clock says 1 at the beginning, 4, 7 and 10 after three steps, 11 after the save, 14, 17 and 20.
     assert [entry if isinstance(entry, str) else len(entry) for entry in trainer.seen] == [
-        3, 3, "saved", 3, 3, "saved", 3, 3, "validated 6", "said from 0", "saved"]  # fmt: skip
+        3, 3, 3, "saved", 3, 3, 3, "validated 6", "said from 0", "saved"]  # fmt: skip
     assert trainer.waited_s == 6
 
 

@@ -98,6 +98,8 @@ def test_a_measured_line_lies_above_all_points_and_finds_an_exact_law():
         assert base >= 0 and slope >= 0
         assert all(base + slope * size >= value * (1 - 1e-12) for size, value in points)
     assert line([(7.0, 5.0), (7.0, 3.0)]) == (5.0, 0.0)
+    # Jobs of no units that write nothing.
+    assert line([(0.0, 0.0), (0.0, 0.0)]) == (0.0, 0.0)
     assert line([(1.0, 5.0), (3.0, 4.9)]) == (5.0, 0.0)
     # A slope that adds less than a millionth of the largest value over all sizes is rounding.
     for whole in (1.0, 4e9):

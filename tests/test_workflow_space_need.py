@@ -53,6 +53,16 @@ def test_a_file_made_anew_needs_what_it_grows_by_and_room_for_the_old_one_until_
     assert space.need([space.PlannedJob("a", {})], figures, PLAN, CONFIG, 2).disk == 5.0
 
 
+def test_a_line_of_the_table_gives_bytes_and_mebibytes_as_bytes(tmp_path):
+    table = tmp_path / "space.csv"
+    table.write_text(",".join(space.COLUMNS) + "\necho,x,3,5,7,11,no\ntiles,x,0,0,0.5,0,yes\n")
+    assert space.read(table) == {
+        "echo": space.Figures(3.0, 5.0, 7.0 * 1_048_576, 11.0, False),
+        "tiles": space.Figures(0.0, 0.0, 524_288.0, 0.0, True),
+    }
+    assert (space.read(table)["echo"].disk(2), space.read(table)["echo"].memory(2)) == (13.0, 7.0 * 1_048_576 + 22)
+
+
 def test_a_shard_of_clean_echoes_holds_one_signal_for_all_levels():
     recipe = CONFIG | {"shards": {"kind": "recipe"}}
     values = 50 * 2 * 3 * 400
