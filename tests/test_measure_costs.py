@@ -161,12 +161,12 @@ def test_an_estimate_adds_stages_rounds_hours_and_gigabytes_and_counts_a_recipe_
     config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
     models, samples = scale.samples_of(config)
     assert samples == 6 * models
-    stages = [{"rule": rule, "wall_s": "1234.5", "samples": "1000", "sample_bytes": "260123", "hardware": "here"}
+    stages = [{"rule": rule, "wall_s": "1234.567", "samples": "1000", "sample_bytes": "260123", "hardware": "here"}
               for rule in scale.DATA_RULES]  # fmt: skip
     signal = 8 * 400 * 3
     for kind, size in (("image", 260123), ("signal", signal), ("recipe", signal / 6)):
         row = scale.estimate(stages, [], config | {"shards": {"kind": kind}}, "x")
-        assert row["core_hours"] == round(6 * 1.2345 * samples / 3600, 2)
+        assert row["core_hours"] == round(6 * 1.234567 * samples / 3600, 2)
         assert row["shards_gb"] == round(size * samples / 1e9, 1)
         assert row["noisy_gb"] == round(signal * samples / 1e9, 1) and row["training_core_hours"] == ""
 

@@ -60,6 +60,13 @@ def test_a_spacing_beyond_half_the_symbol_rate_folds():
     assert features.line_spacing_hz(signal, INTERVAL_S)[0][0] == pytest.approx(400 - 230, abs=0.5)
 
 
+def test_lines_half_the_symbol_rate_apart_are_told_so():
+    """The longest lag of the circular autocorrelation is half of its points; it also counts as a peak."""
+    signal = (body(0.5) * (1 + 0.8 * np.exp(2j * np.pi * 200 * TIMES)))[None]
+    spacing, strength = features.line_spacing_hz(signal, INTERVAL_S)
+    assert spacing[0] == 200 and strength[0] > 0.9
+
+
 def test_bandwidth_is_that_of_the_lines_that_hold_the_power():
     frequencies = {40.0: 0.2, -40.0: 0.2, 0.0: 1.0}
     signal = body(1.0) * sum(np.sqrt(p) * np.exp(2j * np.pi * f * TIMES) for f, p in frequencies.items())
