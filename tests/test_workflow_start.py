@@ -47,7 +47,7 @@ def test_a_started_training_reads_its_start_and_has_steps_of_its_own():
     assert products.training_samples(three)["start"] == f"{base}/unseen/abc-vrp-trp-vt/4/model.pt"
     assert products.training_samples(other) == bare.training_samples(other)
     told = json.loads(settings.training(one))["training"]
-    assert (told["steps"], told["rate"], told["batch"]) == (5, 1e-4, 16) and "from" not in told
+    assert (told["steps"], told["rate"], told["batch"]) == (5, 1e-4, 32) and "from" not in told
     assert json.loads(settings.training(three))["training"]["steps"] == 20
     assert settings.training(other) == before.training(other)
     assert settings.training(Job(run="default", scheme="a-vrp-trp-vt")) == before.training(Job(run="default"))
