@@ -10,6 +10,7 @@ from torch import nn
 from lowalt.common.errors import InputError
 from lowalt.recognition import inference
 from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.matrix_products import MatrixProduct
 
 
 class Formula(nn.Module):
@@ -115,3 +116,16 @@ def test_evaluation_without_workers_reads_in_its_own_process():
     block = {"batch": 4, "threads": 1, "precision": "fp32", "mirror": True}
     assert inference.evaluation(block) == [4, 1, "fp32", True, 0]
     assert inference.evaluation(block | {"workers": 3})[-1] == 3
+
+
+def test_a_model_in_fp32_on_a_processor_computes_the_same_as_matrix_products():
+    torch.manual_seed(2)
+    images = torch.randn(3, 4, 3, 3)
+    model = nn.Sequential(nn.Conv2d(4, 6, 1), nn.ReLU(), nn.Conv2d(6, 5, 3))
+    expected = model(images)
+    kept = Machine(torch.device("cpu"), "bf16").placed(model)
+    assert [type(layer) for layer in kept] == [nn.Conv2d, nn.ReLU, nn.Conv2d]
+    placed = Machine(torch.device("cpu"), "fp32").placed(model)
+    assert [type(layer) for layer in placed] == [MatrixProduct, nn.ReLU, MatrixProduct]
+    assert placed[0].weight.is_contiguous(memory_format=torch.channels_last)
+    torch.testing.assert_close(placed(images), expected, rtol=1e-5, atol=1e-6)

@@ -13,6 +13,7 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.recognition import gpus
 from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.samples import ViewSamples
 
 
@@ -61,6 +62,12 @@ class Machine:
     def gpu(self) -> bool:
         """Whether the device is a GPU."""
         return self.device.type == "cuda"
+
+    def placed(self, model: nn.Module) -> nn.Module:
+        """Return a model on the device for predictions; in fp32 on a processor in the form that it computes fastest."""
+        if self.gpu or self.precision != "fp32":
+            return model.to(self.device)
+        return as_products(model).to(self.device, memory_format=torch.channels_last)
 
     def autocast(self) -> contextlib.AbstractContextManager:
         """Return the context of mixed precision (bfloat16), or none for fp32."""

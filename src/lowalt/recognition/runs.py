@@ -179,9 +179,9 @@ def evaluate(
     batch, threads, precision, mirror, workers = inference.evaluation(settings)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)
-    model = trained.model.to(machine.device)
+    model = machine.placed(trained.model)
     start = time.monotonic()
-    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.device.type == "cuda")
+    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
     found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch, mirror, ahead)
     seconds = time.monotonic() - start
     if machine.rank:
