@@ -18,7 +18,7 @@ STATION = Station("B", (30.0, -12.0, 21.0), 0.7, 4.93e9)
 
 
 def small(subcarriers):
-    """A radar of odd sizes, whose station looks askance and sends beside the carrier."""
+    """A radar of odd sizes. Its station faces 0.7 rad from the x axis and has another carrier than the network."""
     return Network(4.9e9, 120e3, subcarriers, 10, 2.5e-3, 3, (3, 2), (2, 5), 1.7, (STATION,))
 
 
@@ -126,7 +126,7 @@ def test_beams_aim_as_far_and_as_high_as_the_cases_are_to_test():
     np.testing.assert_allclose(mirrored, hard_cases.cluster(120) * [-1, 1, 1])
 
 
-def test_the_naive_formula_is_that_of_a_station_that_looks_askance_too():
+def test_the_naive_formula_holds_for_a_station_that_does_not_face_along_an_axis():
     network = dataclasses.replace(small(37), symbols=1)
     points = np.array([[95.0, 36.0, 44.0], [96.0, 35.0, 43.0], [94.0, 37.5, 44.5]])
     rcs, aim = np.array([0.5, 1.0, 2.0]), np.array([95.5, 36.5, 43.0])

@@ -128,7 +128,7 @@ class SetsCrossSections(Protocol):
 
 @runtime_checkable
 class WeighsPoints(Protocol):
-    """Channel: an effect on points' amplitudes; optional visible_of(settings, view, dark) skips points dark (N, L)."""
+    """Channel: an effect that changes the points' amplitudes (occlusion, aspect)."""
 
     def visible(self, settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
         """Return the real factor on every point's two-way amplitude, (N, L) or (N, 1)."""

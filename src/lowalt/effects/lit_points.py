@@ -4,11 +4,23 @@ Surfaces hide half of a target's points or more. A symbol's points with any stre
 without as fill the table, so that all symbols have equally many.
 """
 
+from typing import Protocol, runtime_checkable
+
 import numpy as np
 
 from lowalt.common.jit import LEAN
 from lowalt.effects.moment_loops import BLOCK
 from lowalt.effects.one_way import ImagePath
+from lowalt.effects.view import View
+
+
+@runtime_checkable
+class SkipsDarkPoints(Protocol):
+    """Channel: an effect on the points' amplitudes that does no work for points which another effect leaves dark."""
+
+    def visible_of(self, settings: dict, view: View, dark: np.ndarray | None) -> np.ndarray:
+        """Return the factor (N, L) of `visible`; any value of points that are `dark` (N, L), None for no such."""
+
 
 MOST = 0.85
 """Largest share of points in any symbol at which gathering them saves time."""

@@ -8,6 +8,7 @@ import numpy as np
 from lowalt.effects import arrivals, need, steering, waveform
 from lowalt.effects.catalogue import BY_END, NamedEffect, providing
 from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
+from lowalt.effects.lit_points import SkipsDarkPoints
 from lowalt.effects.response import ImagePath
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
@@ -179,7 +180,7 @@ class TargetEcho:
 
         dark: points (N, L) whose factor does not matter, None for no such.
         """
-        if dark is not None and hasattr(effect.module, "visible_of"):
+        if dark is not None and isinstance(effect.module, SkipsDarkPoints):
             return effect.module.visible_of(effect.settings, view, dark)
         if view is self.view and effect.name in self._seen:
             return self._seen[effect.name]

@@ -18,24 +18,25 @@ def _room(tensor: torch.Tensor) -> int:
     return -(-tensor.numel() // ALIGNED) * ALIGNED
 
 
+def _parts(flat: torch.Tensor, tensors: list[torch.Tensor]) -> list[torch.Tensor]:
+    """Return a long tensor's parts, one after the other, in the shapes and dense memory layouts of other tensors."""
+    found, at = [], 0
+    for tensor in tensors:
+        found.append(torch.as_strided(flat.detach(), tensor.shape, torch.empty_like(tensor).stride(), at))
+        at += _room(tensor)
+    return found
+
+
 def laid_out(tensors: list[torch.Tensor]) -> torch.Tensor:
     """Lay tensors of one type in one long tensor and return it, (elements,); each becomes a part of it.
 
     Values, shapes and memory layouts stay; the tensors' objects stay too, so a network goes on with the same weights.
     """
     flat = tensors[0].new_zeros(sum(map(_room, tensors)))
-    at = 0
-    for tensor in tensors:
-        part = _part(flat, tensor, at)
+    for tensor, part in zip(tensors, _parts(flat, tensors), strict=True):
         part.copy_(tensor.detach())
         tensor.data = part
-        at += _room(tensor)
     return flat
-
-
-def _part(flat: torch.Tensor, like: torch.Tensor, at: int) -> torch.Tensor:
-    """Return the elements of a long tensor from `at` on, in the shape and the dense memory layout of another tensor."""
-    return torch.as_strided(flat.detach(), like.shape, torch.empty_like(like).stride(), at)
 
 
 def wholes(tensors: list[torch.Tensor]) -> list[tuple[torch.Tensor, list[int]]]:
@@ -59,8 +60,7 @@ def wholes(tensors: list[torch.Tensor]) -> list[tuple[torch.Tensor, list[int]]]:
 
 
 class FlatAdamW(torch.optim.AdamW):
-    """`AdamW` that steps on the weights of each group as one parameter; every element changes as by `AdamW` itself,
-    but for rounding.
+    """`AdamW` that steps on the weights of each group as one parameter: the same steps, with other rounding.
 
     Gradients are zeroed in place, never dropped. The state is read and written weight by weight, as that of `AdamW`, so
     a training goes on with either.
@@ -80,14 +80,14 @@ class FlatAdamW(torch.optim.AdamW):
         kept = super().state_dict()
         state, groups, number = {}, [], 0
         for group, weights in zip(kept["param_groups"], self.members, strict=True):
-            values, at = kept["state"].get(group["params"][0], {}), 0
-            groups.append({**group, "params": list(range(number, number + len(weights)))})
-            for weight in weights:
-                if values:
-                    # The number of steps is a tensor of its own for each weight: `AdamW` counts in it.
-                    state[number] = {key: _part(value, weight, at) if value.ndim else value.clone()
-                                     for key, value in values.items()}  # fmt: skip
-                number, at = number + 1, at + _room(weight)
+            values = kept["state"].get(group["params"][0], {})
+            # The number of steps is a tensor of its own for each weight: `AdamW` counts in it.
+            parts = {key: _parts(value, weights) if value.ndim else [value.clone() for _ in weights]
+                     for key, value in values.items()}  # fmt: skip
+            numbers = list(range(number, number := number + len(weights)))
+            groups.append({**group, "params": numbers})
+            if values:
+                state |= {one: {key: parts[key][place] for key in parts} for place, one in enumerate(numbers)}
         return {"state": state, "param_groups": groups}
 
     def load_state_dict(self, state_dict: dict) -> None:
@@ -107,8 +107,6 @@ def _whole(weights: list[nn.Parameter]) -> nn.Parameter:
     """Lay weights end to end and return them as one parameter (elements,), whose gradient is theirs, end to end."""
     whole = nn.Parameter(laid_out(list(weights)))
     whole.grad = torch.zeros_like(whole)
-    at = 0
-    for weight in weights:
-        weight.grad = _part(whole.grad, weight, at)
-        at += _room(weight)
+    for weight, part in zip(weights, _parts(whole.grad, weights), strict=True):
+        weight.grad = part
     return whole

@@ -1,5 +1,6 @@
 """The moving average of a model's weights, updated at every step: `ModelEmaV3`, which lists its tensors only once."""
 
+import torch
 from timm.utils import ModelEmaV3
 from torch import nn
 
@@ -11,6 +12,10 @@ class MovingAverage(ModelEmaV3):
 
     def __init__(self, model: nn.Module, decay: float) -> None:
         """model: whose weights are averaged, moved in place only; decay: weight of the old average, 0..1."""
+        # Running means of batch norms and the like, which no optimiser lays end to end.
+        others = [value for value in model.buffers() if value.dtype == torch.float32]
+        if others:
+            laid_out(others)
         super().__init__(model, decay=decay)
         # The module's own tensors, not those of its state, whose memory can be exchanged without the module's.
         own = dict(self.module.named_parameters(remove_duplicate=False)) | dict(self.module.named_buffers())

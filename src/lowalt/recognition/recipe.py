@@ -40,7 +40,7 @@ from torch import nn
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.streams import digest
-from lowalt.recognition.flat_weights import FlatAdamW, laid_out
+from lowalt.recognition.flat_weights import FlatAdamW
 
 KEYS = (
     "steps", "batch", "snrs_per_model", "rate", "backbone_rate", "weight_decay", "warmup", "clip",
@@ -104,7 +104,7 @@ def averaging(decay: float, step: int) -> float:
 def optimiser(model: nn.Module, block: dict, flat: bool = False) -> torch.optim.AdamW:
     """Return AdamW with four groups: backbone or not, matrix (decayed) or not.
 
-    flat: lay the weights of each group end to end and step on them as one (`flat_weights`); lay out other values too.
+    flat: lay the weights of each group end to end and step on them as one (`flat_weights`).
     """
     groups = []
     named = list(model.named_parameters())
@@ -119,12 +119,7 @@ def optimiser(model: nn.Module, block: dict, flat: bool = False) -> torch.optim.
             decay = block["weight_decay"] if matrix else 0.0
             if members:
                 groups.append({"params": members, "factor": factor, "weight_decay": decay})
-    if not flat:
-        return torch.optim.AdamW(groups, lr=block["rate"], fused=True)
-    others = [value for value in model.buffers() if value.dtype == torch.float32]
-    if others:
-        laid_out(others)
-    return FlatAdamW(groups, lr=block["rate"], fused=True)
+    return (FlatAdamW if flat else torch.optim.AdamW)(groups, lr=block["rate"], fused=True)
 
 
 def seeded(seed: int, keys: tuple, threads: int) -> None:

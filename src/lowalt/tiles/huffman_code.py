@@ -13,7 +13,7 @@ LONGEST = 15
 
 @PLAIN
 def _sort(weights, order):
-    """Fill `order` with the symbols of weights above 0, lightest first, lower ones first; return their number."""
+    """Fill `order` with the symbols that occur, by rising weight and then by number; return how many there are."""
     nodes = 0
     for symbol in range(weights.size):
         if weights[symbol] == 0:
