@@ -3,7 +3,8 @@
     python benchmarks/mutants.py --out mutants.csv --survivors mutants_survivors.csv --minutes 45     (make mutants)
 
 For each room of `src/lowalt` a number of faults is drawn by seed. Each is set into a copy of the tree, and the tests
-that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too long.
+that run its line are run there until one fails. A failing test kills the fault, and so does a run that takes too much
+processor time. A run that the clock stops first leaves the fault undecided: it is counted apart, and not as killed.
 Maps of tests and outcomes are kept in `--kept`; the same command goes on where the last one stopped. Rooms take turns,
 so that all of them have about as many outcomes when time is up. The list of survivors holds every fault that survived
 a trial, also one that a test kills by now; verdicts that a reader wrote into its last column stay. Where edits of a
@@ -32,10 +33,11 @@ from mutation.trials import Outcome, copy_of_tree, trial
 from lowalt.common.csv_tables import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
-COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_time", "survived", "equivalent",
-           "killed_percent", "low_percent", "high_percent")  # fmt: skip
-"""`survived_first`: before tests were added; `equivalent`: survivors that change no result, by their verdict;
-`killed_percent`: of the faults tried except these; `low_percent`, `high_percent`: its 95 % interval."""
+COLUMNS = ("room", "places", "drawn", "tried", "survived_first", "killed", "by_time", "undecided", "survived",
+           "equivalent", "killed_percent", "low_percent", "high_percent")  # fmt: skip
+"""`survived_first`: before tests were added; `by_time`: killed, since processor time ran out; `undecided`: stopped by
+the clock; `equivalent`: faults not killed that change no result, by their verdict; `killed_percent`: of the faults
+tried except these; `low_percent`, `high_percent`: its 95 % interval."""
 SURVIVORS = ("file", "line", "operator", "occurrence", "tests", "before", "after", "now", "verdict")
 _COMMON = ("archives", "classes", "command", "config", "csv_tables", "download", "echo_rounding", "hardware", "noise",
            "plan", "portable", "splits", "turns", "workflow_board")  # fmt: skip
@@ -63,6 +65,8 @@ NEAR = {
     "workflow": ("workflow", "invented_sizes", "command.py", "command_options"),
 }
 """How the names of files of tests of a room begin, where not by the room's name alone."""
+FILE_S = 12.0
+"""Seconds that a file of tests is taken to need where `--files` spares the map that tells its time."""
 
 
 def near(root: Path, asked: list[str]) -> list[str]:
@@ -102,12 +106,13 @@ def run(
             return None
         tree = trees.get()
         try:
-            spent = sum(found.seconds[test] for test in tests)
+            spent = sum(found.seconds[test] for test in tests) * (FILE_S if asked.files else 1)
             outcome = kept.of(mutant, tests, lambda: trial(tree, mutant, tests, spent))
         finally:
             trees.put(tree)
-        print(f"{'killed  ' if outcome.killed else 'SURVIVED'} {mutant.file}:{mutant.line} {mutant.operator}"
-              f" {mutant.occurrence} ({outcome.tests} tests)", flush=True)  # fmt: skip
+        end = "killed   " if outcome.killed else "UNDECIDED" if outcome.undecided else "SURVIVED "
+        print(f"{end} {mutant.file}:{mutant.line} {mutant.operator} {mutant.occurrence} ({outcome.tests} tests)",
+              flush=True)  # fmt: skip
         return outcome
 
     with ThreadPoolExecutor(asked.jobs) as pool:
@@ -139,12 +144,12 @@ def looks(
     if found is None:
         return None
     outcomes = run(root, found, faults, asked, until, kept)
-    left = [outcome.mutant for outcome in outcomes if not outcome.killed]
+    left = [outcome.mutant for outcome in outcomes if not (outcome.killed or outcome.undecided)]
     others = sorted(that_name(every, left) - set(first)) if asked.near and left else []
     more = mapped(others) if others else None
     if more:
         second = run(root, joined([found, more]), left, asked, until, kept)
-        outcomes = [*(outcome for outcome in outcomes if outcome.killed), *second]
+        outcomes = [*(outcome for outcome in outcomes if outcome.killed or outcome.undecided), *second]
     kept.note(outcome.mutant for outcome in outcomes if not outcome.killed)
     return outcomes
 
@@ -173,13 +178,13 @@ def room_rows(places: dict[str, list], outcomes: list[Outcome], kept: Kept, surv
     rows = []
     for room, (every, chosen) in places.items():
         mine = [outcome for outcome in outcomes if outcome.mutant in set(chosen)]
-        killed = sum(outcome.killed for outcome in mine)
+        killed, undecided = sum(outcome.killed for outcome in mine), sum(outcome.undecided for outcome in mine)
         first = sum(kept.survived_once(outcome.mutant) for outcome in mine)
         same = sum(room_of(row["file"]) == room and row["verdict"].startswith("equivalent") for row in survivors)
         judged = len(mine) - same
         shares = (killed / judged, *wilson(killed, judged)) if judged else ()
-        values = (room, len(every), len(chosen), len(mine), first, killed, sum(each.late for each in mine),
-                  len(mine) - killed, same, *(f"{100 * share:.1f}" for share in shares))  # fmt: skip
+        values = (room, len(every), len(chosen), len(mine), first, killed, sum(each.late for each in mine), undecided,
+                  len(mine) - killed - undecided, same, *(f"{100 * share:.1f}" for share in shares))  # fmt: skip
         rows.append(dict(zip_longest(COLUMNS, values, fillvalue="")))
     return rows
 

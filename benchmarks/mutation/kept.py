@@ -52,7 +52,7 @@ class Kept:
         row = self.rows.get(self._fault(mutant))
         if row is None or not (row["killed"] or row["shown"] == self._tests(tests)):
             return None
-        return Outcome(mutant, row["killed"], row["tests"], row["late"])
+        return Outcome(mutant, row["killed"], row["tests"], row["late"], row.get("undecided", False))
 
     def of(self, mutant: Mutant, tests: list[str], try_it: Callable[[], Outcome]) -> Outcome:
         """The kept outcome, or that of a trial, which is kept."""

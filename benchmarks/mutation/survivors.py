@@ -18,8 +18,9 @@ def survivor_row(root: Path, outcome: Outcome, verdicts: dict[tuple, str]) -> di
     """A line of the table of survivors: where the fault stood, the line before and after, and what became of it."""
     before, after = changed(root, outcome.mutant)
     verdict = "test added" if outcome.killed else verdicts.get((outcome.mutant.file, before, after), "open")
+    now = "killed" if outcome.killed else "undecided" if outcome.undecided else "survives"
     return {**outcome.mutant._asdict(), "tests": outcome.tests, "before": before, "after": after,
-            "now": "killed" if outcome.killed else "survives", "verdict": verdict}  # fmt: skip
+            "now": now, "verdict": verdict}  # fmt: skip
 
 
 def earlier(root: Path, rows: list[dict[str, str]], places: list[Mutant], drawn: list[Mutant]) -> dict[Mutant, dict]:

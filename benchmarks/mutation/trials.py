@@ -1,8 +1,10 @@
 """A fault set into a copy of the tree, and the tests shown to it. Copies stay, so that their machine code is kept."""
 
 import hashlib
+import math
 import os
 import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -11,16 +13,21 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mutation.candidates import Mutant, mutated
-from mutation.forked import run_tests
+from mutation.forked import Limits, run_tests
 
 
 class Outcome(NamedTuple):
-    """A fault and its end: `killed` or not, how many tests were shown it, and whether they ran out of time."""
+    """A fault and its end: `killed` or not, and how many tests were shown it.
+
+    `late`: killed, since the tests ran out of processor time; `undecided`: neither killed nor survived, since the tests
+    were stopped by the clock.
+    """
 
     mutant: Mutant
     killed: bool
     tests: int
     late: bool = False
+    undecided: bool = False
 
 
 def copy_of_tree(root: Path, folder: Path) -> Path:
@@ -75,17 +82,20 @@ def _fault(path: Path, text: str) -> Iterator[None]:
 def trial(tree: Path, mutant: Mutant, tests: list[str], seconds: float) -> Outcome:
     """Set a fault into `tree`, run `tests` until one fails, and take the fault out again.
 
-    A fault that no test runs survives. `seconds`: the time that the tests take without a fault; a run of more than five
-    times that and three minutes is a loop without end, and kills.
+    A fault that no test runs survives. `seconds`: the time that the tests take without a fault; a run that takes more
+    processor time than five times that and three minutes is a loop without end, and kills. A run that takes four times
+    as long as this on the clock is stopped and decides nothing: the machine may be loaded, or the tests wait.
     """
     if not tests:
         return Outcome(mutant, False, 0)
     path = tree / mutant.file
     good = hashlib.sha256(path.read_bytes()).digest()
     with _fault(path, mutated(path.read_text(encoding="utf-8"), mutant)):
-        ended = run_tests(tree, tests, 180 + 5 * seconds, path, good)
-    late = ended is None
+        processor_s = math.ceil(180 + 5 * seconds)
+        ended = run_tests(tree, tests, Limits(processor_s, 4 * processor_s), path, good)
+    if ended is None:
+        return Outcome(mutant, False, len(tests), undecided=True)
     # 1: a test failed; 2 to 4: its file cannot be imported; 5: all tests named were left out, which is no judgement.
     if ended == 5:
         raise RuntimeError(f"{mutant.file}:{mutant.line}: pytest ran none of {tests}")
-    return Outcome(mutant, ended != 0, len(tests), late)
+    return Outcome(mutant, ended != 0, len(tests), late=ended == -signal.SIGXCPU)
