@@ -151,6 +151,13 @@ def test_bands_of_confidence_are_fifteen_of_equal_width():
     assert found["brier"] == pytest.approx(2 * (0.66**2 + 0.33**2 + 1 + 0.05**2) / 4)
 
 
+def test_the_last_band_of_confidence_begins_at_fourteen_fifteenths():
+    """Too little confidence in one band does not make up for too much in the next."""
+    top = np.array([0.93, 0.94])
+    found = statistics.calibration(np.stack([top, 1 - top], 1), np.array([0, 1]))
+    assert found["calibration_error"] == pytest.approx((0.07 + 0.94) / 2)
+
+
 def test_the_pareto_front_has_no_point_that_another_betters():
     cost, value = np.array([1, 2, 2, 3, 3, np.nan, 1]), np.array([5, 7, 6, 7, 9, 9, np.nan])
     assert statistics.pareto(cost, value).tolist() == [True, True, False, False, True, False, False]
