@@ -108,7 +108,7 @@ def test_costs_are_those_of_the_tables(plots):
 
 
 def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
-    few = [plots["stage_times"], plots["bands"]]
+    few = [(plot, svg(plot)) for plot in (plots["stage_times"], plots["bands"])]
     for folder in ("one", "two"):
         write_plots(tmp_path / folder, few)
     names = sorted(path.name for path in (tmp_path / "one").iterdir())
@@ -117,6 +117,14 @@ def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
     with (tmp_path / "one/stage_times.csv").open() as file:
         assert next(csv.DictReader(file)) == {"rule": "echo (3)", "wall_s": "2.0", "cpu_s": "1.5", "peak_mib": "90.0"}
     assert "echo (3)" in (tmp_path / "one/stage_times.svg").read_text()
+
+
+def test_names_inside_a_plot_are_its_own_and_do_not_tell_what_was_drawn_before(plots):
+    named = [plots["accuracy_cost"], plots["accuracy_cost"]._replace(name="others")]
+    first, second = (re.findall(r'<clipPath id="(.*?)"', svg(plot)) for plot in named)
+    assert first[0] == "accuracy_cost-clip1" and [name.replace("accuracy_cost", "others") for name in first] == second
+    assert {f"url(#{name})" for name in first} == set(re.findall(r"url\(#.*?\)", svg(named[0])))
+    assert svg(named[0]).replace("accuracy_cost-clip", "others-clip") == svg(named[1])
 
 
 def test_a_name_cannot_end_the_script_that_holds_it():

@@ -35,8 +35,9 @@ rule report:
         "results/{run}/logs/report.log",
     conda:
         "../../envs/environment.yaml"
+    threads: 2
     params:
         settings=settings.report,
     shell:
-        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q}"
+        "python -m lowalt.report --settings {params.settings:q} --manifest {input.manifest:q} --jobs {threads}"
         " --stages {output.stages:q} --figures {output.figures:q} --out {output.page:q} 2> {log:q}"

@@ -73,11 +73,10 @@ def _stretch(count: int, freedom: int) -> float:
     degrees of freedom needs Student's quantile instead of the normal one. Source: Davison and Hinkley, Bootstrap
     Methods and their Application, 1997, section 2; Hesterberg, What Teachers Should Know about the Bootstrap, 2015.
     """
-    # The Snakefile imports this module, and the distributions take most of a second to import.
-    from scipy.stats import norm as normal
-    from scipy.stats import t as student
+    # The Snakefile imports this module, and SciPy takes time to import: scipy.stats, with the same values, a second.
+    from scipy.special import ndtri, stdtrit
 
-    return float(np.sqrt(count / (count - 1)) * student.ppf(0.975, freedom) / normal.ppf(0.975))
+    return float(np.sqrt(count / (count - 1)) * stdtrit(freedom, 0.975) / ndtri(0.975))
 
 
 def _subtype_weights(subtypes: np.ndarray, repeats: int, generator: np.random.Generator) -> np.ndarray:

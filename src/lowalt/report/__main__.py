@@ -2,18 +2,27 @@
 
 import json
 import sys
+from functools import partial
 from pathlib import Path
 
 from lowalt.common.command import parser, pick, run
 from lowalt.common.files import replacing
+from lowalt.common.side_by_side import together
 from lowalt.motion import read_table
 from lowalt.report.figures.stills import write_stills
 from lowalt.report.inputs import Inputs
-from lowalt.report.page import contents, page, plots
-from lowalt.report.plots import write_plots
+from lowalt.report.page import SECTIONS, page, section
+from lowalt.report.plots import scripts, write_plots
 from lowalt.report.run import ReportedRun
 from lowalt.report.sections.stages import write_stages
 from lowalt.targets.cloud import read
+
+
+def _stills(folder: Path, reported: ReportedRun) -> None:
+    """Write the pictures of the run's points (`stills.write_stills`)."""
+    inputs = reported.inputs
+    clouds = [read(path) for path in inputs.paths("clouds")]
+    write_stills(folder, clouds, inputs.path("gallery").read_bytes(), read_table(inputs.path("motion")))
 
 
 def main(arguments: list[str]) -> None:
@@ -26,15 +35,14 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--stages", required=True, help="table of the stages' times to write (.csv)")
     options.add_argument("--figures", required=True, type=Path, help="folder of the figures to write (.svg, .csv)")
     options.add_argument("--out", required=True, help="page to write (.html)")
+    options.add_argument("--jobs", type=int, default=1, help="sections made at a time, each in a process of its own")
     given = options.parse_args(arguments)
     reported = ReportedRun(Inputs.read(given.manifest), *pick(given.settings, "config", "published"))
     write_stages(given.stages, reported)
-    values = contents(reported)
-    text = page(reported, values)
-    write_plots(given.figures, plots(values))
-    clouds = [read(path) for path in reported.inputs.paths("clouds")]
-    gallery, motion = reported.inputs.path("gallery").read_bytes(), read_table(reported.inputs.path("motion"))
-    write_stills(given.figures, clouds, gallery, motion)
+    calls = [scripts, partial(_stills, given.figures, reported)]
+    script, _, *made = together(calls + [partial(section, reported, name) for name in SECTIONS], given.jobs)
+    write_plots(given.figures, [plot for one in made for plot in one.plots])
+    text = page(reported, dict(zip(SECTIONS, made, strict=True)), script)
     with replacing(given.out) as temporary:
         temporary.write_text(text)
     print(json.dumps({"report": given.out, "samples": len(reported.shards)}), file=sys.stderr)

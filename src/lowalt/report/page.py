@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import jinja2
 
-from lowalt.report.plots import Plot, plotted, scripts
+from lowalt.report.plots import Plot, plotted, scripts, svg
 from lowalt.report.run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
@@ -40,6 +40,13 @@ class PagePart(NamedTuple):
     sections: tuple[ModuleType, ...]
 
 
+class Section(NamedTuple):
+    """A section of a run's page: its HTML, and its plots with their SVG."""
+
+    html: str
+    plots: list[tuple[Plot, str]]
+
+
 RESULTS = (accuracy, orderings, confusion, subtypes, bands, alarms, calibration, transfer, trainings)
 PARTS = (
     PagePart("run", "This run", (overview,)),
@@ -54,8 +61,16 @@ PARTS = (
     PagePart("provenance", "Provenance", (made_with,)),
 )
 """The parts in the order of the page. Every page has all of them; a part without values says so."""
-SECTIONS = tuple(section for part in PARTS for section in part.sections)
-"""The sections in the order of the page.
+
+
+def _name(module: ModuleType) -> str:
+    """A section's name, that of its module."""
+    return module.__name__.rpartition(".")[2]
+
+
+_MODULES = {_name(module): module for part in PARTS for module in part.sections}
+SECTIONS = tuple(_MODULES)
+"""The names of the sections in the order of the page.
 
 Each module has `values(run)`. It returns the values that its template shows, or None where the run has no such section.
 The template has the name of its module and lies in the same folder.
@@ -76,10 +91,17 @@ def rendered(name: str, values: dict | None) -> str:
     return "" if values is None else _templates().get_template(f"sections/{name}.html").render(values)
 
 
-def assembled(title: str, parts: list[dict[str, str]]) -> str:
-    """Return a self-contained page of parts with their contents; each has id, title and html."""
+def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
+    """Return a self-contained page of parts with their contents; each has id, title and html.
+
+    script: JavaScript of the plots where it was made before (`plots.scripts`).
+    """
     drawn = any('<figure class="plot">' in part["html"] for part in parts)
-    return _templates().get_template("page.html").render(title=title, parts=parts, plots=scripts() if drawn else "")
+    return (
+        _templates()
+        .get_template("page.html")
+        .render(title=title, parts=parts, plots=(script or scripts()) if drawn else "")
+    )
 
 
 def section_page(title: str, name: str, values: dict) -> str:
@@ -87,29 +109,21 @@ def section_page(title: str, name: str, values: dict) -> str:
     return assembled(title, [{"id": name, "title": title, "html": rendered(name, values)}])
 
 
-def contents(run: ReportedRun) -> dict[str, dict | None]:
-    """Return the values of every section by its name.
+def section(run: ReportedRun, name: str) -> Section:
+    """Return the section `name` of a run.
 
     Raises: InputError for a table that is missing or lacks a column.
     """
-    return {_name(module): module.values(run) for module in SECTIONS}
+    values = _MODULES[name].values(run)
+    plots = [held for held in (values or {}).values() if isinstance(held, Plot)]
+    return Section(rendered(name, values), [(plot, svg(plot)) for plot in plots])
 
 
-def _name(module: ModuleType) -> str:
-    """A section's name, that of its module."""
-    return module.__name__.rpartition(".")[2]
-
-
-def plots(values: dict[str, dict | None]) -> list[Plot]:
-    """Return the plots among the sections' values, in the order of the page."""
-    return [held for section in values.values() for held in (section or {}).values() if isinstance(held, Plot)]
-
-
-def page(run: ReportedRun, values: dict[str, dict | None]) -> str:
-    """Return the whole page of the sections' values."""
+def page(run: ReportedRun, sections: dict[str, Section], script: str = "") -> str:
+    """Return the whole page of the sections by their names; script: as `assembled` takes it."""
     parts = []
     for part in PARTS:
-        texts = [rendered(_name(module), values[_name(module)]) for module in part.sections]
-        html = "\n".join(texts).strip() or "<p>Neither this run nor the kept reference has measured this.</p>"
+        html = "\n".join(sections[_name(module)].html for module in part.sections).strip()
+        html = html or "<p>Neither this run nor the kept reference has measured this.</p>"
         parts.append({"id": part.id, "title": part.title, "html": html})
-    return assembled(f"run “{run.config['run']}”", parts)
+    return assembled(f"run “{run.config['run']}”", parts, script)

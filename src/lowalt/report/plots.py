@@ -42,16 +42,24 @@ def whole(plot: Plot) -> dict:
 
 
 def svg(plot: Plot) -> str:
-    """Return the plot as SVG; equal rows give equal text. A plot that was drawn before is not drawn again."""
-    return _drawn(json.dumps(whole(plot)))
+    """Return the plot as SVG; equal names and rows give equal text. A plot that was drawn before is not drawn again.
+
+    Names inside it begin with the plot's, so that no two plots of a page share one.
+    """
+    return _drawn(json.dumps(whole(plot)), plot.name)
 
 
 @functools.lru_cache(maxsize=64)
-def _drawn(specification: str) -> str:
+def _drawn(specification: str, name: str) -> str:
     """The SVG of a whole specification (JSON)."""
     import vl_convert
 
-    return vl_convert.vegalite_to_svg(json.loads(specification), vl_version=VEGA_LITE)
+    text = vl_convert.vegalite_to_svg(json.loads(specification), vl_version=VEGA_LITE)
+    # The library counts clip paths through a process, so their numbers tell what else it has drawn.
+    numbers: dict[str, int] = {}
+    return re.sub(r'(id="|url\(#)clip(\d+)',
+                  lambda found: f"{found[1]}{name}-clip{numbers.setdefault(found[2], len(numbers) + 1)}",
+                  text)  # fmt: skip
 
 
 def scripts() -> str:
@@ -69,10 +77,10 @@ def plotted(plot: Plot) -> Markup:
                   ).format(escape(plot.description), Markup(svg(plot)), Markup(text))  # fmt: skip
 
 
-def write_plots(folder: Path, plots: Iterable[Plot]) -> None:
-    """Write every plot as {name}.svg and its rows as {name}.csv into a folder."""
+def write_plots(folder: Path, plots: Iterable[tuple[Plot, str]]) -> None:
+    """Write every plot's SVG as {name}.svg and its rows as {name}.csv into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for plot in plots:
+    for plot, drawn in plots:
         write_csv(folder / f"{plot.name}.csv", list(plot.rows[0]), plot.rows)
         with replacing(folder / f"{plot.name}.svg") as temporary:
-            temporary.write_text(svg(plot))
+            temporary.write_text(drawn)

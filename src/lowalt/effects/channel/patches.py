@@ -6,7 +6,6 @@ offset is then 1/2, its mean. So the land's rings are centred a quarter of a cel
 """
 
 import numpy as np
-from scipy.signal import lfilter
 from scipy.special import ndtr, ndtri
 
 OFFSET = 0.25
@@ -35,6 +34,9 @@ def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
     """
     if correlation == 0:
         return uniform
+    # The report explains scenes by the laws of this folder, and scipy.signal takes a second to import.
+    from scipy.signal import lfilter
+
     score = ndtri(uniform)
     score[:, 1:] *= np.sqrt(1 - correlation**2)
     return ndtr(lfilter([1.0], [1.0, -correlation], score, axis=1))

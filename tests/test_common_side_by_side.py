@@ -1,0 +1,39 @@
+"""Calls made side by side: their order, their processes, and what a failing one leaves undone."""
+
+import os
+import time
+from functools import partial
+
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.common.side_by_side import together
+
+
+def told(number, wait):
+    """Return a number and the process that was asked, after a while (s)."""
+    time.sleep(wait)
+    return number, os.getpid()
+
+
+def refused(path):
+    raise InputError(f"{path}: expected something else")
+
+
+def test_results_keep_the_order_of_the_calls_and_come_from_other_processes():
+    found = together([partial(told, number, wait) for number, wait in enumerate((0.1, 0.0, 0.05, 0.0))], 2)
+    assert [number for number, _ in found] == [0, 1, 2, 3]
+    processes = {process for _, process in found}
+    assert len(processes) == 2 and os.getpid() not in processes
+
+
+def test_one_job_stays_in_this_process():
+    assert together([partial(told, number, 0) for number in range(3)], 1) == [(n, os.getpid()) for n in range(3)]
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_error_is_that_of_the_call_and_calls_not_begun_are_left_out(jobs, tmp_path):
+    late = [partial((tmp_path / str(number)).touch) for number in range(20)]
+    with pytest.raises(InputError, match=r"^table\.csv: expected something else$"):
+        together([partial(refused, "table.csv"), partial(told, 0, 0.3), *late], jobs)
+    assert len(list(tmp_path.iterdir())) < 20
