@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import torch
-from scipy.optimize import minimize_scalar
 
 from lowalt.common.errors import InputError
 from lowalt.common.streams import digest
@@ -116,6 +115,9 @@ MAKERS = {"svm": _svm, "boosting": _boosting, "xgboost": _xgboost}
 
 def _tempered(model: Classical, features: torch.Tensor, labels: np.ndarray) -> None:
     """Set the temperature that gives the least cross entropy on validation samples; no guess changes."""
+    # Trainings of networks import this module too, and SciPy's optimisers take half a second to import.
+    from scipy.optimize import minimize_scalar
+
     with torch.inference_mode():
         scores = model.scores(features.flatten(1).double())
 
