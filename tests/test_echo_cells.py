@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
@@ -95,6 +96,14 @@ def test_parts_that_do_not_turn_are_placed_as_if_turned_by_zero():
     places = nodes[:, part] + np.einsum("nlij,lj->nli", turned[:, part], points)
     truth = echo_signal(net, net.stations[0], places, 1.0, nodes[0, 0], paths=[Path()])
     assert relative(moved.signal, truth.signal) < 1e-11 and relative(moved.signal, plain.signal) > 1e-3
+
+
+def test_rotations_of_a_wrong_shape_are_named_by_the_shape_they_were_given_in():
+    """One number repeated is checked by its first entry alone, which has another shape."""
+    net = network(symbols=5)
+    motion = Rigid(np.broadcast_to(0.0, (5, 4, 2, 2)), np.ones((5, 4, 3)), np.ones((1, 3)), np.zeros(1, int))
+    with pytest.raises(InputError, match=r"motion.rotation has shape \(5, 4, 2, 2\), expected \(N, P, 3, 3\)"):
+        echo_signal(net, net.stations[0], motion, 1.0, np.ones(3))
 
 
 def test_a_point_half_way_between_two_cells_is_counted_as_a_tie_and_one_off_it_is_not():

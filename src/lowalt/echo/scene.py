@@ -72,7 +72,8 @@ def _float(name: str, value, shape: tuple[int | str, ...], sample: str) -> np.nd
 
 def _rotation(value, sample: str) -> tuple[np.ndarray, bool]:
     """Return the checked rotations, and whether they are one zero repeated, as the poses of nodes are."""
-    repeated = isinstance(value, np.ndarray) and value.ndim == 4 and value.size and not any(value.strides)
+    shaped = isinstance(value, np.ndarray) and value.ndim == 4 and value.shape[2:] == (3, 3)
+    repeated = shaped and value.size and not any(value.strides)
     if repeated and not _float("motion.rotation", value[:1, :1], ("N", "P", 3, 3), sample).any():
         return value, True
     return _float("motion.rotation", value, ("N", "P", 3, 3), sample), False
