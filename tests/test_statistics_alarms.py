@@ -84,6 +84,17 @@ def two_subtypes(first, second):
     return statistics.AlarmPart(score, np.repeat([0, 1], [40, 1]), names, np.repeat([0, 1, 2], [20, 20, 1]))
 
 
+def test_alarm_intervals_come_of_400_draws_where_no_number_is_named():
+    """The generator shows how many random numbers were taken."""
+    parts = [[alarm_part(stream(seed, name), 8, name)] for seed, name in ((1, "v"), (2, "t"))]
+    after = []
+    for said in ((), (400,), (401,)):
+        generator = stream(3, "a")
+        statistics.alarm_intervals(*parts, 0.9, False, generator, 4, *said)
+        after.append(generator.random())
+    assert after[0] == after[1] != after[2]
+
+
 def test_alarm_intervals_draw_seeds_and_where_asked_subtypes_of_the_test_part():
     good, bad, halves = two_subtypes(0.9, 0.9), two_subtypes(0.3, 0.3), two_subtypes(0.9, 0.3)
 

@@ -1,0 +1,64 @@
+"""Bounds that decide how an echo is computed: by direct sums, and what follows where a bound is too large."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lowalt.echo.fast import strongest_cell
+from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
+from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
+from lowalt.echo.pointwise.sums import far_bound
+from lowalt.echo.slow_time.node_count import choose
+from lowalt.echo.slow_time.pose_series import series_sizes
+
+
+def test_sizes_of_a_series_of_poses_are_those_of_plain_sums():
+    """Two groups of points on two parts; numbers of both signs, so that no sign or entry can be lost."""
+    rng = np.random.default_rng(7)
+    reference, offset = rng.normal(size=(3, 3)), rng.normal(size=(3, 2, 3))
+    turned, left = rng.normal(size=(3, 2, 3, 3)), abs(rng.normal(size=5))
+    rows, centres, radii = np.array([1, 0]), rng.normal(size=(2, 3)), np.array([0.3, 0.7])
+    moves, sizes, stray = series_sizes(reference, offset, turned, left, rows, centres, radii)
+    assert moves == pytest.approx(np.linalg.norm(reference, axis=1), rel=1e-14)
+    places = np.linalg.norm(offset[:, rows] + np.einsum("kgij,gj->kgi", turned[:, rows], centres), axis=2)
+    matrix = turned[:, rows]
+    squared = abs(matrix @ matrix.swapaxes(-1, -2)).sum(axis=-1).max(axis=-1)
+    assert sizes == pytest.approx((places + np.sqrt(squared) * radii).max(axis=1), rel=1e-14)
+    reach = np.linalg.norm(centres, axis=1) + radii
+    assert stray == pytest.approx((left[1 + rows] + left[3 + rows] * reach).max(), rel=1e-14)
+
+
+def test_a_sum_that_may_be_off_by_half_its_size_proves_no_strongest_cell(monkeypatch):
+    """One point at a whole cell: all other cells are empty, so only the error of the cells' sums is left to decide."""
+    for name in ("cell_sums", "strongest_of"):
+        monkeypatch.setattr(strongest_cell, name, getattr(strongest_cell, name).py_func)
+    certify, table = strongest_cell.certify.py_func, cell_polynomials(64, 0.1, 1e-9)
+    powers = np.zeros((2, table.kernels.shape[2]))
+    powers[0, 0] = 1.0
+    found = {}
+    for bound in (0.0, 0.4, 0.6, 1.2):
+        sums, far = np.empty((9, 2)), np.empty(4)
+        found[bound] = certify(table, PLACES // 2, 0.0, powers, 0.0, (1.0, 0.0), 1e-9, bound, 64, sums, far)
+    assert [found[bound][0] for bound in found] == [CERTAIN, CERTAIN, UNCERTAIN, UNCERTAIN]
+    assert found[0.4][1] == 4 and found[0.4][3] == pytest.approx(0.2, abs=1e-6) and not found[0.4][2]
+    assert found[0.6][3] == 0.0
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3, -0.45])
+def test_the_bound_of_far_cells_of_one_point_is_the_strongest_of_them(place):
+    """z sin(pi u) / (M sin(pi (j - u) / M)), largest in the nearest of the cells beyond; nothing at a whole cell."""
+    count, low, high = 40, -2, 2
+    bound = far_bound(np.array([2.0 - 1.0j]), np.array([place]), low, high, count)
+    beyond = np.array([low - 1, high + 1])
+    truth = abs((2 - 1j) * math.sin(math.pi * place) / (count * np.sin(math.pi * (beyond - place) / count)))
+    assert bound == pytest.approx(truth.max(), rel=1e-8, abs=1e-13)
+
+
+def test_where_no_degree_in_time_is_enough_none_is_chosen():
+    moves, sizes = np.array([100.0, 0.01, 1e-5]), np.array([0.5, 1e-3, 1e-6])
+    arguments = (moves, sizes, 30.0, 1.0, 0.02, 1.0, 1.0, 8, (1.0, 1.0, 1.0))
+    ellipses = np.array([1.5, 3.0, 8.0])
+    best, error, flat, bent = choose(*arguments, 1e-6, 40, ellipses)
+    assert 4 <= best <= 40 and 0 < error <= 1e-6 and 0 < flat < np.inf and 0 < bent < np.inf
+    assert choose(*arguments, 1e-6, best - 1, ellipses) == (0, np.inf, np.inf, np.inf)
