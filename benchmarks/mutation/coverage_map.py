@@ -2,7 +2,8 @@
 
 The map of a file of tests is kept until that file changes. Compiled kernels run outside the interpreter, and lines of
 definitions run at import: there no test is recorded. A fault in such a line is shown to the tests that run any line of
-the same file, or else of a file that imports it.
+the same file or of a file that imports it, and first to those whose file names the module: a test that calls a kernel
+alone runs no recorded line.
 """
 
 import ast
@@ -172,16 +173,23 @@ def _in_function(path: Path, line: int) -> bool:
 
 def shown_tests(root: Path, found: Coverage, file: str, line: int, limit: float) -> list[str]:
     """Tests that run a line until they take `limit` seconds together: those of its room first, each half the quickest
-    first. The quickest test of the room is shown even where it takes longer."""
+    first. The first of them is shown even where it takes longer."""
     rows = found.lines.get(file, {})
     # A line that runs at import belongs to no test, also where the import stands in one.
     own = set(rows.get(line, ())) if _in_function(root / file, line) else set()
     names = own or {test for tests in rows.values() for test in tests}
     near = [found.lines.get(other, {}) for other in importers(root, file)] if not own else []
     names |= {test for lines in near for tests in lines.values() for test in tests}
-    files = {name for name in names if "::" not in name}
+    mapped = {name.partition("::")[0].removeprefix("tests/") for name in found.seconds if name.startswith("tests/")}
+    told = {f"tests/{name}" for name in naming(root, sorted(mapped), file)} if not own else set()
+    files = {name for name in names if "::" not in name} | told
     names |= {test for test in found.seconds if test.partition("::")[0] in files}
-    order = sorted(names & found.seconds.keys(), key=lambda test: (not _of_room(test, file), found.seconds[test], test))
+
+    def place(test: str) -> tuple:
+        """What is compared to bring tests into order."""
+        return not _of_room(test, file), test.partition("::")[0] not in told, found.seconds[test], test
+
+    order = sorted(names & found.seconds.keys(), key=place)
     chosen, total = [], 0.0
     for name in order:
         if total + found.seconds[name] <= limit:

@@ -1,4 +1,4 @@
-"""Trials of small faults that take long: processor time kills a fault, the clock decides nothing."""
+"""Trials of small faults: processor time kills a fault, the clock decides nothing; which tests a kernel is shown."""
 
 import resource
 import signal
@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 from mutants import room_rows
 from mutation import trials
 from mutation.candidates import of_file
+from mutation.coverage_map import Coverage, shown_tests
 from mutation.forked import Limits, run_tests
 from mutation.kept import Kept
 from mutation.survivors import survivor_row
@@ -82,3 +83,17 @@ def test_an_undecided_fault_is_kept_and_counted_apart_and_waits_for_a_verdict(tr
     assert counts == [2, 1, 1, 1, 0, "50.0"]
     listed = survivor_row(tree, outcomes[0], {})
     assert (listed["now"], listed["verdict"]) == ("undecided", "open")
+
+
+def test_tests_of_a_file_that_names_the_module_are_shown_to_a_line_that_no_test_is_known_to_run(tree):
+    """A compiled kernel runs outside the interpreter, so the map does not know the test that calls it alone."""
+    for name, text in (("it", "from lowalt.reach import reach\n"), ("other", "from lowalt import other\n")):
+        (tree / f"tests/test_{name}.py").write_text(text)
+    seconds = {"tests/test_it.py::kernel": 3.0, "tests/test_it.py::slow": 8.0, "tests/test_other.py::quick": 1.0}
+    found = Coverage({"src/lowalt/reach.py": {1: ["tests/test_other.py::quick"]}}, seconds)
+    assert shown_tests(tree, found, "src/lowalt/reach.py", 2, 9.0) == [
+        "tests/test_it.py::kernel", "tests/test_other.py::quick"
+    ]  # fmt: skip
+    # A test that is known to run the line is enough.
+    known = Coverage({"src/lowalt/reach.py": {2: ["tests/test_other.py::quick"]}}, seconds)
+    assert shown_tests(tree, known, "src/lowalt/reach.py", 2, 9.0) == ["tests/test_other.py::quick"]
