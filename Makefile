@@ -33,16 +33,18 @@ export XDG_CACHE_HOME ?= $(CURDIR)/.venv/cache
 endif
 
 # uv installs the same pinned packages in less time than pip; pip does it where uv cannot (an index that only pip knows).
-PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
-install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt $(1) || $(PIP) -c envs/constraints.txt $(1)
+# The caller's pip brings uv, and uv brings pip; where the caller has none, the one that Python brings takes 4 s to unpack.
+PIP = { $(BIN)/python -m pip --version || $(BIN)/python -m ensurepip --default-pip; } >/dev/null 2>&1; $(BIN)/python -m pip install --quiet --disable-pip-version-check
+install = $(BIN)/uv pip install --quiet --python $(BIN)/python -c envs/constraints.txt $(1) || { $(PIP) -c envs/constraints.txt $(1); }
 # The packages that an extra of pyproject.toml names, without this package: a Snakemake that runs would miss it for a moment.
 of_extra = $$($(BIN)/python -c 'import tomllib; print(*tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["$(1)"])')
 
 $(BASE): pyproject.toml envs/constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "error: $(PYTHON) is older than Python 3.11; set PYTHON=..." >&2; exit 1; }
-	test -x $(BIN)/python || $(PYTHON) -m venv .venv
-	$(PIP) -c envs/constraints.txt uv || true
-	$(call install,-e '.[workflow$(comma)cost]')
+	test -x $(BIN)/python || $(PYTHON) -m venv --without-pip .venv
+	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
+		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
+	$(call install,-e '.[workflow$(comma)cost]' pip)
 	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) .venv/set-up-methods .venv/set-up-audit
 	touch $@
 
@@ -288,7 +290,7 @@ pictures: $(SETUP)  ## the README's picture, from the finished default run
 	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
 
 pins: $(TESTING)  ## write the installed versions as the pins
-	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
+	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --all --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
 
 docs-pages: $(BASE)  ## write the page of the configuration's keys from its schema, and the picture of a sample
 	$(BIN)/python -m lowalt.common.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
