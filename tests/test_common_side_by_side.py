@@ -1,12 +1,13 @@
 """Calls made side by side: their order, their processes, and what a failing one leaves undone."""
 
 import os
+import signal
 import time
 from functools import partial
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, SpaceError
 from lowalt.common.side_by_side import together
 
 
@@ -14,6 +15,10 @@ def told(number, wait):
     """Return a number and the process that was asked, after a while (s)."""
     time.sleep(wait)
     return number, os.getpid()
+
+
+def gone():
+    os.kill(os.getpid(), signal.SIGKILL)
 
 
 def refused(path):
@@ -37,3 +42,14 @@ def test_an_error_is_that_of_the_call_and_calls_not_begun_are_left_out(jobs, tmp
     with pytest.raises(InputError, match=r"^table\.csv: expected something else$"):
         together([partial(refused, "table.csv"), partial(told, 0, 0.3), *late], jobs)
     assert len(list(tmp_path.iterdir())) < 20
+
+
+@pytest.mark.parametrize("jobs", [0, -1])
+def test_a_number_of_jobs_below_one_is_refused(jobs):
+    with pytest.raises(InputError, match=rf"^jobs: {jobs}, expected 1 or more$"):
+        together([], jobs)
+
+
+def test_a_process_that_is_killed_ends_in_one_error():
+    with pytest.raises(SpaceError, match="a process was killed before it had its result"):
+        together([partial(told, 0, 0), gone, partial(told, 1, 0)], 2)
