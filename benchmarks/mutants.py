@@ -52,7 +52,7 @@ _TARGETS = ("targets", "gait", "mesh", "mocap", "cloud", "surfaces", "sampling",
 NEAR = {
     "statistics": ("statistics", "recognition_tables", "recognition_macro_f1"),
     "spectra": ("spectra", "tiles_device"),
-    "shards": ("shards", "dataset"),
+    "shards": ("shards", "dataset", "command.py"),
     "recognition": _RECOGNITION,
     "targets": _TARGETS,
     "common": _COMMON,

@@ -152,7 +152,7 @@ def test_folds_and_groups_choose_samples(dataset, index):
     chosen = Dataset(configuration(), dataset.clouds, groups=["seen"], folds=["train", "test"])
     stored = ShardSet(index, groups=["seen"], folds=["train", "test"])
     assert sorted(chosen.key(number) for number in range(len(chosen))) == sorted(k.decode() for k in stored.keys)
-    with pytest.raises(IndexError, match="expected 0 to"):
+    with pytest.raises(IndexError, match=rf"sample {len(chosen)}: expected 0 to {len(chosen) - 1}$"):
         chosen[len(chosen)]
     with pytest.raises(InputError, match="folds"):
         Dataset(configuration(), dataset.clouds, folds=["training"])

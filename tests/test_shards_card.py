@@ -10,7 +10,7 @@ import yaml
 
 from dataset import RENDER, SEED, SNRS, SPLIT, build
 from lowalt.common.errors import InputError
-from lowalt.shards import ShardSet
+from lowalt.shards import ShardSet, card
 from lowalt.shards.card import main, readme, write_samples
 
 CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
@@ -36,6 +36,19 @@ def test_card_has_counts_configuration_and_versions(published):
     assert all(f"| {name} | {version} |" in text for name, version in versions.items())
     for word in ("Known limits", "Oddities", "Licence", "verify"):
         assert word in text
+
+
+def test_sizes_of_shards_are_in_millions_of_bytes(monkeypatch):
+    """A millionth more would be rounded to another digit."""
+
+    class Shards(list):
+        @property
+        def shards(self):
+            return [{"group": "seen", "fold": "train", "samples": 3, "bytes": size} for size in self]
+
+    monkeypatch.setattr(card, "_census", lambda _: ({}, {}, {}))
+    text = card._counts(Shards([3_049_949_999, 4_950_500_000]))
+    assert text.endswith("2 shards of 3049.9 to 4950.5 MB, 8.000 GB in all, 4000225.0 kB a sample.\n")
 
 
 def test_samples_are_all_listed(published):

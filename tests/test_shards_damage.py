@@ -7,7 +7,7 @@ import pytest
 
 from dataset import build, publish
 from lowalt.common.errors import InputError
-from lowalt.shards import ShardSet, faults
+from lowalt.shards import ShardSet, faults, verify
 from lowalt.shards.__main__ import main
 from lowalt.shards.table import map_samples
 
@@ -54,6 +54,14 @@ def test_every_fault_is_found_and_named(copy, images):
                 shards.images(number)
         path.write_bytes(whole)
     assert list(faults(copy / "index.json")) == []
+
+
+def test_a_shard_whose_samples_and_end_are_whole_is_named_by_its_checksum(images):
+    """So an exchanged checksum is not passed over; where the length differs, the length is named instead."""
+    path = sorted(images.glob("*.tar"))[0]
+    samples, size = map_samples(path.with_suffix(".npz")), path.stat().st_size
+    assert list(verify._locate(path, samples, size, size)) == ["SHA-256 differs"]
+    assert list(verify._locate(path, samples, size - 1, size)) == [f"{size} bytes, expected {size - 1}"]
 
 
 def test_damage_next_to_the_shards_is_not_read_over(copy):

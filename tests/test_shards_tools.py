@@ -68,7 +68,9 @@ def test_croissant_is_of_version_1_1_and_has_no_fault(published, mlcroissant):
 
 
 def test_zenodo_takes_the_metadata(published):
-    found = json.loads((published / ".zenodo.json").read_text())
+    text = (published / ".zenodo.json").read_text()
+    found = json.loads(text)
+    assert text == json.dumps(found, indent=1) + "\n"
     assert found["upload_type"] == "dataset" and found["license"] == "mit" and found["creators"][0]["name"]
     assert set(found) >= {"title", "description", "access_right", "keywords"}
 
