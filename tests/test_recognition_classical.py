@@ -122,10 +122,15 @@ def test_a_missing_package_is_named_with_the_extra_that_has_it(monkeypatch):
         classical._needed("sklearn.svm")
 
 
-def test_a_trained_classical_model_is_timed_as_it_is(quick, tmp_path):
+def test_a_trained_classical_model_is_timed_as_it_is(quick, tmp_path, monkeypatch):
     runs.train(sources(write_signals(tmp_path / "a.npz", 40), "features"), scheme("svm"), "seen", SETTINGS, tmp_path)
     found = network_speed.measure(scheme("svm"), SETTINGS, 0.05, str(tmp_path / "model.pt"))
     assert 0 < found["inference_ms_64"] < found["inference_ms_1"] and found["train_ms"] is None
     assert found["backbone"] == "svm" and found["size"] == len(slow_time.NAMES)
+    # Each call takes a millisecond by a clock that moves by one whenever it is read.
+    ticks = iter(range(10**9))
+    monkeypatch.setattr(network_speed, "_clock", lambda *_: lambda: 1e-3 * next(ticks))
+    found = network_speed.measure(scheme("svm"), SETTINGS, 0.05, str(tmp_path / "model.pt"))
+    assert [found[f"inference_ms_{batch}"] for batch in (1, 64)] == pytest.approx([1.0, 1 / 64], rel=1e-6)
     with pytest.raises(InputError, match="no --model"):
         network_speed.measure(scheme("svm"), SETTINGS, 0.05)

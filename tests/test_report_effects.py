@@ -1,6 +1,7 @@
 """What effects cost and do: rows that pair every call with none, differences by hand, the figure and the page."""
 
 import io
+import json
 import re
 
 import numpy as np
@@ -10,6 +11,7 @@ from PIL import Image
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
+from lowalt.measure import effects_cost
 from lowalt.measure.effects_cost import COLUMNS, correct, difference, gathered, recognised, rows, typical_ms, write
 from lowalt.report.figures.effects import figure, most_changed, read_rows
 from lowalt.report.page import rendered
@@ -37,11 +39,12 @@ CALLS = [
     fake("adc", ["adc"], 4.0, [INFINITY]), fake("windy", ["gusts", "adc"], 4.5, [INFINITY]),
 ]  # fmt: skip
 ALL = np.ones((6, 2), bool)
+NETWORK = {"scheme": "ABC", "protocol": "seen"}
 
 
 def table(calls=CALLS, **right):
     told = {"none": ALL, "gusts": ALL, "adc": ALL[:, :1], "windy": ALL[:, :1]} | right
-    return {line["call"]: line for line in rows(calls, told, {"scheme": "ABC", "protocol": "seen"}, 7)}
+    return {line["call"]: line for line in rows(calls, told, NETWORK, 7)}
 
 
 def test_rows_pair_every_call_with_none_on_the_same_snrs():
@@ -130,6 +133,20 @@ def test_the_table_is_read_back_and_the_figure_has_a_pair_for_every_call(tmp_pat
     assert picture.shape[0] > fewer.shape[0]
     # Of 48 colours at most, so that a figure of all effects stays below a megabyte.
     assert 40 < len(np.unique(picture.reshape(-1, 3), axis=0)) <= 48
+
+
+def test_the_command_writes_a_line_a_call_and_says_how_many_it_has(monkeypatch, tmp_path, capsys):
+    """One file with one call is enough: its samples are counted, and no other call is asked for."""
+    monkeypatch.setattr(effects_cost, "read_samples", {"none.npz": CALLS[1]}.get)
+    asked = []
+    monkeypatch.setattr(effects_cost, "recognised", lambda *given: asked.append(given) or ({"none": ALL}, NETWORK))
+    out = str(tmp_path / "effects.csv")
+    settings = json.dumps({"seed": 1, "evaluation": {"batch": 2}})
+    effects_cost.main(["--settings", settings, "--samples", "none.npz", "--model", "model.pt", "--out", out])
+    assert capsys.readouterr().err == f"{out}: 1 calls, 6 motion models\n"
+    assert [line["call"] for line in read_csv(out, *COLUMNS)] == ["none"]
+    ((path, calls, evaluation),) = asked
+    assert (path, [header["name"] for header, _ in calls], evaluation) == ("model.pt", ["none"], {"batch": 2})
 
 
 def test_the_spectrum_that_changes_most_is_shown():
