@@ -1,0 +1,49 @@
+"""Sizes that bounds of effects start from: a facet's radius, how far points move in complex time, the largest echo."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lowalt.effects.chain import Chain
+from lowalt.effects.channel import symbol_motion
+from lowalt.effects.channel.cross_sections import facet_radius_m
+from lowalt.effects.received import observe
+from test_effects import network
+from test_effects_reflected import MIRROR, facing, scene
+
+
+def test_facets_of_a_hexagonal_lattice_cover_the_plane():
+    """The area of the discs is that of the lattice: sqrt(3)/2 of the spacing squared a point."""
+    spacing = 0.3
+    rows, columns = np.meshgrid(np.arange(5), np.arange(6), indexing="ij")
+    points = np.stack([spacing * (columns + 0.5 * (rows % 2)), spacing * np.sqrt(0.75) * rows, 0.0 * rows], axis=-1)
+    assert np.pi * facet_radius_m(points.reshape(-1, 3)) ** 2 == pytest.approx(np.sqrt(3) / 2 * spacing**2, rel=1e-12)
+
+
+def test_points_move_by_their_speed_in_real_time_and_by_their_turn_on_both_sides_of_it():
+    """Two parts at 5 and 9 m/s, whose turns move them by 0.1 and 0.4 m for each second of imaginary time."""
+    radio = network()
+    half = 0.5 / radio.subcarrier_spacing_hz
+    speeds = SimpleNamespace(
+        travel_m=lambda seconds: seconds * np.array([5.0, 9.0]),
+        imaginary_m=lambda seconds: np.multiply.outer(seconds, [0.1, 0.4]),
+    )
+    view = SimpleNamespace(network=radio, speeds=speeds, nearest_m=lambda: np.array([[500.0, 600.0], [550.0, 400.0]]))
+    rho, near, moved, beyond = symbol_motion.complex_motion(view)
+    assert near.tolist() == [500.0, 400.0] and len(rho) > 3
+    wide, high = 0.5 * (rho + 1 / rho), 0.5 * (rho - 1 / rho)
+    assert beyond == pytest.approx(np.multiply.outer(high * half, [0.1, 0.4]), rel=1e-14)
+    size = symbol_motion.farthest_m(radio)
+    speed, turn = np.multiply.outer((1 + wide) * half, [5.0, 9.0]), np.multiply.outer(high * half, [0.1, 0.4])
+    assert moved - size == pytest.approx(speed + turn + turn, rel=1e-6)
+
+
+def test_a_mirror_doubles_the_largest_amplitude_of_each_way():
+    radio = network()
+    largest = []
+    for effects in ({}, {"ground_reflection": MIRROR}):
+        whole = scene(effects, radio)
+        view = observe(whole, radio.stations[0], *facing([[0.0, 0.0, 1.0]] * 3))
+        largest.append(Chain(list(whole.effects), view, lambda name: np.random.default_rng(1)).target.strengths)
+    assert largest[1] == pytest.approx(4.0 * largest[0], rel=1e-2) and (largest[0] > 0).any()
