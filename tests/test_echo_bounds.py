@@ -9,7 +9,7 @@ from lowalt.echo.fast import strongest_cell
 from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
 from lowalt.echo.pointwise.sums import far_bound
-from lowalt.echo.slow_time.node_count import choose
+from lowalt.echo.slow_time.node_count import _growth, choose
 from lowalt.echo.slow_time.pose_series import series_sizes
 
 
@@ -43,6 +43,10 @@ def test_a_sum_that_may_be_off_by_half_its_size_proves_no_strongest_cell(monkeyp
     assert [found[bound][0] for bound in found] == [CERTAIN, CERTAIN, UNCERTAIN, UNCERTAIN]
     assert found[0.4][1] == 4 and found[0.4][3] == pytest.approx(0.2, abs=1e-6) and not found[0.4][2]
     assert found[0.6][3] == 0.0
+    # An error of half the amplitudes in the far cells' sums leaves a lead of less than 1 - 0.5 / pi.
+    sums, far = np.empty((9, 2)), np.empty(4)
+    state, which, tie, lead = certify(table, PLACES // 2, 0.0, powers, 0.0, (1.0, 0.0), 0.5, 0.0, 64, sums, far)
+    assert (state, which, tie) == (CERTAIN, 4, False) and 0.5 < lead < 1 - 0.5 / np.pi
 
 
 @pytest.mark.parametrize("place", [0.0, 0.3, -0.45])
@@ -53,6 +57,16 @@ def test_the_bound_of_far_cells_of_one_point_is_the_strongest_of_them(place):
     beyond = np.array([low - 1, high + 1])
     truth = abs((2 - 1j) * math.sin(math.pi * place) / (count * np.sin(math.pi * (beyond - place) / count)))
     assert bound == pytest.approx(truth.max(), rel=1e-8, abs=1e-13)
+
+
+def test_the_growth_of_an_amplitude_on_an_ellipse_is_that_of_a_range_along_the_line_of_sight():
+    """A point that moves straight away: its largest range over its smallest, squared, is nearly the bound."""
+    rho, reference = 3.0, np.array([100.0, 4.0])
+    turns = np.exp(1j * np.linspace(0, 2 * np.pi, 9))
+    ranges = abs(reference[0] + reference[1] * 0.5 * (rho * turns + 1 / (rho * turns)))
+    whole, bare, v = _growth(rho, reference, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
+    least = 2 * np.log(ranges.max() / ranges.min())
+    assert least <= bare <= 1.02 * least and whole == bare and v == 0.0
 
 
 def test_where_no_degree_in_time_is_enough_none_is_chosen():
