@@ -115,10 +115,16 @@ mutants: $(TESTING)  ## set small faults into every room of the package, one at 
 
 lint:  ## ruff, snakefmt, mypy, snakemake --lint
 	@$(MAKE) --no-print-directory -j 2 ready
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target types style
+
+.PHONY: types style
+types:
+	$(BIN)/python -m mypy
+
+style:
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/snakefmt --check Snakefile workflow
-	$(BIN)/python -m mypy
 	$(BIN)/snakemake --lint
 
 format: $(TESTING)
