@@ -9,6 +9,7 @@ BASE := .venv/set-up-data
 SETUP := .venv/set-up
 TESTING := .venv/set-up-tests
 KERNELS := .venv/set-up-kernels
+BYTECODE := .venv/set-up-bytecode
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
 TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings seeds ranges aspects
@@ -45,7 +46,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
 	$(call install,-e '.[workflow$(comma)cost]' pip)
-	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) .venv/set-up-methods .venv/set-up-audit
+	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) $(BYTECODE) .venv/set-up-methods .venv/set-up-audit
 	touch $@
 
 $(SETUP): $(BASE)
@@ -59,6 +60,12 @@ $(TESTING): $(SETUP)
 # Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time.
 $(KERNELS): $(BASE)
 	$(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log || { cat .venv/kernels.log >&2; exit 1; }
+	touch $@
+
+# Bytecode of the tests and of what they import: written once, not by both processes of the tests at the same time. Where a
+# file cannot be read, the tests say so.
+$(BYTECODE): $(TESTING)
+	$(BIN)/python -m pytest --collect-only -q >.venv/bytecode.log 2>&1 || true
 	touch $@
 
 $(DOCS): $(BASE)
@@ -93,7 +100,7 @@ measured: $(SETUP)  ## recordings held against their radars' twins: make measure
 	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
 	  if [ -f results/measured/$${pair%%:*} ]; then cp results/measured/$${pair%%:*} $${pair##*:}; fi; done
 
-ready: $(TESTING) $(KERNELS)
+ready: $(BYTECODE) $(KERNELS)
 
 test:  ## the test suite
 	@$(MAKE) --no-print-directory -j 2 ready

@@ -1,8 +1,10 @@
 """The house: one street in one direction, light entrances, and nothing in the repository that does not belong there."""
 
 import ast
+import functools
 import io
 import subprocess
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -24,22 +26,18 @@ def test_a_stage_imports_only_what_stands_before_it(stage):
     allowed = set(STREET[: STREET.index(stage) + 1])
     files = modules(stage)
     assert files
-    wrong = {path.name: rooms_imported(path) - allowed for path in files if rooms_imported(path) - allowed}
-    assert not wrong
+    assert not {path.name: wrong for path in files if (wrong := rooms_imported(path) - allowed)}
 
 
-def test_who_only_wants_data_never_imports_torch():
-    stages = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
-    found = printed([f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)" for stage in stages])
-    assert dict(zip(stages, found, strict=True)) == dict.fromkeys(stages, "False\n")
-
-
-def test_what_no_scene_names_is_not_imported():
-    scenes = [{}, *({name: {}} for name in PLACES)]
-    program = (
+LIGHT = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
+SCENES = [{}, *({name: {}} for name in PLACES)]
+PROGRAMS = {
+    **{stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)" for stage in LIGHT},
+    "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)",
+    "scenes": (
         "import os, sys, lowalt.echo.__main__, lowalt.effects.__main__, lowalt.noise.__main__\n"
         "from lowalt.effects.catalogue import called\n"
-        f"for scene in {scenes!r}:\n"
+        f"for scene in {SCENES!r}:\n"
         "    if os.fork() == 0:\n"
         "        called(scene)\n"
         "        break\n"
@@ -49,15 +47,27 @@ def test_what_no_scene_names_is_not_imported():
         "names = [n for n in sys.modules if n.startswith('lowalt.effects.') and n.count('.') == 3]\n"
         "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
         "os._exit(0)"
-    )
-    (text,) = printed([program])
-    found = [{other for other in line.split() if other in PLACES} for line in text.split("\n")[:-1]]
-    assert found == [set(scene) for scene in scenes]
+    ),
+}
 
 
-def test_a_run_without_effects_imports_nothing_of_them():
-    program = "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)"
-    assert printed([program]) == ["False\n"]
+@pytest.fixture(scope="module")
+def said() -> dict[str, str]:
+    """What each of the programs prints, each in a process of its own."""
+    return dict(zip(PROGRAMS, printed([*PROGRAMS.values()]), strict=True))
+
+
+def test_who_only_wants_data_never_imports_torch(said):
+    assert {stage: said[stage] for stage in LIGHT} == dict.fromkeys(LIGHT, "False\n")
+
+
+def test_what_no_scene_names_is_not_imported(said):
+    found = [{other for other in line.split() if other in PLACES} for line in said["scenes"].split("\n")[:-1]]
+    assert found == [set(scene) for scene in SCENES]
+
+
+def test_a_run_without_effects_imports_nothing_of_them(said):
+    assert said["plain"] == "False\n"
 
 
 def test_the_street_holds_every_room():
@@ -78,9 +88,25 @@ def test_the_picture_of_the_house_has_a_mark_for_every_import_between_rooms():
     assert sorted(found) == sorted(pairs)
 
 
+class File:
+    """What the tests below ask of a Python file: its docstring, its classes, and its functions with their lines."""
+
+    def __init__(self, path: Path) -> None:
+        """Read the file."""
+        tree = ast.parse(path.read_text())
+        self.docstring = ast.get_docstring(tree)
+        self.classes = [node.name for node in tree.body if isinstance(node, ast.ClassDef)]
+        # Those inside classes and other functions as well.
+        self.functions = [(node.name, node.end_lineno - node.lineno, ast.get_docstring(node))
+                          for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]  # fmt: skip
+
+
+# Reading all files takes a second.
+file = functools.cache(File)
+
+
 def test_every_module_says_what_it_holds():
-    bare = [path for path in PACKAGE.rglob("*.py") if not ast.get_docstring(ast.parse(path.read_text()))]
-    assert not bare
+    assert not [path for path in PACKAGE.rglob("*.py") if not file(path).docstring]
 
 
 def python_files(*folders: str) -> list[Path]:
@@ -88,17 +114,12 @@ def python_files(*folders: str) -> list[Path]:
     return [path for folder in folders for path in sorted((ROOT / folder).rglob("*.py"))]
 
 
-def functions(path: Path) -> list[ast.FunctionDef]:
-    """All functions of a file, with those inside classes and other functions."""
-    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)]
-
-
 def test_every_function_says_what_it_does():
     bare = [
-        f"{path.name}: {node.name}"
+        f"{path.name}: {name}"
         for path in python_files("src", "benchmarks", "tests/support")
-        for node in functions(path)
-        if not node.name.startswith("__") and not ast.get_docstring(node)
+        for name, _, docstring in file(path).functions
+        if not name.startswith("__") and not docstring
     ]
     assert not bare
 
@@ -113,16 +134,15 @@ LONG = {
 def test_functions_have_at_most_60_lines_and_files_250():
     files = python_files("src", "benchmarks", "tests", "docs", "examples")
     lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in files}
-    long = [f"{path.name}: {node.name}" for path in files for node in functions(path)
-            if node.end_lineno - node.lineno >= 60 and node.name not in LONG]  # fmt: skip
+    long = [f"{path.name}: {name}" for path in files for name, more_lines, _ in file(path).functions
+            if more_lines >= 60 and name not in LONG]  # fmt: skip
     assert not long
     assert not {str(path): count for path, count in lines.items() if count > 250}
 
 
 def test_no_name_of_a_class_stands_for_two_things():
-    defined = [node.name for path in python_files("src/lowalt") for node in ast.parse(path.read_text()).body
-               if isinstance(node, ast.ClassDef)]  # fmt: skip
-    assert not {name for name in defined if defined.count(name) > 1}
+    defined = Counter(name for path in python_files("src/lowalt") for name in file(path).classes)
+    assert not {name for name, count in defined.items() if count > 1}
 
 
 def test_no_tracked_file_is_large_or_names_this_machine():

@@ -5,6 +5,7 @@ draws it.
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
@@ -19,8 +20,12 @@ def modules(room: str) -> list[Path]:
     return sorted((PACKAGE / room).rglob("*.py"))
 
 
-def rooms_imported(path: Path) -> set[str]:
-    """Return the rooms that the imports of one file name; its own room is one of them if it imports from there."""
+@cache
+def rooms_imported(path: Path) -> frozenset[str]:
+    """Return the rooms that the imports of one file name; its own room is one of them if it imports from there.
+
+    A file is read once in a process.
+    """
     names = []
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
@@ -30,7 +35,7 @@ def rooms_imported(path: Path) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             names.append(node.module)
     parts = [name.split(".") for name in names]
-    return {part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET}
+    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET)
 
 
 def purpose(path: Path) -> str:
