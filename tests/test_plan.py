@@ -100,11 +100,12 @@ def test_masts_out_of_reach_change_no_motion_model():
     assert masts_in_reach(masts, None, 30.0) == masts
     config = merge(load_yaml(ROOT / "config/default.yaml"), config | {"motion": {"models": 10, "models_per_chunk": 10}})
     config = merge(config, {"motion": {"region": region}})
-    rows = []
+    rows, clouds = [], None
     for masts_m in (masts, near):
         stations = {f"S{n}": {"position_m": [*mast, 25.0], "normal_deg": 0.0} for n, mast in enumerate(masts_m)}
         config["network"]["stations"] = stations
-        dataset = Dataset(config, inputs=None)
+        dataset = Dataset(config, clouds, inputs=None)
+        clouds = dataset.clouds
         rows.append([dataset.row(dataset.place(number)) for number in range(0, len(dataset), 7)])
     for one, other in zip(*rows, strict=True):
         assert str(one) == str(other)
