@@ -1,11 +1,12 @@
-"""Bounds that decide how an echo is computed: by direct sums, and what follows where a bound is too large."""
+"""Bounds that decide how an echo is computed, and polynomials of its loops: by direct sums and closed forms."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from lowalt.echo.fast import strongest_cell
+from lowalt.echo.fast import driver, strongest_cell
 from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
 from lowalt.echo.pointwise.sums import far_bound
@@ -76,3 +77,13 @@ def test_where_no_degree_in_time_is_enough_none_is_chosen():
     best, error, flat, bent = choose(*arguments, 1e-6, 40, ellipses)
     assert 4 <= best <= 40 and 0 < error <= 1e-6 and 0 < flat < np.inf and 0 < bent < np.inf
     assert choose(*arguments, 1e-6, best - 1, ellipses) == (0, np.inf, np.inf, np.inf)
+
+
+@pytest.mark.parametrize("count", [6, 8, 11])
+def test_waves_are_computed_from_all_coefficients_of_their_polynomials_in_order(monkeypatch, count):
+    """The loops take coefficients as a tuple of known length; each plan has one of three lengths."""
+    given = []
+    monkeypatch.setattr(driver.vector_loops, "amplitudes", lambda *arguments: given.append(arguments))
+    cosine, sine = np.arange(1.0, count + 1), -np.arange(1.0, count + 1)
+    driver.add_amplitudes.py_func("strip", "share", 3, SimpleNamespace(cosine=cosine, sine=sine), 16)
+    assert given == [("strip", "share", 3, tuple(cosine), tuple(sine), 16)]
