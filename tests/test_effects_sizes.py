@@ -1,4 +1,5 @@
-"""Sizes that bounds of effects start from: a facet's radius, how far points move in complex time, the largest echo."""
+"""Sizes that bounds of effects start from: a facet's radius, how far points move in complex time, the largest echo,
+room for rounding, and numbers of a table that are equal by symmetry."""
 
 from types import SimpleNamespace
 
@@ -6,7 +7,7 @@ import numpy as np
 import pytest
 
 from lowalt.effects.chain import Chain
-from lowalt.effects.channel import symbol_motion
+from lowalt.effects.channel import fluctuation, still_rays, symbol_motion
 from lowalt.effects.channel.cross_sections import facet_radius_m
 from lowalt.effects.received import observe
 from test_effects import network
@@ -47,3 +48,20 @@ def test_a_mirror_doubles_the_largest_amplitude_of_each_way():
         view = observe(whole, radio.stations[0], *facing([[0.0, 0.0, 1.0]] * 3))
         largest.append(Chain(list(whole.effects), view, lambda name: np.random.default_rng(1)).target.strengths)
     assert largest[1] == pytest.approx(4.0 * largest[0], rel=1e-2) and (largest[0] > 0).any()
+
+
+def test_a_ray_that_starts_in_the_plane_of_a_triangle_is_left_open(monkeypatch):
+    """Rounding may put it on either side of the triangle; a little off the plane the triangle hides it or does not."""
+    monkeypatch.setattr(still_rays, "sides", lambda *_: (1, 1))
+    tree = SimpleNamespace(faces=np.array([[0, 1, 2]]), closed=np.array([False]))
+    for second, third in (((2.0, 1.0, 0.0), (1.0, 2.0, 0.0)), ((1.0, 2.0, 0.0), (0.0, 1.0, 0.0))):
+        vertices = np.array([(1.0, 1.0, 0.0), second, third])
+        found = [
+            still_rays._met.py_func(vertices, tree, 0, 0.0, 0.0, z, 0.0, 0.0, 1.0, 0.0) for z in (-1e-9, 0.0, 1e-9)
+        ]
+        assert found == [still_rays.HIDDEN, still_rays.OPEN, still_rays.FREE]
+
+
+def test_a_vehicle_and_a_large_craft_reflect_alike_to_the_left_and_to_the_right():
+    for lobes in (fluctuation.VEHICLE, fluctuation.LARGE_UAV):
+        assert lobes[1]._replace(azimuth=270) == lobes[3]

@@ -87,6 +87,17 @@ def test_a_saturated_waveform_is_that_of_the_time_signal_summed_directly(rng):
     np.testing.assert_allclose(power_amplifier.aired(settings, sent), truth, atol=1e-13)
 
 
+def test_products_of_seven_subcarriers_fold_from_nowhere_into_the_band(rng):
+    """Smoothness 3 makes products of seven; they span seven bands, and the nearest image of the band is four away."""
+    settings, count, over = {"backoff_db": 20.0, "smoothness": 3.0}, 12, 16
+    sent = waveform.sent(rng, 8, count)
+    tones = np.exp(2j * np.pi * np.outer(np.arange(count) - count // 2, np.arange(over * count) / (over * count)))
+    signal = sent @ tones
+    weaker = signal / (1 + (abs(signal) / (np.sqrt(count) * 10)) ** 6) ** (1 / 6) - signal
+    truth = weaker @ tones.conj().T / (over * count)
+    np.testing.assert_allclose(power_amplifier.aired(settings, sent) - sent, truth, atol=1e-5 * abs(truth).max())
+
+
 @pytest.mark.parametrize("backoff_db", [0.0, 3.0, 6.0])
 def test_a_hard_limiter_has_the_equivalent_gain_and_distortion_of_a_gaussian(rng, backoff_db):
     gaussian = (rng.standard_normal((400_000, 2)) @ [1, 1j]) * np.sqrt(0.5)
