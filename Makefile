@@ -73,10 +73,11 @@ $(DOCS): $(BASE)
 	touch $@
 
 # Where the packages of training are not there yet, they come while the data are made; so does the machine code, for
-# which jobs wait that need it.
+# which jobs wait that need it. Bytecode of torch takes ten seconds: written once here, not by two trainings at a time.
 default: $(BASE)  ## the embedded default: data, training, evaluation, report in results/default
 	@test -e $(SETUP) || { $(BIN)/python -m lowalt.workflow.kernels 2>.venv/kernels.log & \
-		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile; }
+		$(MAKE) --no-print-directory -j 2 $(SETUP) meanwhile && \
+		{ $(BIN)/python -c 'import lowalt.recognition.runs, lowalt.report.__main__' 2>.venv/bytecode.log & } }
 	$(SNAKEMAKE)
 
 # From a warm cache the packages are there in seconds; only a download is worth a Snakemake of its own.
