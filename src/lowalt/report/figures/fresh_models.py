@@ -6,6 +6,7 @@ python -m lowalt.report.figures.fresh_models --table stream.csv --figure stream.
 import argparse
 
 from matplotlib import pyplot as plt
+from matplotlib.ticker import LogLocator, NullFormatter, ScalarFormatter
 
 from lowalt.common.command import run
 from lowalt.common.csv_tables import read_csv
@@ -36,6 +37,10 @@ def draw(rows: list[dict]) -> bytes:
     panels[1].set(xscale="log", xlabel="processor time of making samples and of training (s)")
     for panel in panels:
         panel.grid(alpha=0.3, which="both")
+        panel.xaxis.set_minor_formatter(NullFormatter())
+    # Times lie within one power of ten or two, so that powers alone would be too few numbers.
+    panels[1].xaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    panels[1].xaxis.set_major_formatter(ScalarFormatter())
     handles, names = panels[1].get_legend_handles_labels()
     title = "filled: held-out subtypes\nhollow: trained subtypes"
     drawing.legend(handles, names, fontsize=7, title=title, title_fontsize=7, loc="outside right center")
