@@ -17,6 +17,15 @@ def told(number, wait):
     return number, os.getpid()
 
 
+def met(folder, number):
+    """Return a number and the process that was asked, once two calls have begun."""
+    (folder / str(number)).touch()
+    until = time.monotonic() + 30
+    while len(list(folder.iterdir())) < 2 and time.monotonic() < until:
+        time.sleep(0.01)
+    return number, os.getpid()
+
+
 def gone():
     os.kill(os.getpid(), signal.SIGKILL)
 
@@ -25,8 +34,9 @@ def refused(path):
     raise InputError(f"{path}: expected something else")
 
 
-def test_results_keep_the_order_of_the_calls_and_come_from_other_processes():
-    found = together([partial(told, number, wait) for number, wait in enumerate((0.1, 0.0, 0.05, 0.0))], 2)
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_results_keep_the_order_of_the_calls_and_come_from_two_processes_at_a_time(tmp_path, start):
+    found = together([partial(met, tmp_path, number) for number in range(4)], 2, start)
     assert [number for number, _ in found] == [0, 1, 2, 3]
     processes = {process for _, process in found}
     assert len(processes) == 2 and os.getpid() not in processes

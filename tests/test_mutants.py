@@ -16,6 +16,8 @@ from mutation.kept import Kept
 from mutation.survivors import changed, earlier, survivor_row
 from mutation.trials import Outcome, copy_of_tree, trial
 
+from small_tree import small_tree
+
 ROOT = Path(__file__).parents[1]
 SOURCE = '''"""A doc with 1 + 2."""
 LIMIT: int | None = 3
@@ -39,10 +41,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def tree(tmp_path):
-    (tmp_path / "src/lowalt").mkdir(parents=True)
-    (tmp_path / "tests").mkdir()
-    (tmp_path / "src/lowalt/reach.py").write_text(SOURCE)
-    return tmp_path
+    return small_tree(tmp_path, SOURCE)
 
 
 def test_places_are_operations_and_constants_and_no_annotations(tree):

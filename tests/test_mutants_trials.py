@@ -18,15 +18,14 @@ from mutation.kept import Kept
 from mutation.survivors import survivor_row
 from mutation.trials import Outcome
 
+from small_tree import small_tree
+
 SOURCE = "def reach(a):\n    return a + 1\n"
 
 
 @pytest.fixture
 def tree(tmp_path):
-    (tmp_path / "src/lowalt").mkdir(parents=True)
-    (tmp_path / "tests").mkdir()
-    (tmp_path / "src/lowalt/reach.py").write_text(SOURCE)
-    return tmp_path
+    return small_tree(tmp_path, SOURCE)
 
 
 def _ran(tree, body, limits):

@@ -9,19 +9,19 @@ from typing import Any
 from lowalt.common.errors import InputError, SpaceError
 
 
-def together(calls: Sequence[Callable[[], Any]], jobs: int) -> list[Any]:
+def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork") -> list[Any]:
     """Return what every call returns, in their order, `jobs` of them at a time.
 
-    Calls and results are pickled. One job makes the calls in this process, one after the other. Raises: what the first
-    call that fails raises, after the calls that had begun; InputError for fewer than one job; SpaceError
-    where a process was killed.
+    Calls and results are pickled. One job makes the calls in this process, one after the other. start: how a process
+    begins; "fork" has this one's modules already, which take seconds to import, "spawn" is for calls that use torch.
+    Raises: what the first call that fails raises, after the calls that had begun; InputError for fewer than one job;
+    SpaceError where a process was killed.
     """
     if jobs < 1:
         raise InputError(f"jobs: {jobs}, expected 1 or more")
-    if jobs == 1 or "fork" not in get_all_start_methods():
+    if jobs == 1 or start not in get_all_start_methods():
         return [call() for call in calls]
-    # A forked process has this one's modules already, which take two seconds to import for the report.
-    with ProcessPoolExecutor(jobs, get_context("fork")) as pool:
+    with ProcessPoolExecutor(min(jobs, max(len(calls), 1)), get_context(start)) as pool:
         begun = [pool.submit(call) for call in calls]
         try:
             return [future.result() for future in begun]

@@ -11,8 +11,11 @@ class MovingAverage(ModelEmaV3):
     """`ModelEmaV3` of one model. Listing all weights by name at every step took longer than averaging them."""
 
     def __init__(self, model: nn.Module, decay: float) -> None:
-        """model: whose weights are averaged, moved in place only; decay: weight of the old average, 0..1."""
-        # Running means of batch norms and the like, which no optimiser lays end to end.
+        """model: whose weights are averaged, moved in place only; decay: weight of the old average, 0..1.
+
+        The model's buffers are laid end to end (`flat_weights.laid_out`), so that they are averaged as one.
+        """
+        # Running means of batch norms and the like: an optimiser lays out weights, and these are none.
         others = [value for value in model.buffers() if value.dtype == torch.float32]
         if others:
             laid_out(others)

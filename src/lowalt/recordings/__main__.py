@@ -6,8 +6,7 @@ recordings with the simulated twins of their radars.
 
 import argparse
 import os
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.shipped import shipped
+from lowalt.common.side_by_side import together
 from lowalt.recordings import compare, samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
@@ -157,11 +157,8 @@ def recognise(arguments: list[str]) -> None:
     names = list(library.twins)
     # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
     # last radar takes longest, so it starts first.
-    with ProcessPoolExecutor(min(given.jobs, len(names)), get_context("spawn")) as pool:
-        jobs = {
-            name: pool.submit(radar, name, found, library, block, given.models, given.reuse) for name in reversed(names)
-        }
-        rows = [row for name in names for row in jobs[name].result()]
+    calls = [partial(radar, name, found, library, block, given.models, given.reuse) for name in reversed(names)]
+    rows = [row for rows in reversed(together(calls, given.jobs, "spawn")) for row in rows]
     samples.write_table(given.out / "measured-recognition.csv", RECOGNITION, rows)
     samples.write_table(given.out / "measured-accuracy.csv", ACCURACY, accuracy(rows, block["seed"]))
 

@@ -97,11 +97,8 @@ def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
     script: JavaScript of the plots where it was made before (`plots.scripts`).
     """
     drawn = any('<figure class="plot">' in part["html"] for part in parts)
-    return (
-        _templates()
-        .get_template("page.html")
-        .render(title=title, parts=parts, plots=(script or scripts()) if drawn else "")
-    )
+    plots = (script or scripts()) if drawn else ""
+    return _templates().get_template("page.html").render(title=title, parts=parts, plots=plots)
 
 
 def section_page(title: str, name: str, values: dict) -> str:
