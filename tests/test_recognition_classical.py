@@ -1,6 +1,7 @@
 """Classical models: their arrays give the libraries' own answers, choices see no test sample, files are read back."""
 
 import copy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,3 +135,15 @@ def test_a_trained_classical_model_is_timed_as_it_is(quick, tmp_path, monkeypatc
     assert [found[f"inference_ms_{batch}"] for batch in (1, 64)] == pytest.approx([1.0, 1 / 64], rel=1e-6)
     with pytest.raises(InputError, match="no --model"):
         network_speed.measure(scheme("svm"), SETTINGS, 0.05)
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
+def test_the_temperature_undoes_a_factor_on_the_scores(scale):
+    """Labels drawn from the softmax of known scores; a method that gives them times a factor is to be divided by it."""
+    rng = np.random.default_rng(3)
+    true = rng.normal(scale=2.0, size=(4000, 3))
+    shares = torch.as_tensor(true).softmax(1).numpy()
+    labels = (rng.random((4000, 1)) > shares.cumsum(axis=1)).sum(axis=1)
+    model = SimpleNamespace(scores=lambda given: scale * given, temperature=torch.tensor(1.0, dtype=torch.float64))
+    classical._tempered(model, torch.as_tensor(true), labels)
+    assert float(model.temperature) * scale == pytest.approx(1.0, rel=0.1)
