@@ -184,3 +184,41 @@ def test_one_seed_and_one_subtype_leave_nothing_to_draw():
     given = np.zeros_like(one), np.ones(30), np.zeros(30)
     found = intervals.strict_difference(one, *given, True, stream(1, "d"), 50)
     assert found == pytest.approx((one.mean(),) * 3)
+
+
+def test_an_interval_of_clusters_counts_each_by_its_samples():
+    """Fifty clusters of nine samples are right and fifty of one are wrong."""
+    found = intervals.bootstrap(
+        np.repeat(np.arange(100), np.repeat([9, 1], 50)), np.repeat([1.0, 0.0], [450, 50]), stream(1, "c"), 400
+    )
+    assert found.value == pytest.approx(0.9)
+    assert 0.8 < found.low < 0.9 < found.high < 0.95
+
+
+def test_a_difference_is_the_first_less_the_second_whatever_their_numbers_of_seeds():
+    """All samples alike, so that nothing is left to chance."""
+    high, low, names = np.full(12, 0.75), np.full(12, 0.5), np.repeat(np.arange(4), 3)
+    assert intervals.paired_difference(np.arange(12), high, low, stream(1, "p")) == (0.25, 0.25, 0.25)
+    for seeds, others in ((1, 3), (3, 1), (2, 4)):
+        given = np.tile(high, (seeds, 1)), np.tile(low, (others, 1)), np.ones(12), names
+        for whole in (False, True):
+            found = intervals.strict_difference(*given, whole, stream(1, "d"), 50)
+            assert found == pytest.approx((0.25, 0.25, 0.25))
+
+
+def test_intervals_come_of_4000_draws_where_no_number_is_named():
+    """The generator shows how many random numbers were taken."""
+
+    def clusters(generator, *said):
+        intervals.bootstrap(np.arange(3), np.arange(3.0), generator, *said)
+
+    def schemes(generator, *said):
+        intervals.strict_difference(np.eye(3), np.eye(3), np.ones(3), np.arange(3), False, generator, *said)
+
+    for draw in (clusters, schemes):
+        after = []
+        for said in ((), (4000,), (4001,)):
+            generator = stream(2, "n")
+            draw(generator, *said)
+            after.append(generator.random())
+        assert after[0] == after[1] != after[2]
