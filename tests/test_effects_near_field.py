@@ -5,7 +5,7 @@ import pytest
 
 from lowalt.common.config import load_yaml
 from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.effects import near_field, response_loops
+from lowalt.effects import near_field, waves
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 SPACING = SPEED_OF_LIGHT / (2 * NETWORK.carrier_hz)
@@ -15,7 +15,7 @@ def given(shape: tuple[int, int]) -> near_field.Arrays:
     turn = 0.7
     return near_field.Arrays(
         np.array([3.0, -4.0, 25.0]), (np.sin(turn), np.cos(turn)), SPACING, 0.5 / SPACING, 1.0, (0.3, 0.1), shape,
-        np.ones((1, 1), np.complex128), response_loops.waves(1e-16), 0.505 / SPACING,
+        np.ones((1, 1), np.complex128), waves.waves(1e-16), 0.505 / SPACING,
     )  # fmt: skip
 
 

@@ -20,7 +20,9 @@ def test_moments_become_subcarriers_as_in_the_plain_sum(count):
     planes, own = rng.normal(size=(3, 2, len(table))), np.exp(1j * rng.normal(size=3))
     whole, cells = np.array([0, 7, 1000]), rng.normal(size=3)
     found = np.full((3, count), 1.0 + 0j)
-    moment_loops.spread(planes, table, own, whole, cells, found)
+    half = (count + 1) // 2
+    work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
+    moment_loops.spread(planes, table, own, whole, cells, *work, found)
     off = np.arange(count) - 0.5 * (count - 1)
     delay = np.exp(-2j * np.pi * (whole + cells)[:, None] * off / count)
     truth = own[:, None] * ((planes[:, 0] + 1j * planes[:, 1]) @ table) * delay
@@ -121,7 +123,9 @@ def test_moments_are_the_plain_sums_over_points_with_and_without_strength(lit):
     strength, ahead, home = np.zeros((3, 5)), *rng.uniform(-1, 1, (2, 3, 5))
     strength[:, lit] = rng.choice([-1e-9, 2e-9, 3.0], (3, len(lit)))
     middle, found = rng.uniform(-0.1, 0.1, 3), np.empty((3, 2, 2, 8))
-    moment_loops.moments(strength, out, back, 2.0, ahead, home, middle, 0.5, 1.5, found)
+    planes = [np.stack([one.real, one.imag]) for one in (out, back)]
+    work = np.empty((5, 5)), np.empty(5, np.int64)
+    moment_loops.moments(strength, *planes, 2.0, ahead, home, middle, 0.5, 1.5, *work, found)
     place = (0.5 * (ahead + home) - middle[:, None]) / 1.5
     terms = (-1j) ** np.arange(8)[:, None, None] * np.cos(np.arange(8)[:, None, None] * np.arccos(place))
     truth = np.einsum("pnl,qnl->nqp", terms, 2.0 * strength * out * back)

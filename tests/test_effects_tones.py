@@ -10,40 +10,51 @@ from lowalt.effects.received import Scene, received_signal
 from test_effects import network, target
 
 
-def cells_of(responses):
-    cells = np.fft.ifft(responses, axis=1)
-    sizes = abs(cells)
-    return cells, sizes, sizes.argmax(axis=1)
+def looks(rng, symbols, subcarriers, noise):
+    """Responses (N, M) of three points that drift over cells, of which two are nearly as strong; noise: of a cell."""
+    drift = rng.uniform(0, subcarriers) + np.linspace(0, 3, symbols)[:, None]
+    turns = np.arange(subcarriers) / subcarriers
+    points = [(1.0, 0.0), (0.99, 0.6), (0.3, -0.4)]
+    echo = sum(size * np.exp(-2j * np.pi * (drift + off) * turns) for size, off in points)
+    random = rng.normal(size=echo.shape) + 1j * rng.normal(size=echo.shape)
+    return np.exp(2j * np.pi * rng.random((symbols, 1))) * echo + noise * np.sqrt(subcarriers) * random
 
 
-@pytest.mark.parametrize("subcarriers", [1, 2, 7, 64])
-@pytest.mark.parametrize("change", [0.0, 1e-9, 1e-2, 0.1])
-def test_the_strongest_cell_is_found_among_all_that_a_change_can_lift(subcarriers, change):
+@pytest.mark.parametrize("subcarriers", [1, 2, 7, 16, 17, 64])
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 0.1])
+@pytest.mark.parametrize("carried", [False, True])
+def test_the_strongest_cell_is_that_of_a_transform(subcarriers, noise, carried):
     rng = np.random.default_rng(1)
-    cells = np.zeros((60, subcarriers), complex)
-    # Two or three cells of nearly the same size, so that small changes decide.
-    for row in cells:
-        row[rng.integers(subcarriers, size=3)] = 1 + change * rng.normal(size=3)
-    before = np.fft.fft(cells, axis=1)
-    noise = change * (rng.normal(size=before.shape) + 1j * rng.normal(size=before.shape))
-    # A whole symbol may turn and grow: only what fits no multiple of the symbol counts as a change.
-    after = np.exp(2j * np.pi * rng.random((60, 1))) * rng.uniform(0.5, 2, (60, 1)) * before + noise
-    _, sizes, best = cells_of(before)
-    truth, own, number = cells_of(after)
-    found = strongest_cell.strongest(before, sizes, best, after)
-    assert found is not None
-    value, cell = found
-    np.testing.assert_allclose(own[np.arange(60), cell], own.max(axis=1), rtol=1e-12)
-    np.testing.assert_allclose(value, truth[np.arange(60), cell], rtol=0, atol=1e-12)
-    assert change < 1e-9 or (cell == number).all()
-    assert subcarriers < 7 or change < 1e-2 or (cell != best).any()
+    responses = looks(rng, 60, subcarriers, noise)
+    cells = np.fft.ifft(responses, axis=1)
+    data = waveform.sent(stream(1, "waveform"), 60, subcarriers) if carried else None
+    value, cell = strongest_cell.strongest(waveform.tones_of(responses, data) if carried else responses, data)
+    np.testing.assert_allclose(abs(cells)[np.arange(60), cell], abs(cells).max(axis=1), rtol=1e-12)
+    np.testing.assert_allclose(value, cells[np.arange(60), cell], rtol=0, atol=1e-13 * abs(cells).max())
 
 
-def test_symbols_that_differ_too_much_are_left_to_the_transform():
-    rng = np.random.default_rng(2)
-    before, after = (rng.normal(size=(40, 64)) + 0j for _ in range(2))
-    _, sizes, best = cells_of(before)
-    assert strongest_cell.strongest(before, sizes, best, after) is None
+def test_a_stronger_cell_far_from_the_one_before_is_found():
+    cells = np.zeros((3, 64), complex)
+    cells[:, 5], cells[1, 40] = 1.0, 1.0 + 1e-9
+    value, cell = strongest_cell.strongest(np.fft.fft(cells, axis=1))
+    assert cell.tolist() == [5, 40, 5] and abs(value[1]) > 1 + 5e-10
+
+
+def test_symbols_without_any_response_have_a_cell_of_zero():
+    value, cell = strongest_cell.strongest(np.zeros((4, 32), complex))
+    assert (value == 0).all() and ((cell >= 0) & (cell < 32)).all()
+
+
+def test_few_cells_are_worked_out_of_a_target_and_none_but_by_the_transform_of_noise(monkeypatch):
+    rng, transformed = np.random.default_rng(2), []
+    plain = strongest_cell._cells
+    monkeypatch.setattr(
+        strongest_cell, "_cells", lambda given, data: transformed.append(len(given)) or plain(given, data)
+    )
+    strongest_cell.strongest(looks(rng, 100, 64, 1e-3))
+    assert transformed == [1]
+    strongest_cell.strongest(rng.normal(size=(100, 64)) + 0j)
+    assert 90 < transformed[-1] <= 100
 
 
 def test_a_receiver_finds_the_cells_that_a_transform_of_its_responses_finds(monkeypatch):
@@ -51,7 +62,7 @@ def test_a_receiver_finds_the_cells_that_a_transform_of_its_responses_finds(monk
     radio = network(subcarriers=32, symbols=40)
     scene = Scene(radio, 5, None, tuple(called({"phase_noise": {"level_db": 20}, "adc": {"bits": 6}})))
     close = received_signal(scene, radio.stations[0], cloud, row)
-    monkeypatch.setattr("lowalt.effects.chain.strongest", lambda *given: None)
+    monkeypatch.setattr(strongest_cell, "FEWEST", 33)
     whole = received_signal(scene, radio.stations[0], cloud, row)
     np.testing.assert_array_equal(close.cell, whole.cell)
     np.testing.assert_allclose(close.signal, whole.signal, rtol=1e-12)

@@ -99,7 +99,8 @@ def _in_orders(
     count = len(within.order)
     found: list[list[time_series.Moments]] = [[[]] * count for _ in groups]
     first, paired, lit = None, [], lit_points.lit(factor)
-    for (number, _), rays in zip(within.order, _rays(echo, view, held, on, within, lit), strict=True):
+    each = _rays(echo, view, held, on, within, lit, len(groups) == 1)
+    for (number, _), rays in zip(within.order, each, strict=True):
         if first is None:
             first, paired = rays, [rays.paired(strength) for _, strength, _ in groups]
         for mine, own in zip(found, paired, strict=True):
@@ -146,11 +147,11 @@ def _groups(
 
 def _rays(
     echo: TargetEcho, view: View, held: Sequence[ImagePath], on: frozenset[str], within: Within,
-    lit: np.ndarray | None = None,
+    lit: np.ndarray | None = None, once: bool = True,
 ) -> Iterator[Steered]:  # fmt: skip
     """Yield the one-way factors at each instant of `within`, in its order.
 
-    held: all paths but the direct one; lit: as in `Steered`. Visibility and reflection coefficients stay during a
+    held: all paths but the direct one; lit, once: as in `Steered`. Visibility and reflection coefficients stay during a
     symbol; only places move.
     """
     kept: dict = {}
@@ -164,7 +165,7 @@ def _rays(
         paths = held
         if held and later is not view:
             paths = echo.moved(later, held)
-        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant, lit=lit)
+        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant, lit=lit, once=once)
         if span is not None:
             first = first or rays
         yield rays
@@ -189,7 +190,8 @@ def _at_instants(
     now, before = echo.sending.aired[rows], echo.sending.aired_before[rows] if turned is not None else None
     held = echo.paths if view is echo.view else echo.paths_of(view)
     within = Within([(number, None) for number in range(len(delays))], delays, None)
-    for rays, weight in zip(_rays(echo, view, held, on, within), weights, strict=True):
+    each = _rays(echo, view, held, on, within, once=len(groups) == 1)
+    for rays, weight in zip(each, weights, strict=True):
         for count, strength, lit in groups:
             spectrum = rays.echo(strength)[lit]
             heard = waveform.transmit(spectrum, now[lit])

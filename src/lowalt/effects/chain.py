@@ -13,7 +13,6 @@ from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, Chooses
 from lowalt.effects.listening import Listening
 from lowalt.effects.receiving import Heard, Receiving
 from lowalt.effects.sending import Sending
-from lowalt.effects.strongest_cell import strongest
 from lowalt.effects.target_echo import EXACT, TargetEcho
 from lowalt.effects.view import View
 
@@ -108,13 +107,7 @@ class Chain:
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
-        return self._cells_of(self.heard(on, chosen).responses)
-
-    def _cells_of(self, spectrum: np.ndarray) -> np.ndarray:
-        """The range cells of responses (N, M); those of the direct echo are kept."""
-        if self.sending.pilots is None and spectrum is self.target.__dict__.get("direct"):
-            return self.target.direct_cells
-        return self.sending.cells(spectrum)
+        return self.sending.cells(self.heard(on, chosen).responses)
 
     def heard(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Heard:
         """Return what the receiver makes of the symbols `chosen` (all) with the physics `on`."""
@@ -139,12 +132,11 @@ class Chain:
                 spectrum, left = self.receiving.responded(spectrum)
                 if not left and not self.sending.distorts:
                     return Heard(spectrum)
-                alone = spectrum is self.target.__dict__.get("direct")
-                return Heard(self.receiving.aired(spectrum, left, rows), alone)
+                return self.receiving.aired(spectrum, left, rows)
             samples = waveform.transmit(spectrum, self.sending.aired[rows])
         if self._unknown is not None:
             samples = samples + self._unknown[rows]
-        return Heard(self.receiving.sampled(samples, left, rows))
+        return self.receiving.sampled(samples, left, rows)
 
     def _moving(
         self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
@@ -166,28 +158,26 @@ class Chain:
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
         heard = self.heard(on, chosen)
-        if not leads and chosen is None and (found := self._close(heard)) is not None:
-            return Outcome(*found, np.full(len(heard.responses), np.nan))
-        cells = self._cells_of(heard.responses)
+        if not leads and not self.detection and self.timing is None and self.sending.pilots is None:
+            value, cell = self._strongest(heard)
+            return Outcome(value, cell, np.full(len(value), np.nan))
+        cells = self.sending.cells(heard.responses)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
         for effect in providing(self.detection, FiltersCells):
             cells = effect.module.process(effect.settings, cells, self.receiving.bare, self.draws(effect.name))
-        size = self.target.direct_sizes if cells is self.target.__dict__.get("direct_cells") else abs(cells)
+        size = abs(cells)
         best, lead = size.argmax(axis=1), need.gap(size) if leads else np.full(len(cells), np.nan)
         for effect in providing(self.detection, ChoosesCells):
             best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
         outcome = Outcome(cells[np.arange(len(cells)), best], best, lead)
         return outcome if self.timing is None else self._evenly(outcome)
 
-    def _close(self, heard: Heard) -> tuple[np.ndarray, np.ndarray] | None:
-        """The strongest cells of what the receiver has made of the target's direct echo alone.
-
-        None where they hold more, or where something stands between these cells and the outcome.
-        """
-        if not heard.alone or self.detection or self.timing is not None or self.sending.pilots is not None:
-            return None
-        return strongest(self.target.direct, self.target.direct_sizes, self.target.direct_best, heard.responses)
+    def _strongest(self, heard: Heard) -> tuple[np.ndarray, np.ndarray]:
+        """The strongest range cells of what is heard; those of the direct echo alone are kept."""
+        if heard.given is self.target.__dict__.get("direct"):
+            return self.target.strongest
+        return heard.strongest()
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""

@@ -215,14 +215,6 @@ class ChangesSamples(Protocol):
 
 
 @runtime_checkable
-class ChangesTones(Protocol):
-    """Optional, receiver: an effect that begins with a transform of its samples, which may then be given at once."""
-
-    def retimed(self, settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-        """Return the samples (N, M) of `receive`, given np.fft.fft of its samples; tones may be overwritten."""
-
-
-@runtime_checkable
 class ChangesResponse(Protocol):
     """Optional, receiver: an effect that can also act on subcarriers before there are samples, in less time."""
 

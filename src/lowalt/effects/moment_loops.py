@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import kernel
+from lowalt.common.jit import INNER_VECTOR, VECTOR, kernel
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 STRIDE = 16
@@ -13,7 +13,7 @@ BLOCK = 4
 """Orders that share a pass over the points."""
 
 
-@LOOPS
+@INNER_VECTOR
 def lit_points(strength, lit):
     """Fill lit with the numbers of the points that have any strength (L,); return how many they are."""
     count = 0
@@ -23,66 +23,92 @@ def lit_points(strength, lit):
     return count
 
 
-@LOOPS
-def products(out, back, strength, times, lit, count, real, imag):
+@INNER_VECTOR
+def products(out_re, out_im, back_re, back_im, strength, times, lit, count, real, imag):
     """Fill real, imag with times strength out back, each (L,), of the `count` points `lit`."""
-    if count == len(out):
-        for i in range(count):
-            z = times * strength[i] * (out[i] * back[i])
-            real[i], imag[i] = z.real, z.imag
+    if count == len(out_re):
+        for i in range(np.uint64(count)):
+            own = times * strength[i]
+            real[i] = own * (out_re[i] * back_re[i] - out_im[i] * back_im[i])
+            imag[i] = own * (out_re[i] * back_im[i] + out_im[i] * back_re[i])
         return
-    for i in range(count):
+    for i in range(np.uint64(count)):
         at = lit[i]
-        z = times * strength[at] * (out[at] * back[at])
-        real[i], imag[i] = z.real, z.imag
+        own = times * strength[at]
+        real[i] = own * (out_re[at] * back_re[at] - out_im[at] * back_im[at])
+        imag[i] = own * (out_re[at] * back_im[at] + out_im[at] * back_re[at])
 
 
-@LOOPS
-def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, reach, result):
+@INNER_VECTOR
+def places(there, home, middle, half_cells, reach, lit, count, u):
+    """Fill u with the two-way ranges of the `count` points `lit`, -1 to 1 over `reach` about `middle` (cells)."""
+    if count == len(there):
+        for i in range(np.uint64(count)):
+            u[i] = (half_cells * (there[i] + home[i]) - middle) / reach
+        return
+    for i in range(np.uint64(count)):
+        at = lit[i]
+        u[i] = (half_cells * (there[at] + home[at]) - middle) / reach
+
+
+@INNER_VECTOR
+def sums(u, real, imag, before, last, count, orders, result):
+    """Fill result (2, P) with (-j)^p times the sum over points of real + j imag, (L,) each, times T_p(u).
+
+    before, last: (L,) work space for the polynomials of the two orders before a pass over the points, which takes four.
+    """
+    for p in range(0, orders, BLOCK):
+        a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(np.uint64(count)):
+            x = u[i]
+            # T_-2 = T_2 and T_-1 = T_1 start the recurrence.
+            older, old = (before[i], last[i]) if p > 0 else (2.0 * x * x - 1.0, x)
+            x += x
+            one = x * old - older
+            two = x * one - old
+            three = x * two - one
+            four = x * three - two
+            before[i], last[i] = three, four
+            y, z = real[i], imag[i]
+            a += one * y
+            b += one * z
+            c += two * y
+            d += two * z
+            e += three * y
+            f += three * z
+            g += four * y
+            h += four * z
+        result[0, p], result[1, p] = a, b
+        result[0, p + 1], result[1, p + 1] = d, -c
+        result[0, p + 2], result[1, p + 2] = -e, -f
+        result[0, p + 3], result[1, p + 3] = -h, g
+
+
+@VECTOR
+def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, reach, work, lit, result):
     """Fill result (N, 2, Q, P) with real and imaginary parts of (-j)^p times the sum over points of z T_p(u).
 
-    z = times strength out back, u the two-way range. out, back: (Q, N, L) at Q frequencies; strength: (N or 1, L);
+    z = times strength out back, u the two-way range. out, back: (2, Q, N, L) at Q frequencies; strength: (N or 1, L);
     u counts from `middle` (N,), in cells as `reach`, and runs from -1 to 1 over `reach`. P is a multiple of BLOCK.
-    Symbols without any strength are zero.
+    Symbols without any strength are zero. work (5, L) and lit (L,) int64: work space.
     """
-    nodes, symbols, whole = out.shape
-    orders = result.shape[3]
-    powers, real, imag = np.empty((orders, whole)), np.empty(whole), np.empty(whole)
-    lit = np.empty(whole, np.int64)
+    nodes, symbols = out.shape[1:3]
+    u, real, imag, before, last = work[0], work[1], work[2], work[3], work[4]
     for n in range(symbols):
         own = strength[n % strength.shape[0]]
-        result[n] = 0.0
         # Points without strength are left out: of a group of points, all others.
         count = lit_points(own, lit)
-        there, home = excess_a[n], excess_b[n]
-        for i in range(count):
-            powers[0, i] = 1.0
-            at = i if count == whole else lit[i]
-            powers[1, i] = (half_cells * (there[at] + home[at]) - middle[n]) / reach
-        for p in range(2, orders):
-            for i in range(count):
-                powers[p, i] = 2.0 * powers[1, i] * powers[p - 1, i] - powers[p - 2, i]
+        for q in range(nodes):
+            for p in range(result.shape[3]):
+                result[n, 0, q, p], result[n, 1, q, p] = 0.0, 0.0
+        if count > 0:
+            places(excess_a[n], excess_b[n], middle[n], half_cells, reach, lit, count, u)
         for q in range(nodes if count else 0):
-            products(out[q, n], back[q, n], own, times, lit, count, real, imag)
-            # Four orders a pass over the points.
-            for p in range(0, orders, BLOCK):
-                a, b, c, d, e, f, g, h = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-                for i in range(count):
-                    a += powers[p, i] * real[i]
-                    b += powers[p, i] * imag[i]
-                    c += powers[p + 1, i] * real[i]
-                    d += powers[p + 1, i] * imag[i]
-                    e += powers[p + 2, i] * real[i]
-                    f += powers[p + 2, i] * imag[i]
-                    g += powers[p + 3, i] * real[i]
-                    h += powers[p + 3, i] * imag[i]
-                result[n, 0, q, p], result[n, 1, q, p] = a, b
-                result[n, 0, q, p + 1], result[n, 1, q, p + 1] = d, -c
-                result[n, 0, q, p + 2], result[n, 1, q, p + 2] = -e, -f
-                result[n, 0, q, p + 3], result[n, 1, q, p + 3] = -h, g
+            products(out[0, q, n], out[1, q, n], back[0, q, n], back[1, q, n], own, times, lit, count, real, imag)
+            sums(u, real, imag, before, last, count, result.shape[3], result[n, :, q])
 
 
-@LOOPS
+@INNER_VECTOR
 def turned(whole, cells, half_steps, total):
     """Phase factor of a delay by `whole` + `cells` range cells, `half_steps` halves of a subcarrier off the middle.
 
@@ -93,7 +119,16 @@ def turned(whole, cells, half_steps, total):
     return complex(math.cos(angle), -math.sin(angle))
 
 
-@LOOPS
+@INNER_VECTOR
+def any_of(planes):
+    """Whether any of the moments (2, P) is not zero."""
+    some = False
+    for p in range(planes.shape[1]):
+        some = some or planes[0, p] != 0.0 or planes[1, p] != 0.0
+    return some
+
+
+@INNER_VECTOR
 def halves(planes, table, work):
     """Fill work (4, H) with the sums over orders of planes (2, P) times table (P, M): even orders', then odd orders'.
 
@@ -102,8 +137,8 @@ def halves(planes, table, work):
     """
     for parity in range(2):
         real, imag = work[2 * parity], work[2 * parity + 1]
-        real[:] = 0.0
-        imag[:] = 0.0
+        for m in range(np.uint64(len(real))):
+            real[m], imag[m] = 0.0, 0.0
         for p in range(parity, table.shape[0], 4):
             # Two orders a pass over the subcarriers; the number of orders may be odd.
             q, more = (p + 2, 1.0) if p + 2 < table.shape[0] else (p, 0.0)
@@ -114,7 +149,7 @@ def halves(planes, table, work):
                 imag[m] += b * one[m] + d * two[m]
 
 
-@LOOPS
+@INNER_VECTOR
 def ramp(start, step, total, real, imag):
     """Fill real, imag (H,) with the phase factors start, start step, start step^2, ... in strides, to rounding."""
     wide = step[1]
@@ -127,18 +162,18 @@ def ramp(start, step, total, real, imag):
         imag[k] = real[k - STRIDE] * wide.imag + imag[k - STRIDE] * wide.real
 
 
-@LOOPS
-def spread(planes, table, own, whole, cells, result):
+@VECTOR
+def spread(planes, table, own, whole, cells, work, turn, sums, result):
     """Add own[n] times the response of moments (N, 2, P), real and imaginary, delayed, to result (N, M).
 
     table: (P, M) real, each order's values at the subcarriers, even or odd about the band's middle as the order is; the
-    delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells.
+    delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells. With H = (M + 1) // 2, work
+    (4, H), turn (2, H) and sums (2, M) are work space.
     """
     symbols, total = result.shape
     half = (total + 1) // 2
-    work, turn, sums = np.empty((4, half)), np.empty((2, half)), np.empty((2, total))
     for n in range(symbols):
-        if not planes[n].any():
+        if not any_of(planes[n]):
             continue
         halves(planes[n], table, work)
         even_re, even_im, odd_re, odd_im = work[0], work[1], work[2], work[3]

@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.effects import interpolation, response_loops
-from lowalt.effects.moment_loops import BLOCK, LOOPS
+from lowalt.effects.moment_loops import BLOCK
+from lowalt.effects.near_field_loops import directions, evaluated
 
 SYMBOLS = 100
 """Symbols that share a box."""
@@ -46,68 +47,6 @@ class Arrays(NamedTuple):
     series: np.ndarray
     rows: np.ndarray
     highest: float
-
-
-@LOOPS
-def directions(places, station, axes, out):
-    """Fill out (3, N, L) with direction cosines across and up, and inverse ranges (1/m), of places (N, 3, L)."""
-    sine, cosine = axes
-    s0, s1, s2 = station[0], station[1], station[2]
-    for n in range(places.shape[0]):
-        at, across, up, near = places[n], out[0, n], out[1, n], out[2, n]
-        for i in range(np.uint64(places.shape[2])):
-            x, y, z = at[0, i] - s0, at[1, i] - s1, at[2, i] - s2
-            inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
-            across[i], up[i], near[i] = (cosine * y - sine * x) * inverse, z * inverse, inverse
-
-
-@LOOPS
-def chebyshev(at, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,)."""
-    for i in range(len(at)):
-        table[0, i] = 1.0
-    for k in range(1, len(table)):
-        for i in range(len(at)):
-            x = (at[i] - middle) / half
-            table[k, i] = 2.0 * x * table[k - 1, i] - table[k - 2, i] if k > 1 else x
-
-
-@LOOPS
-def added(four, first, across, weight, total):
-    """Add weight (L,) times the sum of four (BLOCK,) times the rows of `across` from `first` on to total (L,)."""
-    t, u, v, w = four[0], four[1], four[2], four[3]
-    for i in range(len(total)):
-        total[i] += weight[i] * (
-            (t * across[first, i] + u * across[first + 1, i]) + (v * across[first + 2, i] + w * across[first + 3, i])
-        )
-
-
-@LOOPS
-def evaluated(at, middle, half, terms, lengths, out):
-    """Fill out (Q, N, L) with the polynomials `terms` (2, Q, B, C, A), real and imaginary, of directions at (3, N, L).
-
-    Chebyshev polynomials of (at - middle) / half: A across, B up, C inverse range; of each (B, C) the first
-    lengths[b, c] count, which are multiples of BLOCK.
-    """
-    count = at.shape[2]
-    across, up = np.empty((terms.shape[4], count)), np.empty((terms.shape[2], count))
-    near, weight, total = np.empty((terms.shape[3], count)), np.empty(count), np.empty((2, terms.shape[1], count))
-    for n in range(at.shape[1]):
-        chebyshev(at[0, n], middle[0], half[0], across)
-        chebyshev(at[1, n], middle[1], half[1], up)
-        chebyshev(at[2, n], middle[2], half[2], near)
-        total[:] = 0.0
-        for b in range(terms.shape[2]):
-            for c in range(terms.shape[3]):
-                for i in range(count):
-                    weight[i] = up[b, i] * near[c, i]
-                for q in range(terms.shape[1]):
-                    for a in range(0, lengths[b, c], BLOCK):
-                        added(terms[0, q, b, c, a:], a, across, weight, total[0, q])
-                        added(terms[1, q, b, c, a:], a, across, weight, total[1, q])
-        for q in range(terms.shape[1]):
-            for i in range(count):
-                out[q, n, i] = complex(total[0, q, i], total[1, q, i])
 
 
 class Box(NamedTuple):
@@ -146,7 +85,12 @@ def sums(
             continue
         if kept is not None:
             kept[first] = box
-        evaluated(np.ascontiguousarray(at[:, rows]), box.middle, box.half, box.terms, box.lengths, out[:, rows])
+        _, frequencies, *orders = box.terms.shape
+        work = [np.empty((size, places.shape[1])) for size in (orders[2], orders[0], orders[1])]
+        evaluated(
+            np.ascontiguousarray(at[:, rows]), box.middle, box.half, box.terms, box.lengths, *work,
+            np.empty(places.shape[1]), np.empty((frequencies, 2, places.shape[1])), out[:, rows],
+        )  # fmt: skip
 
 
 def _box(

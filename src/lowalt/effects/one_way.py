@@ -1,16 +1,17 @@
 """One array's complex factors over one path to every point: coefficient, array sum, 1/r and half the two-way phase."""
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.echo.pointwise.reference_range import CELL, REST, TURN, reference
+from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
-from lowalt.effects import near_field, response_loops
+from lowalt.effects import direct_loops, near_field, response_loops, waves
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import ONE, Instant, Kept
 
@@ -30,7 +31,8 @@ class ImagePath(NamedTuple):
 
 
 class OneWay(NamedTuple):
-    """One array over one path: factors (Q, N, L), excess range (N, L), its middle (N,) and reach to either side (m)."""
+    """One array over one path: factors (2, Q, N, L), real and imaginary, excess range (N, L), its middle (N,) and reach
+    to either side (m)."""
 
     factors: np.ndarray
     excess: np.ndarray
@@ -93,7 +95,7 @@ class PathFactors:
         radio, axes = self.radio, (self.radio.sine, self.radio.cosine)
         spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
         count = self.places.shape[:2]
-        out, excess = np.empty((len(kappas), *count), np.complex128), np.empty(count)
+        out, excess = np.empty((2, len(kappas), *count)), np.empty(count)
         gains, shares = np.empty((0, 0, 0, 0), np.complex128), ONE
         if wavefront:
             centre = 0.5 * (kappas.min() + kappas.max())
@@ -102,22 +104,77 @@ class PathFactors:
             )
             array = near_field.Arrays(
                 radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
-                response_loops.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
+                waves.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
             )  # fmt: skip
             if kept is None:
-                gains = np.empty((1, *out.shape), np.complex128)
+                gains = np.empty((1, *out.shape[1:]), np.complex128)
                 near_field.sums(self.places, array, error, gains[0])
             else:
                 gains, shares = kept.sums(self.places, array, error, len(kappas), instant)
         fault = response_loops.one_way(
-            np.ascontiguousarray(self.places.swapaxes(1, 2)), radio.station, axes, self.refs, self.origin,
-            0.5 * radio.turns, spacing, self.aims, radio.kappa, kappas, squint, shape, self.coefficient, gains, shares,
-            out, excess,
+            self._planes, radio.station, axes, self.refs, self.origin,
+            0.5 * radio.turns, spacing, self.aims, radio.kappa, kappas, *_stepped(kappas), squint, shape,
+            self.coefficient, gains, shares, np.empty((13, count[1])), *np.empty((2, len(kappas), count[1])),
+            np.empty(count[1], np.complex128), out, excess,
         )  # fmt: skip
-        if fault:
-            raise InputError(
-                f"position of a point at symbol {(fault - 1) // count[1]} is that of station {self.name} (r = 0), "
-                "expected r > 0"
-            )
+        self._check(fault)
         low, high = excess.min(axis=1), excess.max(axis=1)
         return OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
+
+    def spans(self, shape: tuple[int, int], squint: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds of each symbol's least and largest excess range (N,) of the points (m), as `one_way` counts.
+
+        With squint they count from the origin's range to the array's middle, which the bounds hold too.
+        """
+        low, high = np.empty((2, len(self.places)))
+        half_m = tables.half_diagonal(shape) * SPEED_OF_LIGHT / (2 * self.network.carrier_hz) if squint else 0.0
+        direct_loops.spans(self._planes, self.refs, self.origin, half_m, low, high)
+        if squint:
+            away = self.origin - self.radio.station
+            side = self.radio.cosine * away[:, 1] - self.radio.sine * away[:, 0]
+            along = 0.5 * ((shape[0] - 1) * side + (shape[1] - 1) * away[:, 2])
+            ahead = along * SPEED_OF_LIGHT / (2 * self.network.carrier_hz) / self.refs[:, RANGE]
+            low, high = low - ahead, high - ahead
+        return low, high
+
+    def moments(
+        self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, strength: np.ndarray, middle: np.ndarray,
+        half_cells: float, reach: float, result: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Fill result (N, 2, Q, P) with the moments of the echo on this path alone, as plane waves there and back.
+
+        strength: (N or 1, L); middle, half_cells, reach: as in `moment_loops.moments`; the others as in `one_way`.
+        Raises: InputError for a point in the station.
+        """
+        radio, size = self.radio, direct_loops.padded(self.places.shape[1])
+        fault = direct_loops.moments(
+            self._planes, *self._axes, self.refs, self.origin, 0.5 * radio.turns,
+            SPEED_OF_LIGHT / (2 * self.network.carrier_hz), self.aims, radio.kappa, kappas, *_stepped(kappas), squint,
+            shape, strength, middle, half_cells, reach, np.empty((direct_loops.ROWS, size)),
+            *np.empty((2, len(kappas), size)), result,
+        )  # fmt: skip
+        self._check(fault)
+
+    @property
+    def _axes(self) -> tuple[np.ndarray, tuple[float, float]]:
+        """The station's place (3,) m, and sine and cosine of its normal."""
+        return self.radio.station, (self.radio.sine, self.radio.cosine)
+
+    @cached_property
+    def _planes(self) -> np.ndarray:
+        """The points' places (N, 3, L) m."""
+        return np.ascontiguousarray(self.places.swapaxes(1, 2))
+
+    def _check(self, fault: int) -> None:
+        """Raise InputError where a loop has found a point in the station, n L + l + 1."""
+        if fault:
+            raise InputError(
+                f"position of a point at symbol {(fault - 1) // self.places.shape[1]} is that of station {self.name} "
+                "(r = 0), expected r > 0"
+            )
+
+
+def _stepped(kappas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half of how far frequencies over the carrier are from their middle (Q,), and the waves that hold for it."""
+    steps = 0.5 * (kappas - 0.5 * (kappas[0] + kappas[-1]))
+    return steps, waves.waves_within(0.5 * float(abs(steps).max()))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lowalt.common.jit import kernel
-from lowalt.effects.response_loops import COSINE, DEGREE, SINE, WAVE
+from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract"})
 TURN = 2 * math.pi

@@ -142,8 +142,7 @@ def arriving(signal: np.ndarray) -> float:
 
 def seen_alone(chain: Chain) -> np.ndarray:
     """Return the target's echo (N,) on the direct path with its visibility and aspect; SNRs refer to it."""
-    cells = chain.target.direct_cells
-    return cells[np.arange(len(cells)), chain.target.direct_best]
+    return chain.target.strongest[0]
 
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:

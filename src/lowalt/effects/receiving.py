@@ -3,24 +3,50 @@
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import waveform
+from lowalt.effects import strongest_cell, waveform
 from lowalt.effects.catalogue import NamedEffect, providing, stream_name
-from lowalt.effects.interface import ChangesResponse, ChangesTones, Quantises
+from lowalt.effects.interface import ChangesResponse, Quantises
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
 
 
-class Heard(NamedTuple):
-    """Responses (N, M) behind the receiver, and whether it has acted on the target's direct echo alone."""
+@runtime_checkable
+class ChangesTones(Protocol):
+    """Optional, receiver: an effect that can also act on the transform of its samples, without going back to them."""
 
-    responses: np.ndarray
-    alone: bool = False
+    def retoned(self, settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return np.fft.fft of the samples (N, M) of `receive`, given that of its samples; tones may be overwritten."""
+
+
+@runtime_checkable
+class TakesTones(Protocol):
+    """Optional, receiver: an effect that begins with a transform of its samples, which may then be given at once."""
+
+    def retimed(self, settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return the samples (N, M) of `receive`, given np.fft.fft of its samples; tones may be overwritten."""
+
+
+class Heard:
+    """What a receiver has made of a look: responses (N, M), or their tones and the data (N, M) that they carried."""
+
+    def __init__(self, responses: np.ndarray, data: np.ndarray | None = None):
+        """Keep responses, or with `data`, of unit modulus, the tones (`waveform.tones_of`) of symbols of such data."""
+        self.given, self.data = responses, data
+
+    @cached_property
+    def responses(self) -> np.ndarray:
+        """The responses (N, M), the data divided out."""
+        return self.given if self.data is None else waveform.without(self.given, self.data)
+
+    def strongest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the strongest range cells of all symbols, values (N,) and numbers (N,), from no response at all."""
+        return strongest_cell.strongest(self.given, self.data)
 
 
 class Receiving:
@@ -45,23 +71,39 @@ class Receiving:
             spectrum = changed
         return spectrum, []
 
-    def aired(self, spectrum: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> np.ndarray:
-        """Return the responses (N, M) behind the effects `left` of responses (N, M) of the symbols `rows`, as sent."""
-        tones = waveform.tones_of(spectrum, self.sending.aired[rows])
-        if left and providing(left[:1], ChangesTones):
-            draws = self.draws(stream_name(left[0].name))
-            samples = left[0].module.retimed(left[0].settings, tones, self.frame, draws)
-            return self.sampled(samples, left[1:], rows)
-        return self.sampled(np.fft.ifft(tones, axis=1, out=tones), left, rows)
+    def aired(self, spectrum: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> Heard:
+        """Return what is heard behind the effects `left` of responses (N, M) of the symbols `rows`, as sent."""
+        return self._behind(left, rows, tones=waveform.tones_of(spectrum, self.sending.aired[rows]))
 
-    def sampled(self, samples: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> np.ndarray:
-        """Return the responses (N, M) of time samples (N, M) of the symbols `rows`, behind the effects `left`."""
-        for effect in left:
-            if providing([effect], Quantises):
-                self._converted = effect, samples
-            draws = self.draws(stream_name(effect.name))
-            samples = effect.module.receive(effect.settings, samples, self.frame, draws)
-        return self.sending.received(samples, rows)
+    def sampled(self, samples: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> Heard:
+        """Return what is heard of time samples (N, M) of the symbols `rows`, behind the effects `left`."""
+        return self._behind(left, rows, samples=samples)
+
+    def _behind(
+        self, left: list[NamedEffect], rows: slice | np.ndarray, samples: np.ndarray | None = None,
+        tones: np.ndarray | None = None,
+    ) -> Heard:  # fmt: skip
+        """What is heard behind the effects `left` of samples, or of tones, which are overwritten.
+
+        A transform takes longer than most effects, so tones are kept while no effect asks for samples.
+        """
+        for place, effect in enumerate(left):
+            given = self.frame, self.draws(stream_name(effect.name))
+            takes = bool(providing([effect], TakesTones))
+            if tones is None and takes:
+                tones = np.fft.fft(samples, axis=1)
+            stays = len(providing(left[place:], ChangesTones)) == len(left) - place
+            next_takes = len(providing(left[place : place + 2], TakesTones)) == 2
+            if tones is not None and (stays or next_takes):
+                tones = effect.module.retoned(effect.settings, tones, *given)
+            elif takes:
+                samples, tones = effect.module.retimed(effect.settings, tones, *given), None
+            else:
+                samples, tones = samples if tones is None else np.fft.ifft(tones, axis=1, out=tones), None
+                if providing([effect], Quantises):
+                    self._converted = effect, samples
+                samples = effect.module.receive(effect.settings, samples, *given)
+        return Heard(*self.sending.carrying(np.fft.fft(samples, axis=1) if tones is None else tones, rows))
 
     @property
     def step(self) -> float:

@@ -56,14 +56,15 @@ class OneWayFactors:
     The arguments are those of `response`; kept: polynomials of spherical waves that serve several instants of the same
     symbols, filled by the first of them; like: the factors at another instant of the same symbols, whose references
     this instant shares, so that both have moments of the same functions; farther_m: bound of how much any range differs
-    between instants that share them (m); instant: how this one gets its array sums, None for by itself.
+    between instants that share them (m); instant: how this one gets its array sums, None for by itself; once: whether
+    moments are asked for once: factors on the direct path alone are then not kept.
     """
 
     def __init__(
         self, network: Network, station: Station, places: np.ndarray, aim_m: np.ndarray,
         paths: Sequence[ImagePath] = (), *, squint: bool, wavefront: bool, error: float, kept: dict | None = None,
         sender_aim_m: np.ndarray | None = None, like: "OneWayFactors | None" = None, farther_m: float = 0.0,
-        instant: Instant | None = None,
+        instant: Instant | None = None, once: bool = True,
     ):  # fmt: skip
         self.radio = radio = radar(network, station)
         self.farther_m = farther_m
@@ -85,6 +86,11 @@ class OneWayFactors:
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
         asked = kappas, squint, wavefront, self.rest
+        self.direct = chosen[0] if once and symmetric and not paths and not wavefront else None
+        if self.direct is not None:
+            self.asked, self.out, self.back = (network.transmit, kappas, squint), [], []
+            self.frames = self._frame() if like is None else like.frames
+            return
         self.out = [
             path.one_way(network.transmit, *asked, _own(kept, "out", number), instant)
             for number, path in enumerate(sending)
@@ -125,12 +131,16 @@ class OneWayFactors:
         """
         half_cells, result = 0.5 * self.radio.cells, []
         for (a, b, times), (middle, reach), own in zip(self.pairs, self.frames, paired, strict=True):
-            there, home = self.out[a], self.back[b]
             orders = len(tables.table(reach, self.radio.subcarriers, self.rest))
             found = np.empty((len(self.refs), 2, len(self.nodes), orders))
-            moment_loops.moments(
-                own, there.factors, home.factors, times, there.excess, home.excess, middle, half_cells, reach, found,
-            )  # fmt: skip
+            if self.direct is not None:
+                self.direct.moments(*self.asked, own, middle, half_cells, reach, found)
+            else:
+                there, home = self.out[a], self.back[b]
+                moment_loops.moments(
+                    own, there.factors, home.factors, times, there.excess, home.excess, middle, half_cells, reach,
+                    np.empty((5, there.excess.shape[1])), np.empty(there.excess.shape[1], np.int64), found,
+                )  # fmt: skip
             planes = found.reshape(2 * len(self.refs), -1)
             if len(self.nodes) > 1:
                 planes = planes @ self._joined(reach)[0]
@@ -141,9 +151,12 @@ class OneWayFactors:
         """Return the subcarriers (N, M) of each pair of paths' `moments`, or of sums of such of instants alike."""
         refs = self.refs
         own, whole = np.exp(-2j * np.pi * refs[:, TURN]), refs[:, CELL].astype(np.int64)
-        result = np.zeros((len(refs), self.radio.subcarriers), np.complex128)
+        count = self.radio.subcarriers
+        half = (count + 1) // 2
+        work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
+        result = np.zeros((len(refs), count), np.complex128)
         for planes, (middle, reach) in zip(moments, self.frames, strict=True):
-            moment_loops.spread(planes, self._functions(reach), own, whole, refs[:, REST] + middle, result)
+            moment_loops.spread(planes, self._functions(reach), own, whole, refs[:, REST] + middle, *work, result)
         return result
 
     def largest(self, moments: list[np.ndarray]) -> float:
@@ -162,6 +175,12 @@ class OneWayFactors:
     def _joined(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
         """Tables that join the moments at several frequencies (`response_tables.joined`)."""
         return tables.joined(reach, len(self.nodes), self.radio.subcarriers, self.rest)
+
+    def _frame(self) -> list[tuple[np.ndarray, float]]:
+        """The middle (N,) and reach of the direct path's ranges (cells)."""
+        low, high = self.direct.spans(self.asked[0], self.asked[2])
+        reach = 0.5 * self.radio.cells * (float((high - low).max()) + 2.0 * self.farther_m)
+        return [(0.5 * self.radio.cells * (low + high), tables.round_up(reach))]
 
     def _frames(self) -> list[tuple[np.ndarray, float]]:
         """Middle (N,) and reach of each pair's ranges (cells). Few orders matter where a pair has its own middle."""

@@ -4,55 +4,19 @@ Sines, cosines and polynomials are those of `lowalt.echo`. Each call allocates o
 """
 
 import math
-from functools import lru_cache
 
 import numpy as np
 
-from lowalt.common.jit import kernel
-from lowalt.echo.fast.polynomials import smooth
+from lowalt.common.jit import INNER_VECTOR, VECTOR, kernel
 from lowalt.echo.fast.vector_loops import horner
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
-from lowalt.echo.pointwise.terms import dirichlet
+from lowalt.effects.plane_loops import plane_sums
+from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
 
 LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-DEGREE = 11
-WAVE = np.stack([smooth(name, 0.25, DEGREE)[0] for name in ("cosine", "sine")])
-"""Rows COSINE and SINE: cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2, t on [-1/2, 1/2] turns, to rounding."""
-COSINE, SINE = 0, 1
 
 
-@lru_cache(maxsize=16)
-def waves(error: float) -> np.ndarray:
-    """Return polynomials as in WAVE, of the smallest degree at which cosine and sine err by at most `error`."""
-    for degree in range(1, DEGREE):
-        (cosine, off), (sine, slope) = smooth("cosine", 0.25, degree), smooth("sine", 0.25, degree)
-        if off + 0.5 * slope <= error:
-            return np.stack([cosine, sine])
-    return WAVE
-
-
-@LOOPS
-def array_sum(x, count, square, c, out, size):
-    """out = sin(pi count x) / sin(pi x) with its limits; powers of two are products of cosines of doubled angles."""
-    if count & (count - 1):
-        for i in range(size):
-            out[i] = dirichlet(x[i], count)
-        return
-    for i in range(size):
-        k = np.rint(x[i])
-        out[i] = 1.0 - 2.0 * (k - 2.0 * np.floor(0.5 * k)) if count > 1 else 1.0
-        half = 0.5 * (x[i] - k)
-        square[i] = half * half
-    horner(square, WAVE, COSINE, DEGREE, c, size)
-    doubled = 1
-    while doubled < count:
-        for i in range(size):
-            out[i] *= 2.0 * c[i]
-            c[i] = 2.0 * c[i] * c[i] - 1.0
-        doubled *= 2
-
-
-@LOOPS
+@INNER_VECTOR
 def beyond(across, up, side, z, r, spherical):
     """Path (m) to the element `across` and `up` (m) from the array's corner, minus r; plane or spherical wave.
 
@@ -64,7 +28,7 @@ def beyond(across, up, side, z, r, spherical):
     return step / (math.sqrt(r * r + step) + r)
 
 
-@LOOPS
+@INNER_VECTOR
 def beyond_middle(side, z, r, inverse, across, up, spherical, out):
     """Fill out (L,) with `beyond` for points at side, z (m) and range r; inverse: 1 / r."""
     for i in range(np.uint64(len(out))):
@@ -75,7 +39,7 @@ def beyond_middle(side, z, r, inverse, across, up, spherical, out):
             out[i] = step / (math.sqrt(r[i] * r[i] + step) + r[i])
 
 
-@LOOPS
+@INNER_VECTOR
 def geometry(x, y, z, station, axes, ref, origin, more, side, up, r, inverse):
     """Fill (L,) arrays of points x, y, z (L,) m: excess range, coordinates along the array, range and 1 / range (m).
 
@@ -97,7 +61,7 @@ def geometry(x, y, z, station, axes, ref, origin, more, side, up, r, inverse):
     return zeros
 
 
-@LOOPS
+@INNER_VECTOR
 def scaled(own, weight, c, s, turn, real, imag):
     """Fill real, imag (L,) with own weight (c + j s turn); own: complex, (1,) for all points or (L,)."""
     if len(own) == 1:
@@ -111,7 +75,7 @@ def scaled(own, weight, c, s, turn, real, imag):
         real[i], imag[i] = z.real, z.imag
 
 
-@LOOPS
+@INNER_VECTOR
 def blended(gains, shares, q, n, out):
     """Fill out (L,) with the sum of gains (K, Q, N, L) at q and n times shares (K,), two at least."""
     one, two, a, b = gains[0, q, n], gains[1, q, n], shares[0], shares[1]
@@ -123,25 +87,24 @@ def blended(gains, shares, q, n, out):
             out[i] = complex(out[i].real + c * more[i].real, out[i].imag + c * more[i].imag)
 
 
-@LOOPS
+@VECTOR
 def one_way(
-    places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, squint, shape, coefficient, gains,
-    shares, out, excess,
+    places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, steps, rows, squint, shape,
+    coefficient, gains, shares, work, wide, high, blend, out, excess,
 ):  # fmt: skip
-    """Fill out (Q, N, L), one array's complex factors over one path at Q frequencies, and excess (N, L) (m).
+    """Fill out (2, Q, N, L), real and imaginary parts of one array's factors over one path, and excess (N, L) (m).
 
     places: (N, 3, L) m; axes: sine and cosine of the normal; refs: `precise.reference`; origin: (N, 3) m, its points;
-    beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; shape: the array;
-    coefficient: (N or 1, L or 1); gains: (K, Q, N, L) sums of `near_field`, which count by shares (K,), to use instead
-    of the plane wave's, or empty.
+    beam, kappas (Q,): frequencies of the beams' weights and of the arrays over the carrier; steps, rows: as in
+    `plane_sums`; shape: the array; coefficient: (N or 1, L or 1); gains: (K, Q, N, L) sums of `near_field`, which count
+    by shares (K,), to use instead of the plane wave's, or empty; work (13, L), wide and high (Q, L), blend (L,): work
+    space.
     excess: range minus the reference's; with squint the range of the array's middle, else of its corner.
     Returns 0, or n L + l + 1 where r = 0.
     """
     count = places.shape[2]
-    work, blend = np.empty((15, count)), np.empty(count, np.complex128)
     side, up, r, weight, middle = work[0], work[1], work[2], work[3], work[4]
-    turn, square, c, gain_h, gain_v = work[5], work[6], work[7], work[8], work[9]
-    ct, st, more, real, imag = work[10], work[11], work[12], work[13], work[14]
+    turn, square, ct, st, more, real, imag = work[5], work[6], work[7], work[8], work[9], work[10], work[11]
     spherical = gains.shape[0] > 0
     middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
     fixed = 0.5 * beam * (middle_h * aims[0] + middle_v * aims[1])
@@ -161,25 +124,26 @@ def one_way(
         horner(square, WAVE, COSINE, DEGREE, ct, count)
         horner(square, WAVE, SINE, DEGREE, st, count)
         scaled(coefficient[n % coefficient.shape[0]], weight, ct, st, turn, real, imag)
-        for q in range(len(kappas)):
-            own = out[q, n]
-            if spherical:
+        if spherical:
+            for q in range(len(kappas)):
                 seen = gains[0, q, n]
                 if len(shares) > 1:
                     seen = blend
                     blended(gains, shares, q, n, seen)
+                own_re, own_im = out[0, q, n], out[1, q, n]
                 for i in range(np.uint64(count)):
-                    own[i] = complex(real[i], imag[i]) * seen[i]
-                continue
+                    x, y = seen[i].real, seen[i].imag
+                    own_re[i], own_im[i] = real[i] * x - imag[i] * y, real[i] * y + imag[i] * x
+            continue
+        # The array sums need none of what stands in these rows.
+        spare, centre = work[4:9], 0.25 * (kappas[0] + kappas[-1])
+        plane_sums(side, weight, centre, steps, 0.5 * beam * aims[0], shape[0], rows, spare, more, work[12], wide)
+        plane_sums(up, weight, centre, steps, 0.5 * beam * aims[1], shape[1], rows, spare, more, work[12], high)
+        for q in range(len(kappas)):
+            own_re, own_im, one, other = out[0, q, n], out[1, q, n], wide[q], high[q]
             for i in range(np.uint64(count)):
-                turn[i] = 0.5 * (kappas[q] * (side[i] * weight[i]) - beam * aims[0])
-            array_sum(turn, shape[0], square, c, gain_h, count)
-            for i in range(np.uint64(count)):
-                turn[i] = 0.5 * (kappas[q] * (up[i] * weight[i]) - beam * aims[1])
-            array_sum(turn, shape[1], square, c, gain_v, count)
-            for i in range(np.uint64(count)):
-                gain = gain_h[i] * gain_v[i]
-                own[i] = complex(gain * real[i], gain * imag[i])
+                gain = one[i] * other[i]
+                own_re[i], own_im[i] = gain * real[i], gain * imag[i]
     return 0
 
 

@@ -57,10 +57,18 @@ class Sending:
         return self.pilots.module.range_cells(self.pilots.settings, spectrum)
 
     def received(self, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
-        """Return the responses of the time samples of the symbols `rows`, the known data divided out."""
+        """Return the responses (N, M) of the time samples of the symbols `rows`, the known data divided out."""
+        found, data = self.carrying(np.fft.fft(samples, axis=1), rows)
+        return found if data is None else waveform.without(found, data)
+
+    def carrying(self, tones: np.ndarray, rows: slice | np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+        """Return the tones (N, M) of samples of the symbols `rows`, and the data (N, M) that are in them.
+
+        Data of any but unit modulus are divided out: responses, and None.
+        """
         if self.source is None:
-            return waveform.demodulate(samples, self.known[rows])
-        return np.fft.fftshift(np.fft.fft(samples, axis=-1), axes=-1) / self.known[rows]
+            return tones, self.known[rows]
+        return np.fft.fftshift(tones, axes=-1) / self.known[rows], None
 
     def still(self, spectrum: np.ndarray, prefix: NamedEffect | None, offset_cells: float = 0.0) -> np.ndarray:
         """Return time samples (N, M) of responses (N, M). With a `prefix`, later cells begin with the previous symbol.

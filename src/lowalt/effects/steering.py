@@ -35,9 +35,9 @@ class Steered:
     def __init__(
         self, view: View, paths: Sequence[ImagePath] = (), *, squint: bool = False, wavefront: bool = False,
         error: float = 1e-14, kept: dict | None = None, like: "Steered | None" = None, span: SameSymbols | None = None,
-        instant: Instant | None = None, lit: np.ndarray | None = None,
+        instant: Instant | None = None, lit: np.ndarray | None = None, once: bool = True,
     ):  # fmt: skip
-        """Prepare the factors; kept, like and instant: as in `response.OneWayFactors`, for every beam.
+        """Prepare the factors; kept, like, instant and once: as in `response.OneWayFactors`, for every beam.
 
         span: of the symbols, where the view is one of several instants in them; lit: the only points (N, W) of each
         symbol that have any strength (`lit_points.lit`), None for all.
@@ -46,7 +46,7 @@ class Steered:
         places = view.places
         if lit is not None:
             places, paths = lit_points.places_at(places, lit), [lit_points.path_at(path, lit) for path in paths]
-        asked = {"squint": squint, "wavefront": wavefront, "error": error, "instant": instant}
+        asked = {"squint": squint, "wavefront": wavefront, "error": error, "instant": instant, "once": once}
         asked["farther_m"] = 0.0 if span is None else span.farther_m
         given, self.steady = (view.network, view.station), not view.turning
         if self.steady:

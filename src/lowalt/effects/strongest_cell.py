@@ -1,106 +1,145 @@
-"""The strongest range cells of a look behind a receiver, worked out one by one where only few can be the strongest."""
+"""The strongest range cell of every symbol, worked out from few cells where no other one can be stronger.
 
-import math
+A target fills few range cells, and moves by much less than one from symbol to symbol. So the search starts at the cell
+before, and walks to the largest one. By Parseval's theorem the power of all M cells together is known from the response
+alone. What the cells worked out leave of it bounds every other cell; where it is less than the strongest one's power,
+that cell is the strongest of all.
+"""
+
+from functools import lru_cache
 
 import numpy as np
 
-from lowalt.common.jit import INNER, INNER_VECTOR, LEAN
+from lowalt.common.jit import INNER_VECTOR, VECTOR
+from lowalt.effects.tone_loops import divided
 
 MOST = 8
 """Range cells of a symbol that are worked out one by one; a transform gives all cells in the time of about as many."""
-ROOM = 1e-7
-"""Share of a symbol's magnitude added to the bound on its cells: a difference of squares loses half the digits."""
+FEWEST = 16
+"""Least number of range cells for a search; a transform of so few takes no longer."""
+SLOTS = 16
+"""Range cells whose phase factors are held, a power of two of at least MOST."""
+ROOM = 1e-12
+"""Share of a symbol's power added to what its cells leave: a difference keeps the rounding of its parts."""
+
+
+@lru_cache(maxsize=16)
+def _wave(count: int) -> np.ndarray:
+    """Cosine and sine (2, M) of 2 pi k / M for k < M."""
+    turned = np.exp(2j * np.pi * np.arange(count) / count)
+    return np.stack([turned.real, turned.imag])
 
 
 @INNER_VECTOR
-def _apart(before, after):
-    """The gain from a symbol before (M,) to after (M,) that fits best, and the root of the squares that remain."""
-    own, new, re, im = 0.0, 0.0, 0.0, 0.0
-    for m in range(np.uint64(len(before))):
-        a, b, c, d = before[m].real, before[m].imag, after[m].real, after[m].imag
-        own += a * a + b * b
-        new += c * c + d * d
-        re += a * c + b * d
-        im += a * d - b * c
-    cross = re * re + im * im
-    if own == 0.0:
-        return 0.0, math.sqrt(new)
-    return math.sqrt(cross) / own, math.sqrt(max(new - cross / own, 0.0)) + ROOM * math.sqrt(new)
+def _power(row, data, parts):
+    """Fill parts (2, M) with real and imaginary parts of a response, and return the sum of its squares.
 
-
-@INNER
-def _cell(response, wave, q):
-    """Range cell q of a response (M,); four sums run next to each other, each in the order of the subcarriers."""
-    count = len(response)
-    re0, re1, im0, im1, place = 0.0, 0.0, 0.0, 0.0, 0
-    for m in range(0, count - 1, 2):
-        z, w = response[m], wave[place]
-        place += q
-        place -= count if place >= count else 0
-        re0 += z.real * w.real - z.imag * w.imag
-        im0 += z.real * w.imag + z.imag * w.real
-        z, w = response[m + 1], wave[place]
-        place += q
-        place -= count if place >= count else 0
-        re1 += z.real * w.real - z.imag * w.imag
-        im1 += z.real * w.imag + z.imag * w.real
-    last = response[count - 1] * wave[place] if count % 2 else 0.0j
-    return (complex(re0 + re1, im0 + im1) + last) / count
-
-
-@LEAN
-def contested(before, after, sizes, best, wave, value, cell):
-    """Fill value and cell (N,) with the strongest range cell of responses after (N, M); return whether few are left.
-
-    before: responses (N, M) whose cells have the magnitudes sizes (N, M), the largest in best (N,); wave:
-    exp(j 2 pi k / M) for k < M. What of a symbol after fits no multiple of the symbol before has a known length. A cell
-    is a scalar product with a vector of length M^(-1/2), so no cell's magnitude differs from the multiple's by more
-    than that length over sqrt(M). Only cells that can be the strongest are worked out. Symbols with more than MOST of
-    them are left, with cell -1; once more than a quarter of the look and 16 are left, the loop gives up.
+    row: the response (M,), or with `data` (M,) tones of it in the transform's order (`tone_loops.divided`).
     """
-    symbols, count = after.shape
-    left = 0
+    count = len(row)
+    re, im, power = parts[0], parts[1], 0.0
+    half = count // 2 if len(data) else 0
+    rest = count - half
+    if len(data) == 0:
+        for m in range(np.uint64(count)):
+            re[m], im[m] = row[m].real, row[m].imag
+    else:
+        high_re, high_im, high, above, below = re[half:], im[half:], data[half:], row[:rest], row[rest:]
+        for m in range(np.uint64(rest)):
+            a, b, c, d = above[m].real, above[m].imag, high[m].real, high[m].imag
+            high_re[m], high_im[m] = a * c + b * d, b * c - a * d
+        for m in range(np.uint64(half)):
+            a, b, c, d = below[m].real, below[m].imag, data[m].real, data[m].imag
+            re[m], im[m] = a * c + b * d, b * c - a * d
+    for m in range(np.uint64(count)):
+        power += re[m] * re[m] + im[m] * im[m]
+    return power
+
+
+@INNER_VECTOR
+def _cell(parts, q, wave, held, rows):
+    """Range cell q of a response in parts (2, M); rows (SLOTS, 2, M): phase factors of the cells in held (SLOTS,)."""
+    count = parts.shape[1]
+    slot = q % SLOTS
+    own = rows[slot]
+    if held[slot] != q:
+        held[slot], place = q, 0
+        for m in range(count):
+            own[0, m], own[1, m] = wave[0, place], wave[1, place]
+            place += q
+            place -= count if place >= count else 0
+    re, im, c, s = parts[0], parts[1], own[0], own[1]
+    x, y = 0.0, 0.0
+    for m in range(np.uint64(count)):
+        x += re[m] * c[m] - im[m] * s[m]
+        y += re[m] * s[m] + im[m] * c[m]
+    return complex(x / count, y / count)
+
+
+@VECTOR
+def found(responses, data, none, wave, start, parts, held, rows, value, cell):
+    """Fill value and cell (N,) with the strongest range cells of responses (N, M); return whether few are left.
+
+    data: (N, M) where `responses` are tones, else (0, M); none: (0,); start: a cell near the first symbol's; parts
+    (2, M), held (SLOTS,) of -1 and rows (SLOTS, 2, M): work space. Symbols whose strongest cell is not certain after
+    MOST cells are left, with cell -1; once more than a quarter of the look and 16 are left, the loop gives up.
+    """
+    symbols, count = responses.shape
+    left, near = 0, start
     for n in range(symbols):
-        cell[n] = -1
-        gain, rest = _apart(before[n], after[n])
-        least = gain * sizes[n, best[n]] - 2.0 * rest / math.sqrt(count)
-        many = 0
-        for q in range(np.uint64(count)):
-            many += 1 if gain * sizes[n, q] >= least else 0
-        if many > MOST:
+        own = none
+        if len(data) > 0:
+            own = data[n]
+        total = _power(responses[n], own, parts) / count
+        first, last, best, top, rest = near, near - 1, near, -1.0, (1.0 + ROOM) * total
+        # Where no cells as large as the strongest could make it certain, no more are worked out.
+        while last < first or (not top > rest and last - first + 1 < MOST and rest < MOST * top):
+            q = last + 1
+            if last - best > best - first or (last - best == best - first and last > first and n % 2):
+                q = first - 1
+            first, last = min(first, q), max(last, q)
+            z = _cell(parts, q % count, wave, held, rows)
+            size = z.real * z.real + z.imag * z.imag
+            rest -= size
+            if size > top:
+                top, best, value[n] = size, q, z
+        near = best % count
+        cell[n] = near
+        if total > 0.0 and not top > rest:
+            cell[n] = -1
             left += 1
             if 4 * left > symbols + 64:
                 return False
-            continue
-        top, q = -1.0, best[n] if many == 1 else 0
-        while many > 0:
-            if gain * sizes[n, q] >= least:
-                many -= 1
-                found = _cell(after[n], wave, q)
-                size = math.sqrt(found.real * found.real + found.imag * found.imag)
-                if size > top:
-                    top, value[n], cell[n] = size, found, q
-            q += 1
     return True
 
 
-def strongest(
-    before: np.ndarray, sizes: np.ndarray, best: np.ndarray, after: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the strongest range cells of responses `after` (N, M): their values (N,) and numbers (N,).
+def strongest(responses: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the strongest range cells of responses (N, M): their values (N,) and numbers (N,).
 
-    before: responses (N, M) that differ little from them; sizes (N, M) and best (N,): the magnitudes of their cells and
-    the numbers of the largest. None where the two differ too much for this to save time. Source: Cauchy and Schwarz's
-    inequality.
+    data: (N, M) of unit modulus, where `responses` are the tones (`waveform.tones_of`) of symbols that carried them.
+    Source: Parseval's theorem.
     """
-    symbols, count = after.shape
-    wave = np.exp(2j * np.pi * np.arange(count) / count)
-    value, cell = np.empty(symbols, np.complex128), np.empty(symbols, np.int64)
-    if not contested(before, after, sizes, best, wave, value, cell):
-        return None
+    symbols, count = responses.shape
+    value, cell = np.empty(symbols, np.complex128), np.full(symbols, -1)
+    given = np.empty((0, count), np.complex128) if data is None else np.ascontiguousarray(data)
+    if count >= FEWEST and symbols > 0:
+        start = int(abs(_cells(responses[:1], given[:1])).argmax())
+        found(
+            np.ascontiguousarray(responses), given, np.empty(0, np.complex128), _wave(count), start,
+            np.empty((2, count)), np.full(SLOTS, -1), np.empty((SLOTS, 2, count)), value, cell,
+        )  # fmt: skip
     rest = np.flatnonzero(cell < 0)
     if len(rest):
-        cells = np.fft.ifft(after[rest], axis=1)
+        cells = _cells(responses[rest], given[rest] if len(given) else given)
         cell[rest] = abs(cells).argmax(axis=1)
         value[rest] = cells[np.arange(len(rest)), cell[rest]]
     return value, cell
+
+
+def _cells(responses: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """All range cells (N, M) of responses, or of tones that carried `data`."""
+    if len(data):
+        spectrum = np.empty(responses.shape, np.complex128)
+        divided(np.ascontiguousarray(responses), np.ascontiguousarray(data), spectrum)
+        responses = spectrum
+    return np.fft.ifft(responses, axis=1)

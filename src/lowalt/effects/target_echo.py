@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lowalt.effects import arrivals, need, steering, waveform
+from lowalt.effects import arrivals, need, steering, strongest_cell, waveform
 from lowalt.effects.catalogue import BY_END, NamedEffect, providing
 from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
 from lowalt.effects.lit_points import SkipsDarkPoints
@@ -80,19 +80,9 @@ class TargetEcho:
         return steering.echo(self.view, factor=self.factor, error=EXACT)
 
     @cached_property
-    def direct_cells(self) -> np.ndarray:
-        """The range cells (N, M) of `direct`."""
-        return np.fft.ifft(self.direct, axis=1)
-
-    @cached_property
-    def direct_sizes(self) -> np.ndarray:
-        """The magnitudes (N, M) of these cells."""
-        return abs(self.direct_cells)
-
-    @cached_property
-    def direct_best(self) -> np.ndarray:
-        """The number (N,) of the strongest of these cells."""
-        return self.direct_sizes.argmax(axis=1)
+    def strongest(self) -> tuple[np.ndarray, np.ndarray]:
+        """The strongest range cells of `direct`: their values (N,) and numbers (N,)."""
+        return strongest_cell.strongest(self.direct)
 
     @cached_property
     def own_response(self) -> np.ndarray:

@@ -57,9 +57,13 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
-    tones = np.fft.fft(samples, axis=-1)
+    return without(np.fft.fft(samples, axis=-1), np.broadcast_to(data, samples.shape))
+
+
+def without(tones: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the responses (N, M) of tones (N, M) of samples that carried `data` (N, M) of unit modulus."""
     result = np.empty_like(tones)
-    divided(tones, np.broadcast_to(data, tones.shape), result)
+    divided(tones, data, result)
     return result
 
 

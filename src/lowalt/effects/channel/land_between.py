@@ -14,7 +14,8 @@ from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
 from lowalt.effects.antenna import Element, gain
 from lowalt.effects.channel import patches
-from lowalt.effects.response_loops import LOOPS, array_sum
+from lowalt.effects.plane_loops import array_sum
+from lowalt.effects.response_loops import LOOPS
 
 STRIP = 256
 """Patches that pass through the loops together."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver._white import with_noise
+from lowalt.effects.receiver._white import tones_with_noise, with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -47,5 +47,14 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     if settings["snr_db"] is None:
         return samples
-    power = frame.reference * 10 ** (-settings["snr_db"] / 10)
-    return with_noise(samples, math.sqrt(power / 2), rng)
+    return with_noise(samples, _scale(settings, frame), rng)
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    return tones if settings["snr_db"] is None else tones_with_noise(tones, _scale(settings, frame), rng)
+
+
+def _scale(settings: dict, frame: Frame) -> float:
+    """Standard deviation of each part of a sample's noise."""
+    return math.sqrt(frame.reference * 10 ** (-settings["snr_db"] / 10) / 2)

@@ -77,35 +77,54 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
 
 def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the samples of `receive` from the tones (N, M) of its samples, in the transform's order, as work space."""
+    rates, places = _slipped(settings, tones, frame, rng)
+    samples = np.fft.ifft(tones, axis=1)
+    _stretch(tones, rates, places, samples)
+    return samples
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    rates, places = _slipped(settings, tones, frame, rng)
+    change = np.zeros(tones.shape, np.complex128)
+    _stretch(tones.copy(), rates, places, change)
+    tones += np.fft.fft(change, axis=1, out=change)
+    return tones
+
+
+def _slipped(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> tuple:
+    """Turn tones (N, M) as far as each symbol's middle sample is early; return the rest for `_stretch`."""
     rate = fast(settings, frame, rng)
     early = -rate / (1 + rate)
     count, baseband = tones.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
     at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
-    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones)) * at_middle
-    return _stretched(tones, 2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle)
+    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones), at_middle)
+    return 2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle
 
 
-def _stretched(tones: np.ndarray, rates: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The inverse transform of tones (N, M) times exp(j rates[m] places[i]) at sample i, by the exponential's series.
+def _stretch(tones: np.ndarray, rates: np.ndarray, places: np.ndarray, samples: np.ndarray) -> None:
+    """Add to samples (N, M) the inverse transform of tones times exp(j rates[m] places[i]) - 1 at sample i, by series.
 
-    The terms left out are below rounding; each term is an inverse transform of its own.
+    The terms left out are below rounding; each term is an inverse transform of its own. Tones are overwritten.
     """
     reach = float(abs(rates).max() * abs(places).max())
-    result, order, term = np.fft.ifft(tones, axis=1), 1, reach
+    order, term = 1, reach
     column = np.ones(len(places), np.complex128)
+    work = np.empty_like(tones)
     while term * math.exp(reach) > ROUNDING:
         tones *= rates
         column = column * (1j * places / order)
-        result += np.fft.ifft(tones, axis=1) * column
+        np.fft.ifft(tones, axis=1, out=work)
+        work *= column
+        samples += work
         order += 1
         term *= reach / order
-    return result
 
 
-def _turns(turns: np.ndarray, count: int) -> np.ndarray:
-    """exp(j 2 pi n turns[m]) for n < count: (count, M), as products of a coarse and a fine step in n."""
+def _turns(turns: np.ndarray, count: int, first: np.ndarray) -> np.ndarray:
+    """first[m] exp(j 2 pi n turns[m]) for n < count: (count, M), as products of a coarse and a fine step in n."""
     step = math.isqrt(count) + 1
-    fine = turned(2 * np.pi * np.outer(np.arange(step), turns))
+    fine = turned(2 * np.pi * np.outer(np.arange(step), turns)) * first
     coarse = turned(2 * np.pi * np.outer(np.arange(0, count, step), turns))
     return (coarse[:, None] * fine).reshape(-1, len(turns))[:count]

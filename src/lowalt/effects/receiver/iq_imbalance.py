@@ -43,6 +43,26 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     return out
 
 
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    mu, nu = coefficients(settings)
+    _mirrored(tones, complex(mu), complex(nu))
+    return tones
+
+
+@LEAN
+def _mirrored(tones, mu, nu):
+    """Give tones (N, M) in the transform's order their mirrors about the oscillator: mu R[k] + nu conj(R[-k])."""
+    count = tones.shape[1]
+    for n in range(len(tones)):
+        row = tones[n]
+        row[0] = mu * row[0] + nu * complex(row[0].real, -row[0].imag)
+        for k in range(1, count // 2 + 1):
+            one, other = row[k], row[count - k]
+            row[k] = mu * one + nu * complex(other.real, -other.imag)
+            row[count - k] = mu * other + nu * complex(one.real, -one.imag)
+
+
 @LEAN
 def _mixed(samples, mu, nu, out):
     """Fill out (K,) with mu r + nu conj(r) of samples r (K,)."""

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from lowalt.effects.receiver._white import with_noise
+from lowalt.effects.receiver._white import tones_with_noise, with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -33,5 +33,14 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     A subcarrier sums M samples, so each sample carries 1/M of it; unit-norm receive weights leave one antenna's noise.
     Source: Friis 1944 (noise figure); the link budget's power is the network's `power_w` a subcarrier.
     """
-    power = variance(settings, frame.network.subcarrier_spacing_hz) / samples.shape[1]
-    return with_noise(samples, math.sqrt(power / 2), rng)
+    return with_noise(samples, _scale(settings, samples, frame), rng)
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    return tones_with_noise(tones, _scale(settings, tones, frame), rng)
+
+
+def _scale(settings: dict, samples: np.ndarray, frame: Frame) -> float:
+    """Standard deviation of each part of a sample's noise."""
+    return math.sqrt(variance(settings, frame.network.subcarrier_spacing_hz) / samples.shape[1] / 2)

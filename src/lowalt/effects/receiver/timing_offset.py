@@ -45,8 +45,19 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     A late window makes all echoes seem nearer by c d / 2. The oscillator's own phase runs on and is not touched.
     Source: Speth et al. 1999; one draw a sample and station.
     """
-    turn = turned(2 * np.pi * np.fft.ifftshift(frame.baseband_hz) * late_s(settings, frame, rng))
-    return np.fft.ifft(np.fft.fft(samples, axis=1) * turn, axis=1)
+    return retimed(settings, np.fft.fft(samples, axis=1), frame, rng)
+
+
+def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the samples (N, M) of `receive` from the tones of its samples, which are overwritten."""
+    tones = retoned(settings, tones, frame, rng)
+    return np.fft.ifft(tones, axis=1, out=tones)
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    tones *= turned(2 * np.pi * np.fft.ifftshift(frame.baseband_hz) * late_s(settings, frame, rng))
+    return tones
 
 
 def respond(settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:

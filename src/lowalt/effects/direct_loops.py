@@ -1,0 +1,149 @@
+"""The compiled loops of a target's echo on the direct path alone: from places to moments, one symbol after another.
+
+Next to nothing but places is read and nothing but moments is written, so that a symbol's numbers stay in the nearest
+cache: factors of all points at all symbols, as further paths need them, pass through memory twice.
+"""
+
+import math
+
+import numpy as np
+
+from lowalt.common.jit import INNER_VECTOR, VECTOR, kernel
+from lowalt.echo.fast.vector_loops import horner
+from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
+from lowalt.effects.moment_loops import sums
+from lowalt.effects.plane_loops import plane_sums
+from lowalt.effects.response_loops import beyond_middle, geometry
+from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
+
+ROUNDED = 1e-14
+"""Share of the largest range that two ways to compute an excess range may differ by."""
+ORDERED = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz", "nnan"}, _nrt=False)
+"""As VECTOR, and no number is expected to be none, so that least and largest values become vector instructions."""
+
+
+@ORDERED
+def spans(places, refs, origin, half_m, low, high):
+    """Fill low and high (N,) with bounds of each symbol's least and largest excess range (m) of places (N, 3, L).
+
+    refs, origin: as in `response_loops.one_way`; half_m: distance from the array's corner to where the range counts. A
+    point at s along the line of sight from the origin, and at a distance e from it, has a range of at least r + s and
+    at most r + s + e^2 / (2 (r + s)); its direction is at most 2 e / (2 r - e) from the origin's.
+    """
+    for n in range(len(places)):
+        x, y, z, ref = places[n, 0], places[n, 1], places[n, 2], refs[n]
+        o0, o1, o2, r = origin[n, 0], origin[n, 1], origin[n, 2], ref[RANGE]
+        ux, uy, uz = ref[X] / r, ref[Y] / r, ref[Z] / r
+        least, most, away = 0.0, 0.0, 0.0
+        for i in range(np.uint64(places.shape[2])):
+            a, b, c = x[i] - o0, y[i] - o1, z[i] - o2
+            along = ux * a + uy * b + uz * c
+            least, most, away = min(least, along), max(most, along), max(away, a * a + b * b + c * c)
+        e = math.sqrt(away)
+        # A point may be as near as the station: its range then differs by no more than it is away.
+        near = 2.0 * e >= r
+        turn = half_m * (2.0 if near else 2.0 * e / (2.0 * r - e))
+        room = ROUNDED * (r + e) + turn
+        low[n] = (-e if near else least) - room
+        high[n] = (e if near else most + away / (2.0 * (r + least))) + room
+
+
+ROWS = 20
+"""Rows of work space of `moments`."""
+LANES = 16
+"""Points whose loops the compiler joins; those left over would pass one by one, so rows are filled up."""
+
+
+def padded(count: int) -> int:
+    """Return the length of rows that hold `count` points in whole vectors."""
+    return -(-count // LANES) * LANES
+
+
+@INNER_VECTOR
+def filled(values, size, out):
+    """Fill out (size,) with values (L,) and the first of them again and again."""
+    for i in range(np.uint64(len(values))):
+        out[i] = values[i]
+    for i in range(len(values), size):
+        out[i] = values[0]
+
+
+@INNER_VECTOR
+def lit_strength(values, size, out):
+    """Fill out (size,) with values (L,) and zeros; return how many are not zero."""
+    lit = 0
+    for i in range(np.uint64(len(values))):
+        out[i] = values[i]
+        lit += 1 if values[i] != 0.0 else 0
+    for i in range(len(values), size):
+        out[i] = 0.0
+    return lit
+
+
+@INNER_VECTOR
+def cleared(planes):
+    """Fill planes (2, Q, P) with zeros."""
+    for k in range(planes.shape[0]):
+        for q in range(planes.shape[1]):
+            for p in range(planes.shape[2]):
+                planes[k, q, p] = 0.0
+
+
+@INNER_VECTOR
+def in_station(r, count):
+    """Return the number of the first of `count` points whose range r is 0."""
+    for i in range(count):
+        if r[i] == 0.0:
+            return i
+    return count
+
+
+@VECTOR
+def moments(
+    places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, steps, rows, squint, shape, strength,
+    middle, half_cells, reach, work, wide, high, result,
+):  # fmt: skip
+    """Fill result (N, 2, Q, P) with the moments (`moment_loops.moments`) of points on the direct path, plane waves.
+
+    strength: (N or 1, L) two-way; middle (N,), reach: as there; work (ROWS, `padded`), wide and high (Q, `padded`):
+    work space; the others as in `response_loops.one_way`, whose array sends and receives. Returns 0, or n L + l + 1
+    where r = 0.
+    """
+    count, orders, nodes, size = places.shape[2], result.shape[3], len(kappas), work.shape[1]
+    side, up, r, weight, ahead = work[0], work[1], work[2], work[3], work[4]
+    turn, square, ct, st, more, real, imag = work[5], work[6], work[7], work[8], work[9], work[10], work[11]
+    cosine, u, a, b, c, own, spare = work[12], work[13], work[14], work[15], work[16], work[17], work[4:9]
+    middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
+    fixed = beam * (middle_h * aims[0] + middle_v * aims[1])
+    wave = 2.0 * half_turns if squint else kappas[0] / spacing
+    centre = 0.25 * (kappas[0] + kappas[-1])
+    for n in range(len(places)):
+        filled(places[n, 0], size, a)
+        filled(places[n, 1], size, b)
+        filled(places[n, 2], size, c)
+        if geometry(a, b, c, station, axes, refs[n], origin[n], more, side, up, r, weight):
+            return n * count + in_station(r, count) + 1
+        if lit_strength(strength[n % len(strength)], size, own) == 0:
+            cleared(result[n])
+            continue
+        beyond_middle(side, up, r, weight, middle_h * spacing, middle_v * spacing, False, ahead)
+        for i in range(np.uint64(size)):
+            t = -2.0 * half_turns * more[i] - wave * ahead[i] - fixed
+            turn[i] = t - np.rint(t)
+            square[i] = turn[i] * turn[i]
+            u[i] = (2.0 * half_cells * (more[i] + ahead[i] if squint else more[i]) - middle[n]) / reach
+        horner(square, WAVE, COSINE, DEGREE, ct, size)
+        horner(square, WAVE, SINE, DEGREE, st, size)
+        for i in range(np.uint64(size)):
+            whole = own[i] * weight[i] * weight[i]
+            real[i], imag[i] = whole * ct[i], whole * (st[i] * turn[i])
+        plane_sums(side, weight, centre, steps, 0.5 * beam * aims[0], shape[0], rows, spare, cosine, more, wide)
+        plane_sums(up, weight, centre, steps, 0.5 * beam * aims[1], shape[1], rows, spare, cosine, more, high)
+        for q in range(nodes):
+            one, other = wide[q], high[q]
+            for i in range(np.uint64(size)):
+                gain = one[i] * other[i]
+                gain *= gain
+                a[i], b[i] = gain * real[i], gain * imag[i]
+            sums(u, a, b, c, more, size, orders, result[n, :, q])
+    return 0

@@ -1,0 +1,81 @@
+"""The direct echo from places to moments: as from kept factors and as the slow truth; bounds of its ranges."""
+
+import numpy as np
+import pytest
+
+import reference_effects
+from lowalt.common.errors import InputError
+from lowalt.effects import direct_loops, response_tables
+from lowalt.effects.response import OneWayFactors, response
+from test_effects import network
+
+SPREAD_M = 0.7
+
+
+def places_of(rng, away_m, symbols=5, points=19):
+    """Points (N, L, 3) m that drift along, about a place ahead of the network's station and to its side."""
+    middle = np.array([0.0, 0.0, 10.0]) + away_m
+    drift = np.linspace(0.0, 1.0, symbols)[:, None, None] * [0.3, -0.2, 0.1]
+    return middle + rng.uniform(-SPREAD_M, SPREAD_M, (1, points, 3)) + drift
+
+
+def strengths(rng, kind):
+    """Amplitudes of 19 points in 5 symbols: the same in all, or with dark points and a dark symbol."""
+    if kind == "same":
+        return rng.uniform(0.5, 2.0, (1, 19))
+    own = rng.uniform(0.5, 2.0, (5, 19)) * (rng.random((5, 19)) < 0.6)
+    own[3] = 0.0
+    return own
+
+
+@pytest.mark.parametrize("shape", [(16, 4), (1, 1), (2, 8), (3, 5), (32, 2)])
+@pytest.mark.parametrize("squint", [False, True])
+@pytest.mark.parametrize("kind", ["same", "dark"])
+@pytest.mark.parametrize("away_m", [(60.0, 20.0, 15.0), (5.0, 70.0, -3.0)])
+def test_moments_of_places_are_those_of_kept_factors(shape, squint, kind, away_m):
+    rng = np.random.default_rng(1)
+    radio = network(transmit=shape, receive=shape, subcarriers=64)
+    places, strength = places_of(rng, away_m), strengths(rng, kind)
+    # The beam points elsewhere, so that directions are in the side lobes too.
+    given = radio, radio.stations[0], places, np.array([60.0, 25.0, 30.0])
+    asked = {"squint": squint, "wavefront": False, "error": 1e-13}
+    rays, kept = OneWayFactors(*given, **asked), OneWayFactors(*given, **asked, once=False)
+    assert rays.direct is not None and kept.direct is None
+    peak = strength.sum() * np.prod(shape) ** 2 * rays.radio.scale / np.min(np.linalg.norm(places, axis=2)) ** 2
+    found, truth = (one.summed(strength) for one in (rays, kept))
+    assert abs(found - truth).max() < 1e-12 * peak
+    assert kind == "same" or (found[3] == 0).all()
+
+
+@pytest.mark.parametrize("squint", [False, True])
+def test_a_direct_echo_is_the_sum_over_elements_and_points(squint):
+    radio, rng = network(subcarriers=8), np.random.default_rng(2)
+    places, rcs, aim = places_of(rng, (40.0, 10.0, 5.0)), rng.uniform(0.1, 2.0, 19), np.array([42.0, 9.0, 16.0])
+    given = radio, radio.stations[0], places, rcs, aim
+    truth = reference_effects.subcarriers(*given, squint=squint)
+    assert abs(response(*given, squint=squint) - truth).max() < 1e-9 * abs(truth).max()
+
+
+@pytest.mark.parametrize("squint", [False, True])
+@pytest.mark.parametrize("away_m", [(60.0, 20.0, 15.0), (3.0, 1.0, -2.0), (0.5, 0.2, 0.1)])
+def test_spans_hold_every_range_and_little_more(squint, away_m):
+    radio, rng = network(transmit=(16, 4), receive=(16, 4)), np.random.default_rng(3)
+    given = radio, radio.stations[0], places_of(rng, away_m), np.array([60.0, 25.0, 30.0])
+    rays = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13)
+    low, high = rays.direct.spans((16, 4), squint)
+    excess = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13, once=False).out[0].excess
+    assert (low <= excess.min(axis=1)).all() and (excess.max(axis=1) <= high).all()
+    if away_m[0] > 50:
+        assert (high - low <= 1.05 * np.ptp(excess, axis=1)).all()
+
+
+def test_a_point_in_the_station_is_refused():
+    radio, places = network(), places_of(np.random.default_rng(4), (60.0, 0.0, 0.0))
+    places[2, 7] = radio.stations[0].position_m
+    with pytest.raises(InputError, match=r"symbol 2 .*station A"):
+        response(radio, radio.stations[0], places, np.ones(19), places[0, 0])
+
+
+def test_rows_are_filled_to_whole_vectors():
+    assert [direct_loops.padded(count) for count in (1, 16, 17)] == [16, 16, 32]
+    assert response_tables.round_up(1.0) >= 1.0
