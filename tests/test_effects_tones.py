@@ -1,10 +1,13 @@
 """The compiled passes of the receiver: the strongest cells without a transform, and data as NumPy draws them."""
 
+from dataclasses import replace
+from typing import Protocol, runtime_checkable
+
 import numpy as np
 import pytest
 
 from lowalt.common.streams import stream
-from lowalt.effects import strongest_cell, waveform
+from lowalt.effects import chain, receiving, strongest_cell, waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, received_signal
 from test_effects import network, target
@@ -100,3 +103,72 @@ def slowly_shuffled(draws, count):
             partner = int(draws._halves(1)[0]) & ((1 << place.bit_length()) - 1)
         order[[place, partner]] = order[[partner, place]]
     return order
+
+
+@pytest.mark.parametrize("subcarriers", [32, 9])
+@pytest.mark.parametrize(
+    "name, settings",
+    [
+        ("receiver_noise", {"noise_figure_db": 150.0}), ("cell_noise", {"snr_db": 3.0}), ("cell_noise", {}),
+        ("timing_offset", {"fixed_s": 1e-7}), ("clock_offset", {"fixed_ppm": 3.0}),
+        ("iq_imbalance", {"gain_db": 1.0, "phase_deg": 5.0}),
+    ],
+)  # fmt: skip
+def test_an_effect_on_tones_makes_the_tones_of_its_samples(name, settings, subcarriers):
+    from effects_frames import frame
+
+    look, effect = frame(network(subcarriers=subcarriers, symbols=9)), called({name: settings})[0]
+    look = replace(look, reference=1.0)
+    rng = np.random.default_rng(5)
+    samples = rng.normal(size=(9, subcarriers)) + 1j * rng.normal(size=(9, subcarriers))
+    truth = np.fft.fft(effect.module.receive(effect.settings, samples, look, stream(6, name)), axis=1)
+    found = effect.module.retoned(effect.settings, np.fft.fft(samples, axis=1), look, stream(6, name))
+    assert abs(truth - np.fft.fft(samples, axis=1)).max() > 1e-6 * abs(truth).max() or settings == {}
+    np.testing.assert_allclose(found, truth, rtol=0, atol=1e-13 * abs(truth).max())
+
+
+@runtime_checkable
+class Never(Protocol):
+    """What no module offers."""
+
+    def never_there(self) -> None:
+        """Do nothing."""
+
+
+ALL_ON_TONES = {"receiver_noise": {}, "timing_offset": {}, "clock_offset": {"fixed_ppm": 2.0}, "iq_imbalance": {}}
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        ALL_ON_TONES, ALL_ON_TONES | {"adc": {}}, {"timing_offset": {}, "phase_noise": {"shared": False}, "adc": {}},
+        ALL_ON_TONES | {"symbol_motion": {}}, ALL_ON_TONES | {"data_symbols": {}},
+        ALL_ON_TONES | {"carrier_offset": {"fixed_ppm": 2.0}, "power_amplifier": {}},
+    ],
+)  # fmt: skip
+def test_a_receiver_on_tones_hears_what_it_hears_on_samples(monkeypatch, effects):
+    cloud, row = target(np.random.default_rng(3))
+    radio = network(subcarriers=64, symbols=24, symbol_interval_s=2.5e-3)
+    scene = Scene(radio, 5, None, tuple(called(effects)))
+    given = radio.stations[0], cloud, row
+    found = received_signal(scene, *given)
+    monkeypatch.setattr(receiving, "ChangesTones", Never)
+    monkeypatch.setattr(receiving, "TakesTones", Never)
+    truth = received_signal(scene, *given)
+    np.testing.assert_array_equal(found.cell, truth.cell)
+    assert abs(found.signal - truth.signal).max() <= 1e-12 * abs(truth.signal).max()
+
+
+@pytest.mark.parametrize("kind", ["mean", "pulse", "exponential"])
+@pytest.mark.parametrize("more", [{}, {"slow_time": {"jitter_s": 1e-4}}, {"cell_error": {}}])
+def test_a_canceller_of_responses_is_one_of_cells(monkeypatch, kind, more):
+    cloud, row = target(np.random.default_rng(3))
+    radio = network(subcarriers=64, symbols=24)
+    effects = {"clutter": {}, "canceller": {"kind": kind}} | more
+    scene = Scene(radio, 5, None, tuple(called(effects)))
+    given = radio.stations[0], cloud, row
+    found = received_signal(scene, *given)
+    monkeypatch.setattr(chain, "FiltersSymbols", Never)
+    truth = received_signal(scene, *given)
+    assert abs(found.signal - truth.signal).max() <= 1e-12 * abs(truth.signal).max()
+    assert (found.cell == truth.cell)[abs(truth.signal) > 0].all()

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from lowalt.effects import need, waveform
+from lowalt.effects import need, strongest_cell, waveform
 from lowalt.effects.catalogue import ON_ALL_ECHOES, NamedEffect, placed, providing
 from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, ChoosesCells, FiltersCells, SamplesTime
 from lowalt.effects.listening import Listening
@@ -18,6 +18,13 @@ from lowalt.effects.view import View
 
 COARSEST = 0.1
 """Largest error of interpolation, relative to the sum of peak amplitudes."""
+
+
+@runtime_checkable
+class FiltersSymbols(Protocol):
+    """Optional, detection: a filter over symbols, alike in all cells, that does to responses what it does to cells."""
+
+    ALONG_SYMBOLS: bool
 
 
 class Outcome(NamedTuple):
@@ -158,9 +165,11 @@ class Chain:
     def run(self, on: frozenset[str], chosen: np.ndarray | None = None, leads: bool = True) -> Outcome:
         """Return the outcome with the physics `on`, of the symbols `chosen` (all); `leads`: whether gaps are needed."""
         heard = self.heard(on, chosen)
-        if not leads and not self.detection and self.timing is None and self.sending.pilots is None:
+        along = providing(self.detection, FiltersSymbols)
+        if not leads and self.sending.pilots is None and len(along) == len(self.detection):
             value, cell = self._strongest(heard)
-            return Outcome(value, cell, np.full(len(value), np.nan))
+            outcome = Outcome(value, cell, np.full(len(value), np.nan))
+            return outcome if self.timing is None else self._evenly(outcome)
         cells = self.sending.cells(heard.responses)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
@@ -174,7 +183,13 @@ class Chain:
         return outcome if self.timing is None else self._evenly(outcome)
 
     def _strongest(self, heard: Heard) -> tuple[np.ndarray, np.ndarray]:
-        """The strongest range cells of what is heard; those of the direct echo alone are kept."""
+        """The strongest range cells of what is heard, behind filters over symbols; of the direct echo they are kept."""
+        if self.detection or self.timing is not None:
+            responses = heard.responses if self.timing is None else heard.responses[self.view.sampling.present]
+            for effect in self.detection:
+                draws = self.draws(effect.name)
+                responses = effect.module.process(effect.settings, responses, self.receiving.bare, draws)
+            return strongest_cell.strongest(responses)
         if heard.given is self.target.__dict__.get("direct"):
             return self.target.strongest
         return heard.strongest()

@@ -47,7 +47,7 @@ def response(
     """
     asked = {"squint": squint, "wavefront": wavefront, "error": error}
     rays = OneWayFactors(network, station, places, aim_m, paths, sender_aim_m=sender_aim_m, **asked)
-    return rays.summed(np.sqrt(rcs_m2) * factor)
+    return rays.summed(np.sqrt(rcs_m2), factor)
 
 
 class OneWayFactors:
@@ -103,21 +103,21 @@ class OneWayFactors:
             ]
         self.frames = self._frames() if like is None else like.frames
 
-    def summed(self, strength: np.ndarray) -> np.ndarray:
+    def summed(self, strength: np.ndarray, factor: np.ndarray | float = 1.0) -> np.ndarray:
         """Return the subcarriers (N, M) of points with these factors (N or 1, L) on their unit two-way amplitudes.
 
-        strength: as in `paired`. Symbols without any strength are zero.
+        strength, factor: as in `paired`. Symbols without any strength are zero.
         """
-        return self.spectrum(self.moments(self.paired(strength)))
+        return self.spectrum(self.moments(self.paired(strength, factor)))
 
-    def paired(self, strength: np.ndarray) -> list[np.ndarray]:
+    def paired(self, strength: np.ndarray, factor: np.ndarray | float = 1.0) -> list[np.ndarray]:
         """Return the amplitudes (N or 1, L) of each pair of paths, the same at all instants of the symbols.
 
-        strength: factors (N or 1, L) on the points' unit two-way amplitudes, also (R, N, L), factors of their own for
-        each path there and back; for a way out by path a and back by path b, the factor is the geometric mean of those
-        of a and b; or (R, R, N, L), the factors of every way out and way back.
+        strength, factor: their product, (N or 1, L) on the points' unit two-way amplitudes, also (R, N, L), factors of
+        their own for each path there and back; for a way out by path a and back by path b, the factor is the geometric
+        mean of those of a and b; or (R, R, N, L), the factors of every way out and way back.
         """
-        strength = self.radio.scale * np.atleast_2d(strength)
+        strength = np.atleast_2d(self.radio.scale * strength * factor)
         if strength.ndim == 4:
             return [strength[a, b] for a, b, _ in self.pairs]
         if strength.ndim == 3:

@@ -80,8 +80,7 @@ class Steered:
         roots = np.sqrt(self.view.cloud.rcs_m2)
         if self.lit is not None:
             roots, factor = roots[self.lit], lit_points.at_points(factor, self.lit)
-            return [rays.paired(rows_of(roots * factor, rows)) for rows, _, rays in self.beams]
-        return [rays.paired(roots * rows_of(factor, rows)) for rows, _, rays in self.beams]
+        return [rays.paired(rows_of(roots, rows), rows_of(factor, rows)) for rows, _, rays in self.beams]
 
     def moments(self, paired: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
         """Return the moments (`response.OneWayFactors.moments`) of every beam, with the amplitudes of `paired`."""

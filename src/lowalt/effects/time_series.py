@@ -17,14 +17,15 @@ Moments = list[list[np.ndarray]]
 
 def orders(found: Sequence[Moments]) -> list[Moments]:
     """Return the moments of each order 0 .. Q-1 in time from those at the Q Chebyshev points of a symbol."""
-    matrix = interpolation.coefficients(len(found))
-    return [
-        [
-            [sum(weight * planes for weight, planes in zip(row, pair, strict=True)) for pair in zip(*beam, strict=True)]
-            for beam in zip(*found, strict=True)
-        ]
-        for row in matrix
+    count = len(found)
+    if count == 1:
+        return list(found)
+    matrix = interpolation.coefficients(count)
+    whole = [
+        [(matrix @ np.reshape(pair, (count, -1))).reshape(count, *pair[0].shape) for pair in zip(*beam, strict=True)]
+        for beam in zip(*found, strict=True)
     ]
+    return [[[planes[order] for planes in beam] for beam in whole] for order in range(count)]
 
 
 def kept(series: Sequence[list[Moments]], rays: Steered, allowed: float) -> int:

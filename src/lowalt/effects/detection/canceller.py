@@ -16,6 +16,8 @@ SOURCE = (
     "noise gain); M. I. Skolnik, Radar Handbook, 3rd ed. 2008, ch. 2 (recursive MTI filters)"
 )
 DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95}
+ALONG_SYMBOLS = True
+"""Every cell is filtered alike, so responses are too (`chain.FiltersSymbols`)."""
 
 
 def idle(settings: dict) -> bool:
@@ -64,7 +66,7 @@ def amplifies(settings: dict) -> float:
 
 
 def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """Return range cells (N, M) without echoes that stand still.
+    """Return range cells, or responses, (N, M) without echoes that stand still.
 
     mean: subtracts the look's mean. pulse: `order` first differences over symbols. exponential: subtracts a running
     mean with weights memory^n. The last two start as if the first symbol had lasted forever: their first output is

@@ -52,8 +52,8 @@ def _steps(parts, step, most, full_scale, out):
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
     """Return the converter's range: a component's root mean square over the look, times the back-off."""
-    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64)
-    return math.sqrt(float(np.mean(np.square(parts)))) * 10 ** (backoff_db / 20)
+    parts = np.ascontiguousarray(samples, np.complex128).view(np.float64).reshape(-1)
+    return math.sqrt(float(np.dot(parts, parts)) / parts.size) * 10 ** (backoff_db / 20)
 
 
 def step(settings: dict, samples: np.ndarray) -> float:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
@@ -43,6 +44,15 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     shift = offset_hz(settings, frame, rng)
     between = turned(2 * np.pi * np.mod(shift * frame.symbol_times_s, 1.0))
     within = turned(2 * np.pi * shift * frame.sample_times_s)
-    result = samples * within
-    result *= between[:, None]
+    result = np.empty(samples.shape, np.complex128)
+    _turned(np.ascontiguousarray(samples, np.complex128), between, within, result)
     return result
+
+
+@LEAN
+def _turned(samples, between, within, out):
+    """Fill out (N, M) with samples (N, M) times between (N,) and within (M,)."""
+    for n in range(len(samples)):
+        turn, row, new = between[n], samples[n], out[n]
+        for i in range(np.uint64(len(row))):
+            new[i] = row[i] * (turn * within[i])

@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.common.jit import LEAN
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
@@ -87,7 +88,7 @@ def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Gene
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
     rates, places = _slipped(settings, tones, frame, rng)
     change = np.zeros(tones.shape, np.complex128)
-    _stretch(tones.copy(), rates, places, change)
+    _stretch(tones, rates, places, change)
     tones += np.fft.fft(change, axis=1, out=change)
     return tones
 
@@ -99,32 +100,50 @@ def _slipped(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Gen
     count, baseband = tones.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
     at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
-    tones *= _turns(early * frame.network.symbol_interval_s * baseband, len(tones), at_middle)
+    _turn(tones, early * frame.network.symbol_interval_s * baseband, at_middle)
     return 2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle
 
 
 def _stretch(tones: np.ndarray, rates: np.ndarray, places: np.ndarray, samples: np.ndarray) -> None:
     """Add to samples (N, M) the inverse transform of tones times exp(j rates[m] places[i]) - 1 at sample i, by series.
 
-    The terms left out are below rounding; each term is an inverse transform of its own. Tones are overwritten.
+    The terms left out are below rounding; each term is an inverse transform of its own.
     """
     reach = float(abs(rates).max() * abs(places).max())
     order, term = 1, reach
     column = np.ones(len(places), np.complex128)
-    work = np.empty_like(tones)
+    powers, work = tones, np.empty_like(tones)
     while term * math.exp(reach) > ROUNDING:
-        tones *= rates
+        powers = np.multiply(powers, rates, out=None if powers is tones else powers)
         column = column * (1j * places / order)
-        np.fft.ifft(tones, axis=1, out=work)
-        work *= column
-        samples += work
+        np.fft.ifft(powers, axis=1, out=work)
+        _grow(work, column, samples)
         order += 1
         term *= reach / order
 
 
-def _turns(turns: np.ndarray, count: int, first: np.ndarray) -> np.ndarray:
-    """first[m] exp(j 2 pi n turns[m]) for n < count: (count, M), as products of a coarse and a fine step in n."""
+def _turn(tones: np.ndarray, turns: np.ndarray, first: np.ndarray) -> None:
+    """Multiply tones (N, M) by first[m] exp(j 2 pi n turns[m]), as products of a coarse and a fine step in n."""
+    count = len(tones)
     step = math.isqrt(count) + 1
     fine = turned(2 * np.pi * np.outer(np.arange(step), turns)) * first
     coarse = turned(2 * np.pi * np.outer(np.arange(0, count, step), turns))
-    return (coarse[:, None] * fine).reshape(-1, len(turns))[:count]
+    _stepped(tones, coarse, fine)
+
+
+@LEAN
+def _stepped(tones, coarse, fine):
+    """Multiply tones (N, M) by coarse (K, M) and fine (S, M) at the quotient and the rest of their symbol over S."""
+    for n in range(len(tones)):
+        row, one, other = tones[n], coarse[n // len(fine)], fine[n % len(fine)]
+        for m in range(np.uint64(len(row))):
+            row[m] *= one[m] * other[m]
+
+
+@LEAN
+def _grow(work, column, samples):
+    """Add work (N, M) times column (M,) to samples (N, M)."""
+    for n in range(len(work)):
+        one, row = work[n], samples[n]
+        for i in range(np.uint64(len(row))):
+            row[i] += one[i] * column[i]
