@@ -1,5 +1,7 @@
 """The direct echo from places to moments: as from kept factors and as the slow truth; bounds of its ranges."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,14 +11,12 @@ from lowalt.effects import direct_loops, response_tables
 from lowalt.effects.response import OneWayFactors, response
 from test_effects import network
 
-SPREAD_M = 0.7
 
-
-def places_of(rng, away_m, symbols=5, points=19):
+def places_of(rng, away_m, symbols=5, points=19, spread_m=0.7):
     """Points (N, L, 3) m that drift along, about a place ahead of the network's station and to its side."""
     middle = np.array([0.0, 0.0, 10.0]) + away_m
     drift = np.linspace(0.0, 1.0, symbols)[:, None, None] * [0.3, -0.2, 0.1]
-    return middle + rng.uniform(-SPREAD_M, SPREAD_M, (1, points, 3)) + drift
+    return middle + rng.uniform(-spread_m, spread_m, (1, points, 3)) + drift
 
 
 def strengths(rng, kind):
@@ -48,32 +48,43 @@ def test_moments_of_places_are_those_of_kept_factors(shape, squint, kind, away_m
 
 
 @pytest.mark.parametrize("squint", [False, True])
-def test_a_direct_echo_is_the_sum_over_elements_and_points(squint):
-    radio, rng = network(subcarriers=8), np.random.default_rng(2)
-    places, rcs, aim = places_of(rng, (40.0, 10.0, 5.0)), rng.uniform(0.1, 2.0, 19), np.array([42.0, 9.0, 16.0])
-    given = radio, radio.stations[0], places, rcs, aim
+@pytest.mark.parametrize(
+    "away_m, aim_m", [((40, 10, 5), (42, 9, 16)), ((40, 10, 5), (42, 25, 30)), ((5, 40, 5), (7, 39, 16))]
+)
+def test_a_direct_echo_is_the_sum_over_elements_and_points(squint, away_m, aim_m):
+    radio, rng = network(subcarriers=8, subcarrier_spacing_hz=2e7, transmit=(16, 4)), np.random.default_rng(2)
+    radio = replace(radio, receive=radio.transmit)
+    places, rcs = places_of(rng, np.array(away_m, float)), rng.uniform(0.1, 2.0, 19)
+    given = radio, radio.stations[0], places, rcs, np.array(aim_m, float)
     truth = reference_effects.subcarriers(*given, squint=squint)
     assert abs(response(*given, squint=squint) - truth).max() < 1e-9 * abs(truth).max()
 
 
 @pytest.mark.parametrize("squint", [False, True])
 @pytest.mark.parametrize("away_m", [(60.0, 20.0, 15.0), (3.0, 1.0, -2.0), (0.5, 0.2, 0.1)])
-def test_spans_hold_every_range_and_little_more(squint, away_m):
+@pytest.mark.parametrize("spread_m", [0.7, 0.03])
+def test_spans_hold_every_range_and_little_more(squint, away_m, spread_m):
     radio, rng = network(transmit=(16, 4), receive=(16, 4)), np.random.default_rng(3)
-    given = radio, radio.stations[0], places_of(rng, away_m), np.array([60.0, 25.0, 30.0])
+    places = places_of(rng, away_m, spread_m=spread_m)
+    # All at one distance, so that the ranges to the array's middle differ by direction alone.
+    off = places - [0.0, 0.0, 10.0]
+    flat = np.linalg.norm(off[:, :1], axis=2, keepdims=True) / np.linalg.norm(off, axis=2, keepdims=True)
+    places = places if spread_m > 0.1 else places - off + off * flat
+    given = radio, radio.stations[0], places, np.array([60.0, 25.0, 30.0])
     rays = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13)
     low, high = rays.direct.spans((16, 4), squint)
     excess = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13, once=False).out[0].excess
     assert (low <= excess.min(axis=1)).all() and (excess.max(axis=1) <= high).all()
-    if away_m[0] > 50:
+    if away_m[0] > 50 and spread_m > 0.1:
         assert (high - low <= 1.05 * np.ptp(excess, axis=1)).all()
 
 
-def test_a_point_in_the_station_is_refused():
+@pytest.mark.parametrize("point", [0, 7, 18])
+def test_a_point_in_the_station_is_refused(point):
     radio, places = network(), places_of(np.random.default_rng(4), (60.0, 0.0, 0.0))
-    places[2, 7] = radio.stations[0].position_m
+    places[2, point] = radio.stations[0].position_m
     with pytest.raises(InputError, match=r"symbol 2 .*station A"):
-        response(radio, radio.stations[0], places, np.ones(19), places[0, 0])
+        response(radio, radio.stations[0], places, np.ones(19), places[0, 1])
 
 
 def test_rows_are_filled_to_whole_vectors():
