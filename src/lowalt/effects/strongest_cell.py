@@ -101,10 +101,11 @@ def found(responses, data, none, wave, start, parts, held, rows, value, cell):
             z = _cell(parts, q % count, wave, held, rows)
             size = z.real * z.real + z.imag * z.imag
             rest -= size
-            if size > top:
+            # Of equal cells the lowest counts, as in a transform's maximum.
+            if size > top or (size == top and q % count < best % count):
                 top, best, value[n] = size, q, z
         near = best % count
-        cell[n] = near
+        cell[n] = near if total > 0.0 else 0
         if total > 0.0 and not top > rest:
             cell[n] = -1
             left += 1
