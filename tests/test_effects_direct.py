@@ -72,9 +72,13 @@ def test_spans_hold_every_range_and_little_more(squint, away_m, spread_m):
     places = places if spread_m > 0.1 else places - off + off * flat
     given = radio, radio.stations[0], places, np.array([60.0, 25.0, 30.0])
     rays = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13)
-    low, high = rays.direct.spans((16, 4), squint)
+    low, high, longest = rays.direct.spans((16, 4), squint)
     excess = OneWayFactors(*given, squint=squint, wavefront=False, error=1e-13, once=False).out[0].excess
     assert (low <= excess.min(axis=1)).all() and (excess.max(axis=1) <= high).all()
+    off = np.einsum("nli,ki->nlk", places - [0.0, 0.0, 10.0], [radio.stations[0].horizontal, [0.0, 0.0, 1.0]])
+    cosines = abs(off / np.linalg.norm(places - [0.0, 0.0, 10.0], axis=2, keepdims=True)).reshape(-1, 2)
+    truth = np.minimum(cosines @ [7.5, 1.5], np.hypot(7.5, 1.5)).max()
+    assert truth <= longest < truth + 0.5 + 9.0 * (away_m[0] < 50) if squint else longest == 0.0
     if away_m[0] > 50 and spread_m > 0.1:
         assert (high - low <= 1.05 * np.ptp(excess, axis=1)).all()
 

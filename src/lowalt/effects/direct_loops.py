@@ -23,12 +23,12 @@ ORDERED = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz", "n
 
 
 @ORDERED
-def spans(places, refs, origin, half_m, low, high):
+def spans(places, refs, origin, half_m, low, high, turn):
     """Fill low and high (N,) with bounds of each symbol's least and largest excess range (m) of places (N, 3, L).
 
     refs, origin: as in `response_loops.one_way`; half_m: distance from the array's corner to where the range counts. A
     point at s along the line of sight from the origin, and at a distance e from it, has a range of at least r + s and
-    at most r + s + e^2 / (2 (r + s)); its direction is at most 2 e / (2 r - e) from the origin's.
+    at most r + s + e^2 / (2 (r + s)); turn (N,): its direction is at most 2 e / (2 r - e) from the origin's.
     """
     for n in range(len(places)):
         x, y, z, ref = places[n, 0], places[n, 1], places[n, 2], refs[n]
@@ -42,8 +42,8 @@ def spans(places, refs, origin, half_m, low, high):
         e = math.sqrt(away)
         # A point may be as near as the station: its range then differs by no more than it is away.
         near = 2.0 * e >= r
-        turn = half_m * (2.0 if near else 2.0 * e / (2.0 * r - e))
-        room = ROUNDED * (r + e) + turn
+        turn[n] = 2.0 if near else 2.0 * e / (2.0 * r - e)
+        room = ROUNDED * (r + e) + half_m * turn[n]
         low[n] = (-e if near else least) - room
         high[n] = (e if near else most + away / (2.0 * (r + least))) + room
 

@@ -121,21 +121,26 @@ class PathFactors:
         low, high = excess.min(axis=1), excess.max(axis=1)
         return OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
 
-    def spans(self, shape: tuple[int, int], squint: bool) -> tuple[np.ndarray, np.ndarray]:
+    def spans(self, shape: tuple[int, int], squint: bool) -> tuple[np.ndarray, np.ndarray, float]:
         """Return bounds of each symbol's least and largest excess range (N,) of the points (m), as `one_way` counts.
 
-        With squint they count from the origin's range to the array's middle, which the bounds hold too.
+        With squint they count from the origin's range to the array's middle, which the bounds hold too. The third is a
+        bound of how much longer an element's path to a point is than the middle's, in spacings.
         """
-        low, high = np.empty((2, len(self.places)))
-        half_m = tables.half_diagonal(shape) * SPEED_OF_LIGHT / (2 * self.network.carrier_hz) if squint else 0.0
-        direct_loops.spans(self._planes, self.refs, self.origin, half_m, low, high)
-        if squint:
-            away = self.origin - self.radio.station
-            side = self.radio.cosine * away[:, 1] - self.radio.sine * away[:, 0]
-            along = 0.5 * ((shape[0] - 1) * side + (shape[1] - 1) * away[:, 2])
-            ahead = along * SPEED_OF_LIGHT / (2 * self.network.carrier_hz) / self.refs[:, RANGE]
-            low, high = low - ahead, high - ahead
-        return low, high
+        low, high, turn = np.empty((3, len(self.places)))
+        spacing = SPEED_OF_LIGHT / (2 * self.network.carrier_hz)
+        half_m = tables.half_diagonal(shape) * spacing if squint else 0.0
+        direct_loops.spans(self._planes, self.refs, self.origin, half_m, low, high, turn)
+        if not squint:
+            return low, high, 0.0
+        away, wide, tall = self.origin - self.radio.station, 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            across = (self.radio.cosine * away[:, 1] - self.radio.sine * away[:, 0]) / self.refs[:, RANGE]
+            up = away[:, 2] / self.refs[:, RANGE]
+        ahead = (wide * across + tall * up) * spacing
+        longest = wide * np.minimum(abs(across) + turn, 1.0) + tall * np.minimum(abs(up) + turn, 1.0)
+        longest = np.nan_to_num(longest, nan=np.inf).max()
+        return low - ahead, high - ahead, float(min(longest, tables.half_diagonal(shape)))
 
     def moments(
         self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, strength: np.ndarray, middle: np.ndarray,

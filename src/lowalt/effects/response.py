@@ -81,16 +81,24 @@ class OneWayFactors:
                 self.refs = range_sum(network, station, self.origin)
         # Error budget: 1/2 for the sampling in frequency, 1/10 each for the series and waves of both arrays, for their
         # sums that follow from other instants, and for the tables.
-        self.nodes = kappas = tables.frequencies(network, radio, squint, error / 2)
         self.rest = tenth(error)
         symmetric = network.transmit == network.receive and station.transmitter is None
         self.pairs = _pairs(len(chosen), symmetric)
-        asked = kappas, squint, wavefront, self.rest
         self.direct = chosen[0] if once and symmetric and not paths and not wavefront else None
         if self.direct is not None:
-            self.asked, self.out, self.back = (network.transmit, kappas, squint), [], []
-            self.frames = self._frame() if like is None else like.frames
+            self.out, self.back, longest = [], [], None
+            if like is None:
+                *ends, longest = self.direct.spans(network.transmit, squint)
+                self.frames = self._frame(*ends)
+            else:
+                self.frames = like.frames
+            # Instants that share moments share frequencies, and their points are elsewhere.
+            longest = longest if like is None and farther_m == 0.0 else None
+            self.nodes = tables.frequencies(network, radio, squint, error / 2, longest)
+            self.asked = network.transmit, self.nodes, squint
             return
+        self.nodes = kappas = tables.frequencies(network, radio, squint, error / 2)
+        asked = kappas, squint, wavefront, self.rest
         self.out = [
             path.one_way(network.transmit, *asked, _own(kept, "out", number), instant)
             for number, path in enumerate(sending)
@@ -176,9 +184,8 @@ class OneWayFactors:
         """Tables that join the moments at several frequencies (`response_tables.joined`)."""
         return tables.joined(reach, len(self.nodes), self.radio.subcarriers, self.rest)
 
-    def _frame(self) -> list[tuple[np.ndarray, float]]:
-        """The middle (N,) and reach of the direct path's ranges (cells)."""
-        low, high = self.direct.spans(self.asked[0], self.asked[2])
+    def _frame(self, low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, float]]:
+        """The middle (N,) and reach of the direct path's ranges (cells), which run from low to high (N,) m."""
         reach = 0.5 * self.radio.cells * (float((high - low).max()) + 2.0 * self.farther_m)
         return [(0.5 * self.radio.cells * (low + high), tables.round_up(reach))]
 

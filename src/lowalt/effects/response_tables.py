@@ -90,17 +90,21 @@ def joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarr
     return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
 
 
-def frequencies(network: Network, radio: Radar, squint: bool, error: float) -> np.ndarray:
+def frequencies(
+    network: Network, radio: Radar, squint: bool, error: float, longest: float | None = None
+) -> np.ndarray:  # fmt: skip
     """Return the frequencies (Q,) over the carrier at which the arrays are evaluated: Chebyshev points of the band.
 
     The phase of an array's middle counts as range. Only the elements' paths relative to the middle's remain, so they
-    alone decide how many frequencies are needed.
+    alone decide how many frequencies are needed; longest: bound of these of either array, in spacings, None for the
+    distance of its corner.
     """
     count = radio.subcarriers
     if not squint or count == 1:
         return np.array([radio.kappa])
     half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
-    band = np.pi * half * (half_diagonal(network.transmit) + half_diagonal(network.receive))
+    both = [half_diagonal(shape) if longest is None else longest for shape in (network.transmit, network.receive)]
+    band = np.pi * half * sum(both)
     # Interpolation of exp(j B x) errs by at most 4 times the sum of |J_p(B)| over p >= nodes. Each J_p is below half
     # the J_p before it, so the sum is at most 2 |J_nodes(B)|.
     nodes = int(band) + 2

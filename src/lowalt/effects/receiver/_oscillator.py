@@ -132,10 +132,14 @@ def _lines(points: tuple, at_key: tuple) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def _twist(at_key: tuple) -> np.ndarray:
-    """Turn (Q, J) of every line up to each node of a symbol."""
-    at = grid(*at_key)
-    return turned(2 * np.pi * np.outer(at.node_s, at.slow_hz))
+def _twists(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
+    """Turns of the lines up to each node of a symbol: (Q, K) for every 2 N lines, (Q, 2 N) for the lines between.
+
+    Lines are evenly apart from zero frequency, so a line's turn is the product of two.
+    """
+    at, turns = grid(*at_key), 2 * at_key[0]
+    every = np.arange(len(at.slow_hz) // turns + 1) * turns
+    return tuple(turned(2 * np.pi * at.slow_hz[0] * np.outer(at.node_s, lines)) for lines in (every, np.arange(turns)))
 
 
 @lru_cache(maxsize=4)
@@ -161,10 +165,11 @@ def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.rand
         amplitude = amplitude * 2 * np.abs(np.sin(np.pi * at.slow_hz * delay_s))
     drawn = rng.standard_normal((len(amplitude), 2)).view(np.complex128)[:, 0] * amplitude
     # Lines 2 N apart have equal phases at the symbols' starts: add them, then do one short transform a node.
+    every, between = _twists(at_key)
     turns = 2 * symbols
-    padded = np.zeros((len(at.node_s), -(-(len(drawn) + 1) // turns) * turns), np.complex128)
-    np.multiply(_twist(at_key), drawn, out=padded[:, 1 : len(drawn) + 1])
-    folded = padded.reshape(len(padded), -1, turns).sum(axis=1)
+    padded = np.zeros(every.shape[1] * turns, np.complex128)
+    padded[1 : len(drawn) + 1] = drawn
+    folded = every @ padded.reshape(-1, turns) * between
     at_nodes = turns * np.fft.ifft(folded, axis=1)[:, :symbols].real
     return at_nodes.T @ at.blend
 
