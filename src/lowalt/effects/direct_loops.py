@@ -68,36 +68,6 @@ def filled(values, size, out):
         out[i] = values[0]
 
 
-@INNER_VECTOR
-def lit_strength(values, size, out):
-    """Fill out (size,) with values (L,) and zeros; return how many are not zero."""
-    lit = 0
-    for i in range(np.uint64(len(values))):
-        out[i] = values[i]
-        lit += 1 if values[i] != 0.0 else 0
-    for i in range(len(values), size):
-        out[i] = 0.0
-    return lit
-
-
-@INNER_VECTOR
-def cleared(planes):
-    """Fill planes (2, Q, P) with zeros."""
-    for k in range(planes.shape[0]):
-        for q in range(planes.shape[1]):
-            for p in range(planes.shape[2]):
-                planes[k, q, p] = 0.0
-
-
-@INNER_VECTOR
-def in_station(r, count):
-    """Return the number of the first of `count` points whose range r is 0."""
-    for i in range(count):
-        if r[i] == 0.0:
-            return i
-    return count
-
-
 @VECTOR
 def moments(
     places, station, axes, refs, origin, half_turns, spacing, aims, beam, kappas, steps, rows, squint, shape, strength,
@@ -122,10 +92,12 @@ def moments(
         filled(places[n, 1], size, b)
         filled(places[n, 2], size, c)
         if geometry(a, b, c, station, axes, refs[n], origin[n], more, side, up, r, weight):
-            return n * count + in_station(r, count) + 1
-        if lit_strength(strength[n % len(strength)], size, own) == 0:
-            cleared(result[n])
-            continue
+            for i in range(count):
+                if r[i] == 0.0:
+                    return n * count + i + 1
+        filled(strength[n % len(strength)], size, own)
+        for i in range(count, size):
+            own[i] = 0.0
         beyond_middle(side, up, r, weight, middle_h * spacing, middle_v * spacing, False, ahead)
         for i in range(np.uint64(size)):
             t = -2.0 * half_turns * more[i] - wave * ahead[i] - fixed

@@ -120,15 +120,6 @@ def turned(whole, cells, half_steps, total):
 
 
 @INNER_VECTOR
-def any_of(planes):
-    """Whether any of the moments (2, P) is not zero."""
-    some = False
-    for p in range(planes.shape[1]):
-        some = some or planes[0, p] != 0.0 or planes[1, p] != 0.0
-    return some
-
-
-@INNER_VECTOR
 def halves(planes, table, work):
     """Fill work (4, H) with the sums over orders of planes (2, P) times table (P, M): even orders', then odd orders'.
 
@@ -173,7 +164,10 @@ def spread(planes, table, own, whole, cells, work, turn, sums, result):
     symbols, total = result.shape
     half = (total + 1) // 2
     for n in range(symbols):
-        if not any_of(planes[n]):
+        some = 0
+        for p in range(planes.shape[2]):
+            some += 1 if planes[n, 0, p] != 0.0 or planes[n, 1, p] != 0.0 else 0
+        if some == 0:
             continue
         halves(planes[n], table, work)
         even_re, even_im, odd_re, odd_im = work[0], work[1], work[2], work[3]
