@@ -131,7 +131,8 @@ def strongest(responses: np.ndarray, data: np.ndarray | None = None) -> tuple[np
         )  # fmt: skip
     rest = np.flatnonzero(cell < 0)
     if len(rest):
-        cells = _cells(responses[rest], given[rest] if len(given) else given)
+        rows = slice(None) if len(rest) == symbols else rest
+        cells = _cells(responses[rows], given[rows] if len(given) else given)
         cell[rest] = abs(cells).argmax(axis=1)
         value[rest] = cells[np.arange(len(rest)), cell[rest]]
     return value, cell
