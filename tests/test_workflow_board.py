@@ -80,6 +80,11 @@ def test_failed_jobs_are_counted_and_not_done():
     board = board_of(done=0, running=2)
     board.finish(0, 105.0, good=False)
     assert board.line("echo", 106.0, lambda log, since: None).startswith("echo  0/10, 1 failed")
+    # A stage whose last job ends is not done where another one failed.
+    board = Board({"echo": 2}, 0.0)
+    for number in (0, 1):
+        board.start(number, Job("echo", "", "", 1.0))
+    assert board.finish(0, 5.0, good=False) is None and board.finish(1, 6.0) is None
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import yaml
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import Scheme
-from lowalt.workflow import refusals
+from lowalt.workflow import extra_runs, refusals
 
 IMAGES = Scheme("x", (0,), (0,))
 SIGNALS = Scheme("x", (0,), (), method="cnn", size=400)
@@ -120,3 +120,10 @@ def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, 
     refusals.refuse_data(own | {"data": "made"})
     kept.write_text(yaml.safe_dump(own | {"run": "made", "seed": own["seed"] + 1, "more": 1}))
     assert_refused(r"other settings of \['more', 'seed'\]", refusals.refuse_data, own | {"data": "made"})
+
+
+def test_a_run_to_train_on_too_that_has_no_shards_is_named_with_what_makes_its_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for folder, target in (("views/24", "training_samples"), ("slow_time", "slow_times"), ("tracks", "tracks")):
+        words = f"no results/other/shards; expected what the target `{target}` makes in the run 'other'"
+        assert_refused(words, extra_runs.files, "other", folder)

@@ -16,6 +16,7 @@ from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
+from lowalt.workflow.settings import Settings
 from snakemake_texts import body
 
 ROOT = Path(__file__).parent.parent
@@ -24,6 +25,15 @@ SETTINGS_OF = {
     "tiles": "images", "shard": "shard", "index": "index", "configuration": "configuration", "views": "views",
     "train": "training", "evaluate": "evaluation", "report": "report",
 }  # fmt: skip
+
+
+class Job(SimpleNamespace):
+    """Wildcards of a job, read as attributes or asked for by name, as Snakemake gives them."""
+
+    def get(self, name, default=None):
+        return getattr(self, name, default)
+
+
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
 
@@ -73,6 +83,34 @@ def test_settings_of_different_jobs_differ_and_are_json():
     assert json.loads(settings.configuration(one)) == plain(load_yaml("config/default.yaml"))
 
 
+def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
+    """Texts are kept, so a key that leaves out what a job differs by would hand it another job's text."""
+    start = {"seen/ABC:VRP+TRP+VT": {"from": "unseen/ABC:VRP+TRP+VT", "steps": 7}}
+    run, _, settings = parts(
+        {"added": [{"snr_db": [1.5]}], "tiles": {"reduced": [24]}, "recognition": {"start": start}}
+    )
+    scheme = next(one.slug for one in run.trained if one.name == "ABC:VRP+TRP+VT")
+    common = {"run": run.name, "scheme": scheme}
+    chunks = [name.split("-", 1) for name in ("seen-00000", "seen-00001", run.plan.chunks[-1])]
+    rest = [
+        ("A", "crow", "24", "seen", "0"), ("B", "owl", "48", "unseen", "0"), ("B", "crow", "24", "unseen", "1"),
+        ("A", "owl", "24", "unseen", "0"),
+    ]  # fmt: skip
+    names = ("station", "subtype", "size", "protocol", "train_seed")
+    jobs = [
+        Job(**common, group=group, part=part, **dict(zip(names, one, strict=True)))
+        for group, part in chunks
+        for one in rest
+    ]
+    stages = [
+        "cloud", "motion", "echo", "noise", "shard", "views", "slow_time", "training", "trial", "images", "index",
+    ]  # fmt: skip
+    for stage in stages:
+        told = [getattr(settings, stage)(job) for job in jobs]
+        assert told == [getattr(Settings(run, EffectCalls(run)), stage)(job) for job in jobs]
+        assert (len(set(told)) > 1) == (stage not in ("images", "index"))
+
+
 def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
     run, products, settings = parts()
     calls = EffectCalls(run)
@@ -81,6 +119,8 @@ def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
     occluded = SimpleNamespace(run="default", group="seen", call="occlusion")
     assert len(products.call_occluders(occluded)) == 20
     assert json.loads(settings.effect_samples(occluded))["effects"] == {"occlusion": {}}
+    plain_call = SimpleNamespace(**vars(occluded) | {"call": "none"})
+    assert json.loads(settings.effect_samples(plain_call))["effects"] == {}
     with pytest.raises(InputError, match="no call 'nothing'"):
         calls.named("nothing")
 

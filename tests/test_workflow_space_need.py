@@ -177,3 +177,12 @@ def test_a_table_of_stages_counts_an_echo_job_as_one_station_or_as_all(tmp_path,
     sizes = [space_measured.largest(tmp_path / "stages.csv", CONFIG | {"echo": {"job": job}})[0][1]
              for job in ("chunk", "station")]  # fmt: skip
     assert sizes[0] == 3 * sizes[1] and sizes[1] % (50 * 400) == 0
+
+
+def test_jobs_on_other_machines_share_this_one_s_disk_as_on_one_core_and_none_of_its_memory(tmp_path, monkeypatch):
+    """Two temporary files at a time, and jobs of a million GB of memory."""
+    table = tmp_path / "space.csv"
+    table.write_text(",".join(space.COLUMNS) + "\nnoise,x,1e18,0,1e9,0,yes\n")
+    monkeypatch.setenv(space_check.VARIABLE, "warn")
+    (told,) = space_check.check([space.PlannedJob("noise", CHUNK)] * 5, PLAN, CONFIG, None, table, tmp_path)
+    assert told.startswith("the run will write 2000000000.0 GB, ")

@@ -27,6 +27,10 @@ def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so
     (folder / f"{os.getpid()}.json").unlink()
     status.write(board_of(), "running", folder)
     assert [found["pid"] for found in status.read(folder)] == [os.getpid()]
+    # One that ends meanwhile stays to be seen until another run starts.
+    (folder / f"{dead['pid']}.json").write_text(json.dumps(dead))
+    status.write(board_of(), "running", folder)
+    assert {found["pid"] for found in status.read(folder)} == {os.getpid(), dead["pid"]}
 
 
 def test_a_file_that_another_run_has_swept_away_meanwhile_is_no_fault(tmp_path, monkeypatch):

@@ -80,8 +80,13 @@ def test_the_one_run_of_a_trial_is_named_summed_and_weighed(made):
     (results / "tiny/config.yaml").write_text("run: tiny")
     (results / "tiny/clouds/crow.npz").write_bytes(bytes(2_000_000))
     (results / "tiny/stages.csv").write_bytes(bytes(500_000 - 9))
+    # What a run says of its predictions holds times; no other record does.
+    for name in ("predictions/unseen/a.csv", "predictions/unseen/a.json", "clouds/predictions.json"):
+        (results / "tiny" / name).parent.mkdir(parents=True, exist_ok=True)
+        (results / "tiny" / name).touch()
     assert made.name() == "tiny" and made.written_mb() == 2.5
-    assert set(made.whole()) == {"config.yaml", "clouds/crow.npz"}
+    kept = {"config.yaml", "clouds/crow.npz", "clouds/predictions.json", "predictions/unseen/a.csv"}
+    assert set(made.whole()) == kept
     (results / "reference/config.yaml").touch()
     with pytest.raises(InputError, match="expected exactly one"):
         made.name()
