@@ -189,3 +189,7 @@ def test_a_network_counts_by_its_row_of_most_images_and_settings_by_the_scheme_s
     assert hours == pytest.approx(visits * 1.5e-3 / 3600 * (9 + 3) / 9)
     assert named(block["table"], "A:VRP+TRP+VT", "ABC").size == 0
     assert scale.training_hours([], config) == (4, None, "")
+    # A network that was timed on fewer images than another tells nothing of what more of them take.
+    wider = costs[0] | {"backbone": "another"}
+    assert scale.training_hours([costs[1], wider], config) == (4, None, "")
+    assert scale.training_hours([costs[0], wider], config) == (4, hours, "best")

@@ -141,6 +141,26 @@ def test_a_wrong_cell_shows_in_cells_signal_and_spectra_as_often_as_it_is_asked_
     np.testing.assert_allclose(after.power, np.mean(abs(before.signal.astype(complex)) ** 2, axis=2), rtol=1e-6)
 
 
+def test_noise_of_all_cells_is_that_of_each_snr_in_its_own_place():
+    noise, snrs = {"cell_noise": {}}, (30.0, 3.0, -10.0)
+    found = measured(noise, snrs, models=1)
+    tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    for level, snr in enumerate(snrs):
+        (heard,) = takes([scene(noise).at_snr(snr)], {"DJI Mini 2": craft()}, [row(0)], {})
+        np.testing.assert_array_equal(found["views"][0, level], resize(split(tiles.tile(heard.signal[0]), 3), SIZE))
+    assert len({images.tobytes() for images in found["views"][0]}) == 3
+
+
+@pytest.mark.parametrize(("categories", "shown"), [(("Bird", "UAV", "UAV"), 1), (("Bird", "Bird", "Vehicle"), 0)])
+def test_the_example_is_the_first_sample_of_the_first_class_or_else_the_first(categories, shown):
+    given = [row(model) | {"category": category} for model, category in enumerate(categories)]
+    tiles = Renderer.from_settings({"network": NETWORK, "spectra": SPECTRA, "images": IMAGES})
+    clouds = {"DJI Mini 2": craft()}
+    found = measure((scene(), scene()), tiles, clouds, given, {}, [INFINITY], SIZE, CATEGORIES)
+    clean = takes([scene()], clouds, given, {})[0].signal
+    np.testing.assert_array_equal(found["example"][0], split(tiles.tile(clean[shown]), 3))
+
+
 def test_the_command_writes_what_it_measured_and_names_what_is_missing(tmp_path):
     write_cloud(tmp_path / "craft.npz", craft())
     write_table(tmp_path / "chunk.csv", [row(model) for model in range(5)])

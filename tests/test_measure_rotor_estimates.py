@@ -38,6 +38,11 @@ def test_right_and_wrong_estimates_are_counted_against_the_motion_table(tmp_path
     assert {(row["blades"], row["models"], row["right_percent"]) for row in found} == {("2", "2", "50.0")}
     assert float(found[0]["median_error_hz"]) == pytest.approx(9.0, abs=0.2)
     assert {row["pursued_right_percent"] for row in found} == {"50.0"}
+    # A guess anywhere from the lowest frequency searched to half the rate, in cycles of a look of 400 symbols.
+    guesses = np.linspace(rotor_estimates.LEAST_CYCLES, 200, 100_001)
+    chance = 100 * np.mean(abs(guesses - 100) < rotor_estimates.NEAR_CYCLES)
+    assert {row["chance_percent"] for row in found} == {f"{chance:.1f}"}
+    assert {len(reads) for reads in rotor_estimates.estimates(tmp_path, 1).values()} == {1}
     (tmp_path / "noisy/seen-00000.npy").unlink()
     with pytest.raises(InputError, match="no signals of craft with rotors"):
         rotor_estimates.estimates(tmp_path, 20)

@@ -114,6 +114,15 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
 
 
+def test_a_network_takes_in_its_images_signals_or_features_and_no_more():
+    kinds = {"mean": ("VRP+VT", 24, 2 * 24 * 24), "cnn": ("", 400, 3 * 400 * np.complex64().itemsize),
+             "svm": ("", 9, 3 * 9 * np.float32().itemsize)}  # fmt: skip
+    for method, (spectra, size, expected) in kinds.items():
+        views = tuple(range(len(spectra.split("+")))) if spectra else ()
+        scheme = schemes.Scheme("x", (0,) if spectra else (0, 1, 2), views, method="" if spectra else method, size=size)
+        assert accuracy_cost._input_bytes(scheme, size) == expected
+
+
 def test_runs_without_speed_or_row_are_refused(table, tmp_path):
     run, order = run_of(tmp_path, "base", 0), ["base", "small", "large"]
     with pytest.raises(InputError, match="base"):
@@ -176,5 +185,7 @@ def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(mo
     # A call of 1 ms leaves no room for 64 samples in 50 ms; a fourth of 8 ms has none for two training samples.
     assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.05)["inference_ms_64"] is None
     assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.008)["train_batch"] == 1
+    # Room for one and two thirds of a sample is room for one.
+    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.02)["train_batch"] == 1
     # Only the modality embedding grows with the spectra.
     assert nine["parameters"] - one["parameters"] == 2 * 64

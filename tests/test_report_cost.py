@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -79,6 +80,19 @@ def test_pixels_are_those_of_rendered_tiles_and_a_fine_tolerance_changes_none(cl
     coarse, fine = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, BLOCK)
     assert coarse["changed_share"] == coarse["changed_pixels"] / coarse["pixels"] > 0.3
     assert coarse["largest_step"] > 5 and fine["changed_share"] < 0.01
+
+
+def test_motion_models_are_different_samples_whose_changes_add_up_and_whose_largest_step_counts(cloud, monkeypatch):
+    asked, found = [], iter([(1, 9), (2, 4), (3, 5), (5, 6)])
+    monkeypatch.setattr("lowalt.measure.echo_pixels.sample", lambda *given: asked.append(given[4:6]) or given)
+    monkeypatch.setattr("lowalt.measure.echo_pixels.signals", lambda *given: None)
+    monkeypatch.setattr("lowalt.measure.echo_pixels.changes", lambda *tiles: next(found))
+    tiles = SimpleNamespace(network=None, tile=lambda signal: np.zeros((2, 3), np.uint8))
+    block = {"distances_m": [30.0, 80.0], "tolerances": [1e-3], "models": 2, "motion": {}, "seed": 7}
+    rows = pixels(tiles, [cloud], {"DJI Mini 2": PUBLISHED}, block)
+    assert asked == [(7, 30.0), (8, 30.0), (7, 80.0), (8, 80.0)]
+    told = [(row["changed_pixels"], row["pixels"], row["largest_step"], row["range_m"]) for row in rows]
+    assert told == [(3, 12, 9, 30.0), (8, 12, 6, 80.0)]
 
 
 def test_a_tolerance_below_the_floor_keeps_the_exact_signal(cloud):
