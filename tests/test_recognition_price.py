@@ -114,6 +114,20 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
 
 
+def test_the_table_is_the_same_in_whatever_order_the_trainings_come(tmp_path):
+    """An interval draws trainings by their place, so they are put in the order of their seeds first."""
+    (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
+    wrong = {("base", 0): 4, ("base", 1): 5, ("small", 0): 9, ("small", 1): 14}
+    runs = [run_of(tmp_path, name, count, seed=seed) for (name, seed), count in wrong.items()]
+    speeds = accuracy_cost.read_speeds([speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0))])
+    timed = accuracy_cost.entries(tmp_path / "schemes.csv", "ABC", speeds, 280000.0)
+    tables = []
+    for order in ((0, 1, 2, 3), (3, 1, 2, 0), (1, 0, 3, 2)):
+        accuracy_cost.write([runs[n] for n in order], ["base", "small"], timed, [], tmp_path / "out.csv", 1)
+        tables.append((tmp_path / "out.csv").read_text())
+    assert tables[0] == tables[1] == tables[2]
+
+
 def test_a_network_takes_in_its_images_signals_or_features_and_no_more():
     kinds = {"mean": ("VRP+VT", 24, 2 * 24 * 24), "cnn": ("", 400, 3 * 400 * np.complex64().itemsize),
              "svm": ("", 9, 3 * 9 * np.float32().itemsize)}  # fmt: skip
@@ -187,5 +201,8 @@ def test_a_network_s_times_are_a_sample_s_and_what_takes_too_long_is_left_out(mo
     assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.008)["train_batch"] == 1
     # Room for one and two thirds of a sample is room for one.
     assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), given, 0.02)["train_batch"] == 1
+    # A step is judged by one sample's 1 ms, not by a 64th of it, a sample's share of a batch: room for 5.4 samples.
+    wide = given | {"training": training | {"batch": 8}}
+    assert network_speed.measure(schemes.Scheme("one", (0,), (0,)), wide, 0.065)["train_batch"] == 4
     # Only the modality embedding grows with the spectra.
     assert nine["parameters"] - one["parameters"] == 2 * 64

@@ -153,17 +153,21 @@ def test_both_kinds_give_the_same_images(images, signals):
         by_signal.png(0)
 
 
-def test_wrong_input_is_refused_by_name(images, tmp_path):
+def test_wrong_input_is_refused_by_name(images, tmp_path, tmp_path_factory):
     inputs = ["--motion", f"{images}/seen.csv", "--signals", f"{images}/seen.npy"]
     out = ["--fold", "train", "--out", f"{tmp_path}/x.tar"]
     tiles = ["--tiles", f"{images}/seen.tiles.npz"]
     block = json.loads(write_settings("image"))
+    one = tmp_path_factory.mktemp("one") / "seen.npy"
+    np.save(one, np.load(images / "seen.npy")[:, :1])
     for change, given, named in [
         ({}, [*inputs, *out], "--tiles"),
         ({"shards": {"kind": "sound"}}, [*inputs, *tiles, *out], "sound"),
         ({"snr_db": [3]}, [*inputs, *tiles, *out], "seen.npy"),
         ({}, [*inputs, "--tiles", f"{images}/unseen.tiles.npz", *out], "unseen.tiles.npz"),
         ({}, [*inputs, *tiles, "--fold", "trial", "--out", f"{tmp_path}/x.tar"], "trial"),
+        # The images of two SNRs for one.
+        ({"snr_db": [3]}, [*inputs[:2], "--signals", str(one), *tiles, *out], "16 images, expected 8"),
     ]:
         with pytest.raises(InputError, match=named):
             main(["write", "--settings", json.dumps({**block, **change}), *given])
@@ -203,5 +207,6 @@ def test_chunks_are_sized_for_their_shards(images, signals, tmp_path, capsys):
         models_per_chunk(0, 300_000, 20, 6, split)
     block = {"network": NETWORK, "noise": {"snr_db": SNRS}, "split": split, "shards": {"kind": "signal"}}
     (tmp_path / "config.yaml").write_text(json.dumps(block))
-    size_main(["--config", str(tmp_path / "config.yaml"), "--subtypes", "20", "--target-mb", "40"])
-    assert int(capsys.readouterr().out) == models_per_chunk(40e6, sample_bytes("signal", 3, 400), 20, 2, split)
+    for given, target in ((["--target-mb", "40"], 40e6), ([], 1e9)):
+        size_main(["--config", str(tmp_path / "config.yaml"), "--subtypes", "20", *given])
+        assert int(capsys.readouterr().out) == models_per_chunk(target, sample_bytes("signal", 3, 400), 20, 2, split)

@@ -106,6 +106,21 @@ def test_mlcroissant_validates_and_loads(published, mlcroissant):
         assert next(iter(data.records("members")))["members/content"].size == (768, 768)
 
 
+def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(published, tmp_path):
+    copy = shutil.copytree(published, tmp_path / "copy")
+    main(["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml"), "--license", "CC-BY-4.0"])
+    assert "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)" in (copy / "README.md").read_text()
+    assert yaml.safe_load((copy / "README.md").read_text().split("---")[1])["license"] == "cc-by-4.0"
+    assert json.loads((copy / ".zenodo.json").read_text())["license"] == "cc-by-4.0"
+    assert (
+        json.loads((copy / "croissant.json").read_text())["license"] == "https://creativecommons.org/licenses/by/4.0/"
+    )
+    before = (copy / "README.md").read_bytes()
+    with pytest.raises(InputError, match=r"--license: 'WTFPL', expected one of \['CC-BY-4.0', 'MIT'\]"):
+        card.write(copy / "index.json", copy / "config.yaml", "WTFPL")
+    assert (copy / "README.md").read_bytes() == before
+
+
 def test_equal_data_sets_have_equal_cards(published, tmp_path):
     copy = shutil.copytree(published, tmp_path / "copy")
     before = {name: (copy / name).read_bytes() for name in ("README.md", "samples.csv", "croissant.json")}

@@ -64,6 +64,21 @@ def test_a_shard_whose_samples_and_end_are_whole_is_named_by_its_checksum(images
     assert list(verify._locate(path, samples, size - 1, size)) == [f"{size} bytes, expected {size - 1}"]
 
 
+def test_a_shard_cut_after_its_last_sample_is_named_by_its_length_and_its_end(copy):
+    """An archive ends with two empty blocks of 512 bytes; zeros of fewer are no end."""
+    path = copy / "seen-train-00000.tar"
+    whole, rows = path.read_bytes(), map_samples(path.with_suffix(".npz"))
+    end = int((rows["offset"] + rows["size"]).max())
+    for kept, told in (
+        (0, ["the end of the archive is damaged"]),
+        (1023, ["the end of the archive is damaged"]),
+        (1024, []),
+    ):
+        path.write_bytes(whole[: end + kept])
+        length = f"{end + kept} bytes, expected {len(whole)}"
+        assert list(faults(copy / "index.json")) == [f"{path.name}: {line}" for line in (length, *told)]
+
+
 def test_damage_next_to_the_shards_is_not_read_over(copy):
     """A flipped label in a table, or a changed floor in the index, is refused as well."""
     table = copy / "seen-train-00000.npz"

@@ -64,6 +64,7 @@ def test_other_versions_and_damage_are_refused_and_other_samples_told(finished, 
         (tmp_path / "empty" / "clouds").mkdir(parents=True)
         for name in ("config.yaml", *(f"clouds/{path.name}" for path in finished.glob("clouds/*"))):
             (tmp_path / "empty" / name).write_bytes((finished / name).read_bytes())
+        (tmp_path / "empty" / "clouds" / "shards.npz").write_bytes(b"a cloud by its folder, a shard by its name only")
         recipe.pack(tmp_path / "empty", tmp_path / "empty.tar")
 
 

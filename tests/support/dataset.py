@@ -7,9 +7,12 @@ import shutil
 import numpy as np
 import yaml
 
+from lowalt.common.network import Network
 from lowalt.motion import COLUMNS, write_table
 from lowalt.shards import card
 from lowalt.shards.__main__ import main
+from lowalt.shards.record import npy
+from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import encode, files
 from pictures import IMAGES, NETWORK, SPECTRA, echoes, renderer
 
@@ -75,6 +78,13 @@ def build(folder, kind, inputs=True):
     for path in [] if inputs else [*folder.glob("seen.*"), *folder.glob("unseen.*")]:
         path.unlink()
     return folder
+
+
+def pack(path, rows, fold="train"):
+    """A shard of these rows' signals at 3 dB, all dealt to one fold."""
+    chunk = ChunkSamples([row | {"fold": fold} for row in rows], [3.0], SPLIT, SEED, Network.from_settings(NETWORK))
+    write_shard(path, chunk, fold, "signal", lambda number, _: npy(echoes(number)))
+    return path
 
 
 def publish(folder, target):

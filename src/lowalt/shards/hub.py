@@ -1,5 +1,7 @@
 """The metadata block at the head of a data card, as dataset hubs read it: licence, size, protocols and their shards."""
 
+from fnmatch import fnmatchcase
+
 from lowalt.common.splits import FOLDS
 from lowalt.shards.read import ShardSet
 
@@ -16,10 +18,13 @@ def size_category(samples: int) -> str:
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
-    """Return one pattern for the shards of a group and fold; their names, if one does not begin with group and fold."""
+    """Return one pattern for the shards of a group and fold; their paths, if it would not match exactly these."""
     names = [entry["path"] for entry in shards.shards if (entry["group"], entry["fold"]) == (group, fold)]
-    usual = f"{group}-{fold}-"
-    return [f"{usual}*.tar"] if all(name.startswith(usual) for name in names) else names
+    usual = f"{group}-{fold}-*.tar"
+    # In a hub's pattern a star stands for no slash; to `fnmatchcase` it may.
+    paths = [entry["path"] for entry in shards.shards if "/" not in entry["path"]]
+    matched = [path for path in paths if fnmatchcase(path, usual)]
+    return [usual] if matched == names else names
 
 
 def configs(shards: ShardSet) -> list[dict]:

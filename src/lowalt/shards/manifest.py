@@ -5,6 +5,7 @@ the first stage that differs is named, since all stages after it then differ too
 """
 
 import argparse
+import re
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,13 +43,16 @@ def text(folder: str | Path) -> str:
 def read(path: str | Path) -> dict[str, str]:
     """Return the checksums of a manifest by file.
 
-    Raises: InputError naming the file and the line that is no checksum and name.
+    Raises: InputError naming the file and the line that is no checksum and name, or whose file no stage makes.
     """
     result = {}
     for number, line in enumerate(text_of(path, "manifest").splitlines(), start=1):
         digest, _, name = line.partition("  ")
-        if len(digest) != 64 or not name:
+        if not re.fullmatch("[0-9a-f]{64}", digest) or not name:
             raise InputError(f"{path}, line {number}: {line!r}, expected a SHA-256, two spaces and a file")
+        if stage_of(name) not in STAGES:
+            # No stage would compare such a file, so it would pass unseen.
+            raise InputError(f"{path}, line {number}: {name!r}, expected a file of one of {tuple(STAGES)}")
         result[name] = digest
     return result
 

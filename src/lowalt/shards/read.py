@@ -71,7 +71,8 @@ class ShardSet:
             path, entry = table_path(self._path(shard)), self.shards[shard]
             samples = map_samples(path)
             if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
-                raise InputError(f"{path.name}: the table is damaged or another one (SHA-256 differs)")
+                told = f"{len(samples)} rows, expected {entry['samples']}, and the SHA-256 that the index states"
+                raise InputError(f"{path.name}: damaged or another table: {told}")
             self._tables[shard] = samples
         return self._tables[shard]
 
@@ -236,8 +237,7 @@ class ShardSet:
 
         Raises: InputError naming an unknown one.
         """
-        known = station_names(self.index["render"]["network"])
-        spectra = self.spectra
+        known, spectra = station_names(self.index["render"]["network"]), self.spectra
         stations, views = list(known if stations is None else stations), list(spectra if views is None else views)
         if set(stations) - set(known) or set(views) - set(spectra):
             raise InputError(f"stations {stations} and views {views}, expected some of {known} and of {list(spectra)}")

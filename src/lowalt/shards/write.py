@@ -94,8 +94,10 @@ def write_shard(
                         spans[number] = span
                 table[place] = _entry(key, label(classes, row), row["model"], snr_db, span)
             checksum = tar.close()
-        if len(np.unique(table["key"])) != len(table):
-            raise InputError(f"{path}: a sample key stands twice")
+        keys, counts = np.unique(table["key"], return_counts=True)
+        if (counts > 1).any():
+            twice = keys[counts > 1][0].decode()
+            raise InputError(f"{path}: sample {twice!r} stands twice, expected each motion model of a subtype once")
         header = {
             "name": Path(path).name, "kind": kind, "group": groups[0], "fold": wanted,
             "samples": len(table), "bytes": tar.size, "sha256": checksum,

@@ -1,0 +1,58 @@
+"""A manifest of a run: which lines are taken, and which stages a comparison leaves out."""
+
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.shards import manifest
+
+SUM = "0123456789abcdef" * 4
+FILES = ("clouds/a.npz", "motion/seen-00000.csv", "echo/A/seen-00000.npy", "noisy/seen-00000.npy", "shards/index.json")
+
+
+@pytest.fixture
+def options(tmp_path):
+    """The options of a run and of its manifest."""
+    for name in FILES:
+        (tmp_path / "run" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "run" / name).write_text(name)
+    given = ["--run", str(tmp_path / "run"), "--manifest", str(tmp_path / "run.sha256")]
+    manifest.main(["write", *given])
+    return given
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        (f"{SUM[:-1]}  clouds/a.npz", "expected a SHA-256"),
+        (f"{SUM}0  clouds/a.npz", "expected a SHA-256"),
+        (f"{SUM.upper()}  clouds/a.npz", "expected a SHA-256"),
+        (f"{SUM}  ", "expected a SHA-256, two spaces and a file"),
+        (f"{SUM} clouds/a.npz", "expected a SHA-256"),
+        (f"{SUM}  cloud/a.npz", "'cloud/a.npz', expected a file of one of"),
+        (f"{SUM}  ../clouds/a.npz", "expected a file of one of"),
+    ],
+)
+def test_a_line_without_a_whole_checksum_and_a_stage_s_file_is_named(tmp_path, line, words):
+    path = tmp_path / "run.sha256"
+    path.write_text(f"{SUM}  clouds/b.npz\n{line}\n")
+    with pytest.raises(InputError, match=rf"run\.sha256, line 2: .*{words}"):
+        manifest.read(path)
+    path.write_text(f"{SUM}  clouds/b.npz\n")
+    assert manifest.read(path) == {"clouds/b.npz": SUM}
+
+
+def test_stages_that_left_no_files_are_passed_over_where_they_are_named_alone(tmp_path, options, capsys):
+    for name in FILES[2:4]:
+        (tmp_path / "run" / name).unlink()
+    manifest.main(["check", *options, "--without", "echo", "noise"])
+    assert "all 5 files are equal" in capsys.readouterr().out
+    for without, missing in ((["echo"], [f"noise: {FILES[3]} is missing"]), ([], [
+        f"echo: {FILES[2]} is missing", f"noise: {FILES[3]} is missing"])):  # fmt: skip
+        with pytest.raises(SystemExit, match="1"):
+            manifest.main(["check", *options, "--without", *without])
+        assert capsys.readouterr().out.splitlines() == missing
+    # A file that is there is compared all the same.
+    (tmp_path / "run" / FILES[3]).write_text("other")
+    with pytest.raises(SystemExit, match="1"):
+        manifest.main(["check", *options, "--without", "echo", "noise"])
+    assert capsys.readouterr().out.splitlines() == [f"noise: {FILES[3]} differs"]
