@@ -9,7 +9,9 @@ import pytest
 from lowalt.echo.fast import driver, strongest_cell
 from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
+from lowalt.echo.pointwise import sums as sums_of_points
 from lowalt.echo.pointwise.sums import far_bound
+from lowalt.echo.pointwise.terms import cell_sum
 from lowalt.echo.slow_time.node_count import _growth, choose
 from lowalt.echo.slow_time.pose_series import series_sizes
 
@@ -77,6 +79,32 @@ def test_where_no_degree_in_time_is_enough_none_is_chosen():
     best, error, flat, bent = choose(*arguments, 1e-6, 40, ellipses)
     assert 4 <= best <= 40 and 0 < error <= 1e-6 and 0 < flat < np.inf and 0 < bent < np.inf
     assert choose(*arguments, 1e-6, best - 1, ellipses) == (0, np.inf, np.inf, np.inf)
+
+
+@pytest.mark.parametrize(("slack", "wide"), [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (3.0, 3.0)])
+def test_a_place_counts_as_a_cell_polynomial_s_whole_width_at_least(slack, wide):
+    """Points that stay at the reference's range have v = 0, so |v| is `slack` alone, and sums of v^2 bend with it."""
+    moves, sizes = np.array([100.0, 0.01, 1e-5]), np.array([0.5, 1e-3, 1e-6])
+    ellipses = np.array([1.5, 3.0, 8.0])
+    *_, flat, bent = choose(moves, sizes, 30.0, 0.0, slack, 1.0, 1.0, 8, (1.0, 1.0, 1.0), 1e-6, 40, ellipses)
+    assert bent == pytest.approx(wide**2 * flat, rel=1e-12)
+
+
+def test_cells_are_added_by_eights_before_all_of_them_are_computed(monkeypatch):
+    """Three points of which nothing is in the two cells next to them, so that the strongest cell lies beyond."""
+    count, places = 64, np.array([0.25, 0.5, 0.75])
+    cells = np.array(
+        [[cell_sum(np.array([1.0 + 0j]), np.array([u]), j, count) for u in places] for j in range(-32, 32)]
+    )
+    amplitudes = np.linalg.svd(cells[32:34])[2][-1].conj()
+    sums = np.full((count, 2), np.nan)
+    monkeypatch.setattr(sums_of_points, "strongest_of", sums_of_points.strongest_of.py_func)
+    value, cell, _, lead = sums_of_points.strongest.py_func(amplitudes, places, 0, count, sums)
+    truth = abs(cells @ amplitudes)
+    assert truth[32:34].max() < 1e-12 * truth.max() and cell == (truth.argmax() - 32) % count
+    assert abs(value) == pytest.approx(truth.max(), rel=1e-12) and 0 <= lead <= np.diff(np.sort(truth)[-2:]) + 1e-12
+    # Cells 0 and 1 with eight more on either side are enough: the bound excludes the other 46.
+    assert np.isfinite(sums).all(axis=1).sum() == 2 + 2 * 8
 
 
 @pytest.mark.parametrize("count", [6, 8, 11])

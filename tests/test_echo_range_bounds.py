@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lowalt.echo.fast.range_bounds import MEAN, OMEGA, PSI, SIZE, SPREAD, fill_extents
+from lowalt.echo.fast.range_bounds import END, MEAN, OMEGA, PSI, SIZE, SPREAD, START, cut_segments, fill_extents
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 
 SYMBOLS, PARTS, GROUPS, POINTS = 6, 3, 5, 40
@@ -52,3 +52,25 @@ def test_no_point_lies_beyond_the_extents(spread_m):
     assert (away.max((1, 2)) <= out[:, SIZE]).all() and ((weights * away.mean(2)).sum(1) <= out[:, MEAN]).all()
     # A bound that is never near the truth would serve as little: each point adds at most twice its stretched stray.
     assert (out[:, SIZE] <= away.max((1, 2)) + 2 * 2.0 * np.sqrt(3) * 5 * spread_m).all()
+
+
+@pytest.mark.parametrize(("column", "centre", "half"), [(PSI, 2, 3), (OMEGA, 4, 5)])
+def test_a_segment_is_a_fifth_and_a_radian_of_gain_phase_wider_than_the_target(column, centre, half):
+    """A target 0.1 wide drifts by 0.01 a symbol in one direction cosine; the other's rate is too small to matter."""
+    symbols, drift, rate = 40, 0.01, 40.0
+    # Points at most `turn` from the reference's direction: 2 d / (2 - d) of a spread d.
+    turn = 0.05
+    extents = np.zeros((symbols, 5))
+    extents[:, SPREAD] = 2 * turn / (2 + turn)
+    extents[:, column] = drift * np.arange(symbols)
+    rates = (rate, 1e-3) if column == PSI else (1e-3, rate)
+    out = np.zeros((symbols, 6))
+    count = cut_segments.py_func(extents, *rates, 100, out)
+    # (0.1 + 0.01 k) 40 <= 1.2 x 0.1 x 40 + 1 holds up to k = 4, so five symbols make a segment.
+    assert count == 8 and out[:count, START].tolist() == list(range(0, 40, 5))
+    assert out[:count, END].tolist() == list(range(5, 41, 5))
+    np.testing.assert_allclose(out[:count, centre], drift * (out[:count, START] + 2), atol=1e-12)
+    np.testing.assert_allclose(out[:count, half], turn + 2 * drift, atol=2e-9)
+    assert (out[:count, half] >= turn + 2 * drift).all()
+    # As wide as they like, segments end where they are longest.
+    assert cut_segments.py_func(extents, 1e-3, 1e-3, 16, out) == 3 and out[:3, END].tolist() == [16, 32, 40]

@@ -117,13 +117,15 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
 def test_the_table_is_the_same_in_whatever_order_the_trainings_come(tmp_path):
     """An interval draws trainings by their place, so they are put in the order of their seeds first."""
     (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
-    wrong = {("base", 0): 4, ("base", 1): 5, ("small", 0): 9, ("small", 1): 14}
-    runs = [run_of(tmp_path, name, count, seed=seed) for (name, seed), count in wrong.items()]
+    wrong = {"base": (4, 25, 13), "small": (9, 31, 2)}
+    runs = [
+        run_of(tmp_path, name, count, seed=seed) for name, counts in wrong.items() for seed, count in enumerate(counts)
+    ]
     speeds = accuracy_cost.read_speeds([speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0))])
     timed = accuracy_cost.entries(tmp_path / "schemes.csv", "ABC", speeds, 280000.0)
     tables = []
-    for order in ((0, 1, 2, 3), (3, 1, 2, 0), (1, 0, 3, 2)):
-        accuracy_cost.write([runs[n] for n in order], ["base", "small"], timed, [], tmp_path / "out.csv", 1)
+    for order in (runs, runs[::-1], [*runs[3:], *runs[:3]]):
+        accuracy_cost.write(order, ["base", "small"], timed, [], tmp_path / "out.csv", 1)
         tables.append((tmp_path / "out.csv").read_text())
     assert tables[0] == tables[1] == tables[2]
 
