@@ -47,6 +47,9 @@ shards.__main__ write: --settings, --motion, --fold, --out
 shards.build: --config, --out
 shards.card: --index, --config
 shards.manifest write: --run, --manifest
+shards.recipe pack: --run, --out
+shards.recipe unpack: recipe, --out
+shards.recipe: command
 shards.sigmf: --index, --out
 shards.size: --config, --subtypes
 shards.upload: --index, --repository

@@ -8,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference_effects
+from lowalt.common.config import faults, load
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
+from lowalt.common.yaml_files import load_yaml
 from lowalt.echo import echo_matrix, echo_signal
 from lowalt.echo.radar import radar
 from lowalt.effects import interface, waveform
@@ -165,6 +167,13 @@ def test_the_catalogue_names_every_effect_module_and_only_those():
         provided = [one for one in WORK[PLACES[entry.partition("/")[2]]] if isinstance(module, one)]
         assert len(provided) == 1
     assert len(set(ORDER)) == len(ORDER)
+
+
+def test_the_defaults_of_every_effect_are_values_that_a_scene_may_give_it():
+    schema = load_yaml("workflow/schemas/config.schema.yaml")
+    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
+    given = {name: __import__(dotted(name), fromlist=["DEFAULTS"]).DEFAULTS for name in PLACES}
+    assert faults(config | {"effects": given}, schema) == []
 
 
 def test_idle_effects_leave_every_bit(rng):

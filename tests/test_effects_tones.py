@@ -50,6 +50,12 @@ def test_symbols_without_any_response_have_the_cell_that_a_transform_gives_them(
     assert cell.tolist() == [0, 9, 9, 0] and (value[[0, 3]] == 0).all()
 
 
+@pytest.mark.parametrize("subcarriers", [1, 64])
+def test_no_symbols_have_no_cells(subcarriers):
+    value, cell = strongest_cell.strongest(np.empty((0, subcarriers), complex))
+    assert value.shape == cell.shape == (0,)
+
+
 def test_few_cells_are_worked_out_of_a_target_and_none_but_by_the_transform_of_noise(monkeypatch):
     rng, transformed = np.random.default_rng(2), []
     plain = strongest_cell._cells

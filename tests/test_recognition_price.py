@@ -114,20 +114,32 @@ def test_accuracy_differences_and_costs_are_those_put_in(table):
     assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
 
 
+def written(folder, runs):
+    """The table's rows of trainings of the first two schemes."""
+    (folder / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
+    speeds = accuracy_cost.read_speeds([speed_of(folder, name, ms) for name, ms in (("base", 4.0), ("small", 1.0))])
+    timed = accuracy_cost.entries(folder / "schemes.csv", "ABC", speeds, 280000.0)
+    accuracy_cost.write(runs, ["base", "small"], timed, [], folder / "out.csv", 1)
+    with (folder / "out.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
 def test_the_table_is_the_same_in_whatever_order_the_trainings_come(tmp_path):
     """An interval draws trainings by their place, so they are put in the order of their seeds first."""
-    (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
     wrong = {"base": (4, 25, 13), "small": (9, 31, 2)}
     runs = [
         run_of(tmp_path, name, count, seed=seed) for name, counts in wrong.items() for seed, count in enumerate(counts)
     ]
-    speeds = accuracy_cost.read_speeds([speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0))])
-    timed = accuracy_cost.entries(tmp_path / "schemes.csv", "ABC", speeds, 280000.0)
-    tables = []
-    for order in (runs, runs[::-1], [*runs[3:], *runs[:3]]):
-        accuracy_cost.write(order, ["base", "small"], timed, [], tmp_path / "out.csv", 1)
-        tables.append((tmp_path / "out.csv").read_text())
+    tables = [written(tmp_path, order) for order in (runs, runs[::-1], [*runs[3:], *runs[:3]])]
     assert tables[0] == tables[1] == tables[2]
+
+
+def test_schemes_of_one_training_have_an_interval_and_no_spread(tmp_path):
+    rows = written(tmp_path, [run_of(tmp_path, "base", 4), run_of(tmp_path, "small", 10)])
+    (small,) = [row for row in rows if (row["scheme"], row["snr_db"]) == ("small", "avg")]
+    assert (small["seeds"], small["spread_points"]) == ("1", "")
+    # Six of 40 motion models more are called wrong: 15 points.
+    assert float(small["low"]) < float(small["difference_points"]) == -15.0 < float(small["high"]) <= 0
 
 
 def test_a_network_takes_in_its_images_signals_or_features_and_no_more():

@@ -8,10 +8,14 @@ import shutil
 import pytest
 import yaml
 
-from dataset import RENDER, SEED, SNRS, SPLIT, build
+from dataset import RENDER, SEED, SNRS, SPLIT, build, motion_rows
 from lowalt.common.errors import InputError
+from lowalt.common.network import Network
 from lowalt.shards import ShardSet, card
 from lowalt.shards.card import main, readme, write_samples
+from lowalt.shards.croissant import metadata
+from lowalt.shards.index import build as index_of
+from lowalt.shards.write import ChunkSamples, write_shard
 
 CONFIG = {"run": "trial", "seed": SEED, "noise": {"snr_db": SNRS}, "split": SPLIT, **RENDER}
 
@@ -104,6 +108,27 @@ def test_mlcroissant_validates_and_loads(published, mlcroissant):
     assert [row["samples/label"] for row in rows] == shards.labels.tolist()
     if shards.kind == "image":
         assert next(iter(data.records("members")))["members/content"].size == (768, 768)
+
+
+def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
+    """Two stations and one spectrum: tiles of one column and two rows."""
+    stations = {name: RENDER["network"]["stations"][name] for name in "AB"}
+    render = {"network": RENDER["network"] | {"stations": stations}, "spectra": {"trp": RENDER["spectra"]["trp"]},
+              "images": RENDER["images"]}  # fmt: skip
+    entry = {"name": "seen-train-0.tar", "path": "seen-train-0.tar", "sha256": "0", "bytes": 1, "samples": 1,
+             "group": "seen", "fold": "train"}  # fmt: skip
+    index = {"kind": "image", "shards": [entry], "render": render}
+    found = metadata(index, {"path": "samples.csv", "bytes": 1, "sha256": "0"}, {})
+    (content,) = [field for field in found["recordSet"][1]["field"] if field["name"] == "content"]
+    assert content["description"] == "256 x 512 palette PNG: rows are stations, columns TRP."
+    rows, network = [motion_rows("seen")[0] | {"fold": "train"}], Network.from_settings(render["network"])
+    chunk = ChunkSamples(rows, [3.0], SPLIT, SEED, network)
+    write_shard(tmp_path / "seen-train-0.tar", chunk, "train", "image", lambda *_: b"")
+    index_of([tmp_path / "seen-train-0.tar"], render, tmp_path / "index.json")
+    shards = ShardSet(tmp_path / "index.json")
+    assert "1 samples as 2 x 1 tiles of" in card.description(shards)
+    text = readme(shards, "run: x", "x", "MIT")
+    assert "rows are the stations, columns TRP;" in text and "# (2, 224, 224) uint8" in text
 
 
 def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(published, tmp_path):

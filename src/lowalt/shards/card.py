@@ -120,9 +120,10 @@ def write_samples(shards: ShardSet, path: Path) -> None:
 def description(shards: ShardSet) -> str:
     """Return the data set in one paragraph."""
     stations = station_names(shards.index["render"]["network"])
+    what = WHAT[shards.kind].format(stations=len(stations), columns=len(shards.spectra))
     return (
         f"Simulated echoes of low-altitude targets ({', '.join(map(plural, shards.classes))}) at the base stations "
-        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {WHAT[shards.kind]}, "
+        f"{', '.join(stations)} of a networked sensing system, {len(shards)} samples as {what}, "
         "with motion parameters and geometry of every sample. Made by lowalt after 'Networked ISAC Enabled Target "
         "Recognition Towards Low-Altitude Economy' (Luo et al.); the samples are not that paper's own."
     )
@@ -130,6 +131,7 @@ def description(shards: ShardSet) -> str:
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
+    images = len(shards.columns())
     first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
     return f"""---
 {yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip()}
@@ -143,7 +145,7 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
 {_counts(shards)}
 ## How to read it
 
-{READING[shards.kind]}
+{READING[shards.kind].format(spectra=", ".join(name.upper() for name in shards.spectra))}
 `samples.csv` lists all samples, `index.json` the shards with their SHA-256, and the `.npz` beside a shard the offset,
 size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
 
@@ -157,7 +159,7 @@ for sample in webdataset.WebDataset("seen-train-00000.tar", shardshuffle=False).
 
 from lowalt.shards import ShardSet
 shards = ShardSet("index.json", groups=["seen"], folds=["train"])
-images, label = shards.images(0, size=224), shards.labels[0]  # (9, 224, 224) uint8
+images, label = shards.images(0, size=224), shards.labels[0]  # ({images}, 224, 224) uint8
 ```
 
 `python -m lowalt.shards verify --index index.json` checks every byte of every file and names what is damaged;

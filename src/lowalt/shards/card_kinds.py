@@ -1,10 +1,13 @@
-"""Sentences of the data card about each kind of shards."""
+"""Sentences of the data card about each kind of shards.
+
+WHAT and READING leave the numbers of stations and spectra, and the names of the spectra, to `str.format`.
+"""
 
 MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
 """Extension of the member next to the record."""
 
 WHAT = {
-    "image": "3 x 3 tiles of time-frequency images",
+    "image": "{stations} x {columns} tiles of time-frequency images",
     "signal": "complex symbol-domain signals",
     "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
 }
@@ -20,7 +23,7 @@ Each shard is a plain tar in the WebDataset layout. A sample has two members:
 READING = {
     "image": _SAMPLE.format(
         extension="png",
-        meaning="the tile, 8-bit indices with their colour map; rows are the stations, columns VRP, TRP and VT",
+        meaning="the tile, 8-bit indices with their colour map; rows are the stations, columns {spectra}",
     ),
     "signal": _SAMPLE.format(
         extension="npy",

@@ -66,7 +66,7 @@ FIELDS = {
 """Columns of the table of all samples: data type and meaning; the label's meaning names the classes."""
 
 MEDIA = {
-    "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns VRP, TRP, VT."),
+    "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns {}."),
     "signal": (
         "application/octet-stream",
         "sc:Text",
@@ -98,7 +98,8 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
     mime, data_type, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
-    meaning = meaning.format(len(named(index["render"]["spectra"])) * size, stations * size)
+    spectra = [name.upper() for name in named(index["render"]["spectra"])]
+    meaning = meaning.format(len(spectra) * size, stations * size, ", ".join(spectra))
     inside = [{"@id": entry["name"]} for entry in index["shards"]]
     sets = [
         _files(

@@ -98,10 +98,10 @@ def main(arguments: list[str]) -> None:
     """Pack a finished run into a recipe, or make the whole data set of a recipe and compare every file."""
     options = argparse.ArgumentParser(prog="python -m lowalt.shards.recipe", description=main.__doc__)
     commands = options.add_subparsers(dest="command", required=True)
-    packing = commands.add_parser("pack", help="write the recipe of a finished run")
+    packing = commands.add_parser("pack", help="write the recipe of a finished run", description=pack.__doc__)
     packing.add_argument("--run", required=True, help="folder of the run, such as results/default")
     packing.add_argument("--out", required=True, help="recipe to write (.tar)")
-    unpacking = commands.add_parser("unpack", help="make the data set of a recipe")
+    unpacking = commands.add_parser("unpack", help="make the data set of a recipe", description=unpack.__doc__)
     unpacking.add_argument("recipe", help="recipe (.tar)")
     unpacking.add_argument("--out", required=True, help="folder to write into")
     given = options.parse_args(arguments)
