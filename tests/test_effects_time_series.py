@@ -22,11 +22,15 @@ def test_moments_become_subcarriers_as_in_the_plain_sum(count):
     found = np.full((3, count), 1.0 + 0j)
     half = (count + 1) // 2
     work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
-    moment_loops.spread(planes, table, own, whole, cells, *work, found)
+    moment_loops.spread(planes, table, own, whole, cells, *work, False, found)
     off = np.arange(count) - 0.5 * (count - 1)
     delay = np.exp(-2j * np.pi * (whole + cells)[:, None] * off / count)
     truth = own[:, None] * ((planes[:, 0] + 1j * planes[:, 1]) @ table) * delay
     assert abs(found - 1.0 - truth).max() < 1e-11
+    # A result that holds nothing yet is filled, with zeros where all moments are zero.
+    planes[1], empty = 0.0, np.full((3, count), np.nan + 0j)
+    moment_loops.spread(planes, table, own, whole, cells, *work, True, empty)
+    assert abs(empty[::2] - truth[::2]).max() < 1e-11 and (empty[1] == 0.0).all()
 
 
 def test_orders_are_those_of_the_polynomial_through_the_instants():

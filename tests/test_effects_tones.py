@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lowalt.common.streams import stream
-from lowalt.effects import chain, receiving, strongest_cell, waveform
+from lowalt.effects import chain, receiving, strongest_cell, tone_loops, waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, received_signal
 from test_effects import network, target
@@ -94,6 +94,30 @@ def test_a_receiver_that_takes_tones_makes_the_same_samples():
     samples = np.random.default_rng(5).normal(size=(9, 32)) + 0j
     found = clock_offset.retimed(settings, np.fft.fft(samples, axis=1), look, np.random.default_rng(6))
     np.testing.assert_array_equal(found, clock_offset.receive(settings, samples, look, np.random.default_rng(6)))
+
+
+@pytest.mark.parametrize("subcarriers", [8, 9])
+def test_data_are_divided_out_into_a_response_or_in_addition_to_one(subcarriers):
+    rng = np.random.default_rng(8)
+    tones, still = rng.normal(size=(2, 5, subcarriers)) + 1j * rng.normal(size=(2, 5, subcarriers))
+    data = waveform.sent(stream(1, "waveform"), 5, subcarriers)
+    alone = np.fft.fftshift(tones, axes=1) / data
+    filled, added = np.full(tones.shape, np.nan + 0j), still.copy()
+    tone_loops.divided(tones, data, True, filled)
+    tone_loops.divided(tones, data, False, added)
+    np.testing.assert_allclose(filled, alone, rtol=1e-14)
+    np.testing.assert_allclose(added, still + alone, rtol=1e-14)
+
+
+def test_weighed_samples_fill_or_add_to_the_first_ones_of_a_row():
+    rng = np.random.default_rng(9)
+    samples, before = rng.normal(size=(2, 4, 12)) + 1j * rng.normal(size=(2, 4, 12))
+    shape, total, part = rng.normal(size=12), np.full((4, 12), np.nan + 0j), before.copy()
+    tone_loops.weighed(samples, shape, True, total)
+    tone_loops.weighed(samples, shape[:5], False, part)
+    np.testing.assert_allclose(total, samples * shape, rtol=1e-14)
+    np.testing.assert_allclose(part[:, :5], before[:, :5] + (samples * shape)[:, :5], rtol=1e-14)
+    np.testing.assert_array_equal(part[:, 5:], before[:, 5:])
 
 
 def test_halves_that_a_shuffle_does_not_need_are_drawn_again():

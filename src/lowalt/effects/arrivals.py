@@ -17,6 +17,7 @@ from lowalt.effects.gain_times import Instant
 from lowalt.effects.near_field import SYMBOLS
 from lowalt.effects.response import ImagePath
 from lowalt.effects.steering import SameSymbols, Steered, at_rows, rows_of
+from lowalt.effects.tone_loops import weighed
 from lowalt.effects.view import View
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def arriving(
             paths = [at_rows(path, some) for path in held]
             given = view.at_symbols(some), paths, on, rows_of(factor, some), numbers[some]
             found.append(_in_orders(echo, *given, within, allowed))
-        still, samples = (np.concatenate(every) for every in zip(*found, strict=True))
+        still, samples = found[0] if len(found) == 1 else (np.concatenate(every) for every in zip(*found, strict=True))
     else:
         still = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
         samples = _at_instants(echo, view, on, factor, rows, moving.instants(view, echo.error))
@@ -106,23 +107,21 @@ def _in_orders(
         for mine, own in zip(found, paired, strict=True):
             mine[number] = rays.moments(own)
     series = [time_series.orders(mine) for mine in found]
-    samples = np.zeros((len(view.times_s), view.network.subcarriers), np.complex128)
     now = echo.sending.aired[rows] if turned is not None or count > 1 else None
     other = None if turned is None else turned * echo.sending.aired_before[rows] - now
     orders = 1
     if count > 1:
         share = allowed if turned is None else 0.5 * allowed
         orders = time_series.kept(series, first, share * float(echo.strengths.sum(axis=1).max()))
+    samples = (np.empty if orders > 1 else np.zeros)((len(view.times_s), view.network.subcarriers), np.complex128)
     shapes = interpolation.polynomials(orders, interpolation.samples(samples.shape[1]))
-    for order, shape in enumerate(shapes):
+    for order, shape in zip(range(orders)[::-1], shapes[::-1], strict=True):
         spectra = [first.spectrum(mine[order]) for mine in series]
         whole = sum(spectra[1:], spectra[0])
         if order == 0:
             still = whole
         else:
-            heard = waveform.transmit(whole, now)
-            heard *= shape
-            samples += heard
+            weighed(waveform.transmit(whole, now), shape, order == orders - 1, samples)
         for (cut, _, lit), spectrum in zip(groups, spectra, strict=True):
             if cut:
                 samples[lit, :cut] += shape[:cut] * waveform.transmit(spectrum[lit], other[lit])[:, :cut]

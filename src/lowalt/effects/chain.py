@@ -127,7 +127,7 @@ class Chain:
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
             still, samples = self._moving(view, on, factor, rows)
             if not left and not self.sending.distorts and self._unknown is None:
-                return Heard(still + self.sending.received(samples, rows))
+                return Heard(self.sending.with_samples(still, samples, rows))
             samples += waveform.transmit(still, self.sending.aired[rows])
         else:
             spectrum = self.target.subcarriers(view, on, factor)

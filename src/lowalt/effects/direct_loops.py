@@ -86,7 +86,7 @@ def moments(
     middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
     fixed = beam * (middle_h * aims[0] + middle_v * aims[1])
     wave = 2.0 * half_turns if squint else kappas[0] / spacing
-    centre = 0.25 * (kappas[0] + kappas[-1])
+    centre, scale = 0.25 * (kappas[0] + kappas[-1]), 1.0 / reach
     for n in range(len(places)):
         filled(places[n, 0], size, a)
         filled(places[n, 1], size, b)
@@ -103,7 +103,7 @@ def moments(
             t = -2.0 * half_turns * more[i] - wave * ahead[i] - fixed
             turn[i] = t - np.rint(t)
             square[i] = turn[i] * turn[i]
-            u[i] = (2.0 * half_cells * (more[i] + ahead[i] if squint else more[i]) - middle[n]) / reach
+            u[i] = (2.0 * half_cells * (more[i] + ahead[i] if squint else more[i]) - middle[n]) * scale
         horner(square, WAVE, COSINE, DEGREE, ct, size)
         horner(square, WAVE, SINE, DEGREE, st, size)
         for i in range(np.uint64(size)):

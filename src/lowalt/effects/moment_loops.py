@@ -42,13 +42,14 @@ def products(out_re, out_im, back_re, back_im, strength, times, lit, count, real
 @INNER_VECTOR
 def places(there, home, middle, half_cells, reach, lit, count, u):
     """Fill u with the two-way ranges of the `count` points `lit`, -1 to 1 over `reach` about `middle` (cells)."""
+    scale = 1.0 / reach
     if count == len(there):
         for i in range(np.uint64(count)):
-            u[i] = (half_cells * (there[i] + home[i]) - middle) / reach
+            u[i] = (half_cells * (there[i] + home[i]) - middle) * scale
         return
     for i in range(np.uint64(count)):
         at = lit[i]
-        u[i] = (half_cells * (there[at] + home[at]) - middle) / reach
+        u[i] = (half_cells * (there[at] + home[at]) - middle) * scale
 
 
 @INNER_VECTOR
@@ -154,12 +155,12 @@ def ramp(start, step, total, real, imag):
 
 
 @VECTOR
-def spread(planes, table, own, whole, cells, work, turn, sums, result):
+def spread(planes, table, own, whole, cells, work, turn, sums, fresh, result):
     """Add own[n] times the response of moments (N, 2, P), real and imaginary, delayed, to result (N, M).
 
     table: (P, M) real, each order's values at the subcarriers, even or odd about the band's middle as the order is; the
     delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells. With H = (M + 1) // 2, work
-    (4, H), turn (2, H) and sums (2, M) are work space.
+    (4, H), turn (2, H) and sums (2, M) are work space. Where `fresh` is set, result holds nothing yet and is filled.
     """
     symbols, total = result.shape
     half = (total + 1) // 2
@@ -167,7 +168,10 @@ def spread(planes, table, own, whole, cells, work, turn, sums, result):
         some = 0
         for p in range(planes.shape[2]):
             some += 1 if planes[n, 0, p] != 0.0 or planes[n, 1, p] != 0.0 else 0
+        row = result[n]
         if some == 0:
+            for m in range(np.uint64(total if fresh else 0)):
+                row[m] = 0.0
             continue
         halves(planes[n], table, work)
         even_re, even_im, odd_re, odd_im = work[0], work[1], work[2], work[3]
@@ -182,6 +186,9 @@ def spread(planes, table, own, whole, cells, work, turn, sums, result):
         for m in range(np.uint64(total - half)):
             a, b, c, d = even_re[m] - odd_re[m], even_im[m] - odd_im[m], x * re[m] + y * im[m], y * re[m] - x * im[m]
             high_re[m], high_im[m] = a * c - b * d, a * d + b * c
-        row = result[n]
+        if fresh:
+            for m in range(np.uint64(total)):
+                row[m] = complex(low_re[m], low_im[m])
+            continue
         for m in range(np.uint64(total)):
             row[m] += complex(low_re[m], low_im[m])

@@ -25,8 +25,10 @@ ELLIPSES = 1.0 + 2.0 ** np.arange(-3.0, 14.0)
 """Sums of the semi-axes of the ellipses on which sums are bounded."""
 WIDER = 1.02
 """How much wider than needed a box is made that may serve again; a target moves by far less within an OFDM symbol."""
-WORK = 1_000_000
-"""Time of a box's nodes and terms before any point is summed, in terms of one point."""
+WORK = 2_000_000
+"""Time of a box before any node or point is summed, in terms of one point."""
+ELEMENT, ORDER = 14.0, 0.5
+"""Time of an element and of an order of its series at one point, in terms of one point."""
 LEBESGUE = 3.5
 """Bound of the norm of an interpolation from up to 50 Chebyshev points, 1 + (2 / pi) log(n + 1)."""
 MOST = 50
@@ -97,8 +99,7 @@ def _box(
     low: np.ndarray, high: np.ndarray, wider: float, array: Arrays, error: float, points: int, frequencies: int
 ) -> Box | None:  # fmt: skip
     """The polynomials over the directions from low to high (3,), None where summing every point costs less."""
-    # A term takes about as long as a fifth of an element.
-    each = np.prod(array.shape) * (4 + array.series.shape[1])
+    each = float(np.prod(array.shape)) * (ELEMENT + ORDER * array.series.shape[1])
     if points * each < WORK:
         return None
     middle = 0.5 * (low + high)

@@ -162,9 +162,10 @@ class OneWayFactors:
         count = self.radio.subcarriers
         half = (count + 1) // 2
         work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
-        result = np.zeros((len(refs), count), np.complex128)
-        for planes, (middle, reach) in zip(moments, self.frames, strict=True):
-            moment_loops.spread(planes, self._functions(reach), own, whole, refs[:, REST] + middle, *work, result)
+        result = np.empty((len(refs), count), np.complex128)
+        for number, (planes, (middle, reach)) in enumerate(zip(moments, self.frames, strict=True)):
+            cells = refs[:, REST] + middle
+            moment_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, result)
         return result
 
     def largest(self, moments: list[np.ndarray]) -> float:

@@ -55,9 +55,12 @@ def geometry(x, y, z, station, axes, ref, origin, more, side, up, r, inverse):
         far = math.sqrt(across * across + along * along + high * high)
         # A count, unlike a branch or a least range, leaves this loop to vector instructions.
         zeros += 1 if far == 0.0 else 0
+        # One quotient for both 1 / r and 1 / (r + r_ref): a division takes as long as ten products.
+        both = far + r_ref
+        share = 1.0 / (far * both)
         # r^2 - r_ref^2 over r + r_ref: a difference of ranges without cancellation.
-        more[i] = (a * (2.0 * rx + a) + b * (2.0 * ry + b) + d * (2.0 * rz + d)) / (far + r_ref)
-        side[i], up[i], r[i], inverse[i] = cosine * along - sine * across, high, far, 1.0 / far
+        more[i] = (a * (2.0 * rx + a) + b * (2.0 * ry + b) + d * (2.0 * rz + d)) * (far * share)
+        side[i], up[i], r[i], inverse[i] = cosine * along - sine * across, high, far, both * share
     return zeros
 
 

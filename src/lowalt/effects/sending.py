@@ -12,6 +12,7 @@ from lowalt.common.network import Network
 from lowalt.effects import waveform
 from lowalt.effects.catalogue import NamedEffect, providing
 from lowalt.effects.interface import ChangesWaveform, DrawsData, PicksSubcarriers
+from lowalt.effects.tone_loops import divided
 
 
 class Sending:
@@ -60,6 +61,14 @@ class Sending:
         """Return the responses (N, M) of the time samples of the symbols `rows`, the known data divided out."""
         found, data = self.carrying(np.fft.fft(samples, axis=1), rows)
         return found if data is None else waveform.without(found, data)
+
+    def with_samples(self, responses: np.ndarray, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
+        """Return responses (N, M) plus those of time samples (N, M) of the symbols `rows`; both are overwritten."""
+        found, data = self.carrying(np.fft.fft(samples, axis=1, out=samples), rows)
+        if data is None:
+            return responses + found
+        divided(found, np.ascontiguousarray(data), False, responses)
+        return responses
 
     def carrying(self, tones: np.ndarray, rows: slice | np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
         """Return the tones (N, M) of samples of the symbols `rows`, and the data (N, M) that are in them.

@@ -142,6 +142,6 @@ def _cells(responses: np.ndarray, data: np.ndarray) -> np.ndarray:
     """All range cells (N, M) of responses, or of tones that carried `data`."""
     if len(data):
         spectrum = np.empty(responses.shape, np.complex128)
-        divided(np.ascontiguousarray(responses), np.ascontiguousarray(data), spectrum)
+        divided(np.ascontiguousarray(responses), np.ascontiguousarray(data), True, spectrum)
         responses = spectrum
     return np.fft.ifft(responses, axis=1)

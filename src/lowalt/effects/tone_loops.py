@@ -3,6 +3,8 @@
 Tones stand in the transform's order: the oscillator's subcarrier and those above it first, then those below it.
 """
 
+import numpy as np
+
 from lowalt.common.jit import LEAN
 
 
@@ -19,19 +21,43 @@ def carried(response, data, tones):
     half = response.shape[1] // 2
     rest = response.shape[1] - half
     for n in range(len(response)):
-        for m in range(rest):
-            tones[n, m] = response[n, m + half] * data[n, m + half]
-        for m in range(half):
-            tones[n, m + rest] = response[n, m] * data[n, m]
+        above, below, high, low = response[n, half:], response[n, :half], data[n, half:], data[n, :half]
+        first, last = tones[n, :rest], tones[n, rest:]
+        for m in range(np.uint64(rest)):
+            first[m] = above[m] * high[m]
+        for m in range(np.uint64(half)):
+            last[m] = below[m] * low[m]
 
 
 @LEAN
-def divided(tones, data, response):
-    """Fill response (N, M) with tones (N, M) in the transform's order, times the conjugate of data (N, M)."""
+def divided(tones, data, fresh, response):
+    """Add tones (N, M) in the transform's order, times the conjugate of data (N, M), to response (N, M).
+
+    Where `fresh` is set, response holds nothing yet and is filled.
+    """
     half = tones.shape[1] // 2
     rest = tones.shape[1] - half
     for n in range(len(tones)):
-        for m in range(rest):
-            response[n, m + half] = tones[n, m] * complex(data[n, m + half].real, -data[n, m + half].imag)
-        for m in range(half):
-            response[n, m] = tones[n, m + rest] * complex(data[n, m].real, -data[n, m].imag)
+        first, last, high, low = tones[n, :rest], tones[n, rest:], data[n, half:], data[n, :half]
+        above, below = response[n, half:], response[n, :half]
+        if fresh:
+            for m in range(np.uint64(rest)):
+                above[m] = first[m] * complex(high[m].real, -high[m].imag)
+            for m in range(np.uint64(half)):
+                below[m] = last[m] * complex(low[m].real, -low[m].imag)
+            continue
+        for m in range(np.uint64(rest)):
+            above[m] += first[m] * complex(high[m].real, -high[m].imag)
+        for m in range(np.uint64(half)):
+            below[m] += last[m] * complex(low[m].real, -low[m].imag)
+
+
+@LEAN
+def weighed(samples, shape, fresh, total):
+    """Add samples (N, M) times shape (K,), at the first K of each row, to total (N, K or more); `fresh`: fill it."""
+    for n in range(len(samples)):
+        row, out = samples[n], total[n]
+        for i in range(np.uint64(len(shape) if fresh else 0)):
+            out[i] = complex(row[i].real * shape[i], row[i].imag * shape[i])
+        for i in range(np.uint64(0 if fresh else len(shape))):
+            out[i] += complex(row[i].real * shape[i], row[i].imag * shape[i])

@@ -63,7 +63,7 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 def without(tones: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Return the responses (N, M) of tones (N, M) of samples that carried `data` (N, M) of unit modulus."""
     result = np.empty_like(tones)
-    divided(tones, data, result)
+    divided(tones, data, True, result)
     return result
 
 
