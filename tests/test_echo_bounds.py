@@ -90,6 +90,15 @@ def test_a_place_counts_as_a_cell_polynomial_s_whole_width_at_least(slack, wide)
     assert bent == pytest.approx(wide**2 * flat, rel=1e-12)
 
 
+def test_coefficients_of_high_orders_weigh_as_the_powers_of_a_place_beyond_the_polynomials_width():
+    """A bound falls by rho a degree; what stands before it is c_0, c_1 |v| or the others' sum times |v|^7."""
+    rho, moves, sizes, first = 3.0, np.array([100.0, 0.01]), np.array([0.5, 1e-3]), []
+    for kernel in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
+        degree, error, *_ = choose(moves, sizes, 3.0, 0.0, 2.5, 1.0, 1.0, 8, kernel, 1e-6, 40, np.array([rho]))
+        first.append(error * rho**degree)
+    assert first == pytest.approx(first[0] * np.array([1.0, 2.5, 2.5**7]), rel=1e-12)
+
+
 def test_cells_are_added_by_eights_before_all_of_them_are_computed(monkeypatch):
     """Three points of which nothing is in the two cells next to them, so that the strongest cell lies beyond."""
     count, places = 64, np.array([0.25, 0.5, 0.75])

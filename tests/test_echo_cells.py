@@ -9,6 +9,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
+from lowalt.echo.fast.polynomials import CELL_REACH
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
 from test_echo import cloud_in_motion, network, relative
 
@@ -36,7 +37,9 @@ def test_tabulated_kernels_keep_their_error(count, deep, error):
 
 
 def test_targets_too_deep_and_too_few_cells_are_left_to_the_general_kernel():
-    assert cell_polynomials(256, 2.4, 1e-6) is not None and cell_polynomials(256, 2.6, 1e-6) is None
+    # A cell SIDE and a half away, seen from the deepest point, is as far as the rule of its kernel holds.
+    deepest = CELL_REACH - SIDE - 0.5 - 0.5 / PLACES
+    assert cell_polynomials(256, deepest, 1e-6) is not None and cell_polynomials(256, deepest + 1e-9, 1e-6) is None
     assert cell_polynomials(2 * SIDE + 3, 0.2, 1e-6) is not None and cell_polynomials(2 * SIDE + 2, 0.2, 1e-6) is None
 
 

@@ -99,3 +99,16 @@ def test_kept_boxes_serve_places_inside_and_are_made_anew_outside(monkeypatch):
         near_field.sums(moved, array, 1e-7, out, kept)
         assert abs(out[0] - direct(moved, array)).max() <= 1e-7 * 64
         assert len(made) == boxes
+
+
+def test_a_box_is_made_where_its_terms_at_all_frequencies_are_fewer_than_the_elements():
+    """With any number of points, a box whose terms cost more than summing elements never pays."""
+    array, points = given((16, 4)), 10**9
+    low = np.array([0.1, 0.05, 1 / 410])
+    each = np.prod(array.shape) * (4 + array.series.shape[1])
+    box = near_field._box(low, low + 1e-3 * np.array([1.0, 1.0, 1e-3]), 1.0, array, 1e-6, points, 1)
+    most = int(each // box.lengths.sum())
+    assert most >= 2
+    for frequencies, pays in ((most, True), (most + 1, False)):
+        found = near_field._box(low, low + 1e-3 * np.array([1.0, 1.0, 1e-3]), 1.0, array, 1e-6, points, frequencies)
+        assert (found is not None) == pays

@@ -171,6 +171,7 @@ recognition.__main__ views: --settings, --index, --shard, --out
 recognition.choose: --settings, --predictions, --out
 recognition.rates: --settings, --protocol, --scheme, --stations, --out
 recognition.slow_time: --settings, --index, --shard, --out
+recognition.track: --settings, --index, --shard, --out
 recognition.trial: --settings, --views, --candidate, --fold, --stations, --out
 recognition.upload: --model, --repository
 recognition.zoo: --model, --name
