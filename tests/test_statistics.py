@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from lowalt.common.streams import stream
 from lowalt.recognition import intervals, statistics
@@ -204,6 +205,14 @@ def test_a_difference_is_the_first_less_the_second_whatever_their_numbers_of_see
         for whole in (False, True):
             found = intervals.strict_difference(*given, whole, stream(1, "d"), 50)
             assert found == pytest.approx((0.25, 0.25, 0.25))
+
+
+@pytest.mark.parametrize("place", [0, 4, 9])
+def test_every_cluster_is_drawn_as_often_as_any_other(place):
+    """Of ten clusters one is right, so a draw of ten has a binomial number of them: 0 to 3 in 95 %."""
+    low, high = stats.binom(10, 0.1).ppf([0.025, 0.975]) / 10
+    found = intervals.bootstrap(np.arange(10), np.eye(10)[place], stream(6, "b"))
+    assert found == pytest.approx((0.1, low, high)) and (low, high) == (0.0, 0.3)
 
 
 def test_intervals_come_of_4000_draws_where_no_number_is_named():
