@@ -193,3 +193,11 @@ def test_blades_flash_twice_a_turn_and_brightest_square_to_the_line_of_sight():
     echo = response(NETWORK, view.station, view.places, view.cloud.rcs_m2, view.aim_m, factor=factor)
     flat = response(NETWORK, view.station, view.places, view.cloud.rcs_m2, view.aim_m)
     assert abs(echo[bright]).mean() > 1.5 * abs(flat[bright]).mean()
+
+
+def test_images_at_another_instant_are_those_of_the_path():
+    view = seen(body([[1.0, 2.0, 3.0], [-1.0, 0.5, 0.0]]))
+    (path,), before = ground_reflection.paths(ground_reflection.DEFAULTS, view), view.places.copy()
+    np.testing.assert_array_equal(ground_reflection.images({}, view)[0], path.places)
+    np.testing.assert_array_equal(path.places, before * [1.0, 1.0, -1.0])
+    np.testing.assert_array_equal(view.places, before)

@@ -9,7 +9,7 @@ import pytest
 from lowalt.common.streams import stream
 from lowalt.effects import chain, receiving, strongest_cell, tone_loops, waveform
 from lowalt.effects.catalogue import called
-from lowalt.effects.received import Scene, received_signal
+from lowalt.effects.received import Scene, observe, received_signal
 from test_effects import network, target
 
 
@@ -118,6 +118,28 @@ def test_weighed_samples_fill_or_add_to_the_first_ones_of_a_row():
     np.testing.assert_allclose(total, samples * shape, rtol=1e-14)
     np.testing.assert_allclose(part[:, :5], before[:, :5] + (samples * shape)[:, :5], rtol=1e-14)
     np.testing.assert_array_equal(part[:, 5:], before[:, 5:])
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_chain_that_runs_again_takes_the_numbers_it_has_drawn(moving):
+    cloud, row = target(np.random.default_rng(3))
+    radio = network(subcarriers=32, symbols=40)
+    named = {"receiver_noise": {"noise_figure_db": 60.0}, "phase_noise": {"level_db": 20, "shared": False}}
+    named |= {"symbol_motion": {}} if moving else {}
+    scene = Scene(radio, 5, None, tuple(called(named)))
+    asked, found = [], []
+    for again in (False, True):
+        built = chain.Chain(
+            list(scene.effects), observe(scene, radio.stations[0], cloud, row),
+            lambda name: asked.append(name) or scene.stream(name, row, "A"),
+        )  # fmt: skip
+        for _ in range(1 + again):
+            on = frozenset(["symbol_motion"] if moving else [])
+            found.append(built.run(on).signal)
+    np.testing.assert_array_equal(found[0], found[1])
+    np.testing.assert_array_equal(found[1], found[2])
+    built.receiving.bare.drawn.clear()
+    assert np.array_equal(built.run(on).signal, found[0])
 
 
 def test_halves_that_a_shuffle_does_not_need_are_drawn_again():

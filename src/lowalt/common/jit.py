@@ -184,3 +184,5 @@ VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""
 INNER_VECTOR = kernel(inner=True, fastmath=_REORDERED, **_LEAN)
 """As VECTOR, for functions that only kernels call."""
+ORDERED = kernel(fastmath={*_REORDERED, "nnan"}, **_LEAN)
+"""As VECTOR, and no number is expected to be none, so that least and largest values become vector instructions."""

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, VECTOR, kernel
+from lowalt.common.jit import INNER_VECTOR, ORDERED, VECTOR
 from lowalt.echo.fast.vector_loops import horner
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
 from lowalt.effects.moment_loops import sums
@@ -18,8 +18,6 @@ from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
 
 ROUNDED = 1e-14
 """Share of the largest range that two ways to compute an excess range may differ by."""
-ORDERED = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz", "nnan"}, _nrt=False)
-"""As VECTOR, and no number is expected to be none, so that least and largest values become vector instructions."""
 
 
 @ORDERED

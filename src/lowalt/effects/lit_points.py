@@ -51,9 +51,12 @@ def _sorted(strength, numbers):
 def _gathered(planes, numbers, out):
     """Fill out (N, K, W) with planes (N, K, L) at each symbol's points `numbers` (N, W)."""
     for n in range(len(out)):
+        chosen = numbers[n]
         for k in range(out.shape[1]):
-            for i in range(out.shape[2]):
-                out[n, k, i] = planes[n, k, numbers[n, i]]
+            plane, row = planes[n, k], out[n, k]
+            for i in range(np.uint64(len(row))):
+                # Without a sign, no number can count from the end.
+                row[i] = plane[np.uint64(chosen[i])]
 
 
 def lit(factor: np.ndarray | float) -> np.ndarray | None:

@@ -73,11 +73,12 @@ def sums(
     directions stay inside, and new ones are made a little wider than needed and added.
     """
     at = np.empty((3, *places.shape[:2]))
-    directions(np.ascontiguousarray(places.swapaxes(1, 2)), array.station, array.axes, at)
+    least, most = np.empty((2, 3, len(places)))
+    directions(np.ascontiguousarray(places.swapaxes(1, 2)), array.station, array.axes, least, most, at)
     for first in range(0, len(places), SYMBOLS):
         rows = slice(first, first + SYMBOLS)
         points = places[rows].shape[0] * places.shape[1]
-        low, high = at[:, rows].min(axis=(1, 2)), at[:, rows].max(axis=(1, 2))
+        low, high = least[:, rows].min(axis=1), most[:, rows].max(axis=1)
         box = None if kept is None else kept.get(first)
         if box is None or not box.holds(low, high):
             wider = WIDER if kept is not None else 1.0

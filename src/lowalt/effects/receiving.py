@@ -127,4 +127,4 @@ class Receiving:
         starts = None if view.sampling is None else view.sampling.times_s
         ones = np.broadcast_to(np.ones((), np.complex128), (view.network.symbols, view.network.subcarriers))
         delay_s = 2.0 * range_m / SPEED_OF_LIGHT
-        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts)
+        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts, drawn={})

@@ -6,8 +6,10 @@ Eq. 7 assumes that the cyclic prefix covers every echo; the effect `cyclic_prefi
 Impairments are in `effects.receiver`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -96,6 +98,16 @@ class Frame:
     """(N, M) subcarriers on the air where an amplifier distorts them, None for the data themselves."""
     starts_s: np.ndarray | None = None
     """(N,) s, start of each symbol's useful part where it is not n T_r."""
+    drawn: dict[str, Any] | None = field(default=None, repr=False, compare=False)
+    """What effects have drawn for the look, by name, where it is computed more than once with the same streams."""
+
+    def once(self, name: str, draw: Callable[[], Any]) -> Any:
+        """Return what `draw` returns, for the effect `name`: of a look that is computed again, what it returned."""
+        if self.drawn is None:
+            return draw()
+        if name not in self.drawn:
+            self.drawn[name] = draw()
+        return self.drawn[name]
 
     @property
     def waveform(self) -> np.ndarray:

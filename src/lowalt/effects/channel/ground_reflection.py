@@ -10,7 +10,7 @@ import numpy as np
 from scipy.special import i0e
 
 from lowalt.common.errors import InputError
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import ORDERED
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.effects import series
@@ -87,7 +87,9 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
     """Return the points' images (N, L, 3) m below the ground."""
-    return [_mirrored(view)[0]]
+    planes = np.swapaxes(view.places, 1, 2).copy()
+    np.negative(planes[:, 2], out=planes[:, 2])
+    return [np.swapaxes(planes, 1, 2)]
 
 
 def _mirrored(view: View) -> tuple[np.ndarray, np.ndarray]:
@@ -98,18 +100,17 @@ def _mirrored(view: View) -> tuple[np.ndarray, np.ndarray]:
     return np.swapaxes(images, 1, 2), sine
 
 
-@LEAN
+@ORDERED
 def _mirror(planes, station, images, sine):
     """Fill images (N, 3, L) and sine (N, L) of `_mirrored` for places in planes (N, 3, L)."""
+    s0, s1, s2 = station[0], station[1], station[2]
     for n in range(len(planes)):
         x, y, z = planes[n, 0], planes[n, 1], planes[n, 2]
-        i, j, k = images[n, 0], images[n, 1], images[n, 2]
+        i, j, k, row = images[n, 0], images[n, 1], images[n, 2], sine[n]
         for l in range(np.uint64(planes.shape[2])):  # noqa: E741
             i[l], j[l], k[l] = x[l], y[l], -z[l]
-            a, b, c = x[l] - station[0], y[l] - station[1], -z[l] - station[2]
-            share = -c / math.sqrt(a * a + b * b + c * c)
-            share = share if share > 0.0 else 0.0
-            sine[n, l] = share if share < 1.0 else 1.0
+            a, b, c = x[l] - s0, y[l] - s1, -z[l] - s2
+            row[l] = min(max(-c / math.sqrt(a * a + b * b + c * c), 0.0), 1.0)
 
 
 def paths(settings: dict, view: View) -> list[ImagePath]:

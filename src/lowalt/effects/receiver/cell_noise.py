@@ -47,12 +47,14 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     if settings["snr_db"] is None:
         return samples
-    return with_noise(samples, _scale(settings, frame), rng)
+    return with_noise("cell_noise", samples, _scale(settings, frame), frame, rng)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    return tones if settings["snr_db"] is None else tones_with_noise(tones, _scale(settings, frame), rng)
+    if settings["snr_db"] is None:
+        return tones
+    return tones_with_noise("cell_noise", tones, _scale(settings, frame), frame, rng)
 
 
 def _scale(settings: dict, frame: Frame) -> float:

@@ -93,6 +93,4 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     the target's reference point; all echoes are taken to have it. Noise beyond half the sample rate is filtered out.
     Source: Petrovic et al. 2007 (within a symbol); Budge and Burt 1993 (range correlation).
     """
-    result = turned(phase(settings, frame, rng))
-    result *= samples
-    return result
+    return frame.once("phase_noise", lambda: turned(phase(settings, frame, rng))) * samples

@@ -33,12 +33,12 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     A subcarrier sums M samples, so each sample carries 1/M of it; unit-norm receive weights leave one antenna's noise.
     Source: Friis 1944 (noise figure); the link budget's power is the network's `power_w` a subcarrier.
     """
-    return with_noise(samples, _scale(settings, samples, frame), rng)
+    return with_noise("receiver_noise", samples, _scale(settings, samples, frame), frame, rng)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    return tones_with_noise(tones, _scale(settings, tones, frame), rng)
+    return tones_with_noise("receiver_noise", tones, _scale(settings, tones, frame), frame, rng)
 
 
 def _scale(settings: dict, samples: np.ndarray, frame: Frame) -> float:
