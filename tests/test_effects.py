@@ -1,6 +1,8 @@
 """Effects as a whole: the chain against a slow truth, no effect that a scene does not name, streams of their own."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference_effects
-from lowalt.common.config import faults, load
+from lowalt.common.config import faults, load, plain
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network, Station
 from lowalt.common.streams import stream
@@ -169,11 +171,13 @@ def test_the_catalogue_names_every_effect_module_and_only_those():
     assert len(set(ORDER)) == len(ORDER)
 
 
-def test_the_defaults_of_every_effect_are_values_that_a_scene_may_give_it():
-    schema = load_yaml("workflow/schemas/config.schema.yaml")
-    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
-    given = {name: __import__(dotted(name), fromlist=["DEFAULTS"]).DEFAULTS for name in PLACES}
-    assert faults(config | {"effects": given}, schema) == []
+def test_the_defaults_of_every_effect_are_allowed_and_those_kept():
+    """A scene that names an effect alone means the kept values: where one is to change, so does such a scene's data."""
+    schema = "workflow/schemas/config.schema.yaml"
+    given = {name: __import__(dotted(name), fromlist=["DEFAULTS"]).DEFAULTS for name in sorted(PLACES)}
+    assert faults(load(["config/default.yaml"], schema) | {"effects": given}, load_yaml(schema)) == []
+    lines = [json.dumps({name: plain(values)}) for name, values in given.items()]
+    assert lines == Path("tests/data/effect_defaults.jsonl").read_text().splitlines()
 
 
 def test_idle_effects_leave_every_bit(rng):

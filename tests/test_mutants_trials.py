@@ -69,6 +69,26 @@ def test_only_a_failure_or_processor_time_kills(tree, monkeypatch, status, kille
     assert asked == [Limits(201, 804)] and (tree / "src/lowalt/reach.py").read_text() == SOURCE
 
 
+def test_a_fault_s_machine_code_goes_with_it_and_that_of_the_good_file_comes_back(tree):
+    """With `cache=True` numba makes a new list for the fault and numbers its machine code from 1 again."""
+    path, kept = tree / "src/lowalt/reach.py", tree / "src/lowalt/__pycache__"
+    kept.mkdir(exist_ok=True)
+    good = {
+        "reach.reach-6.py311.nbi": b"list",
+        "reach.reach-6.py311.1.nbc": b"code",
+        "other.f-1.py311.1.nbc": b"another",
+    }
+    for name, content in good.items():
+        (kept / name).write_bytes(content)
+    before = path.stat().st_mtime_ns
+    with trials._fault(path, "LIMIT = 4\n"):
+        for name in ("reach.reach-6.py311.nbi", "reach.reach-6.py311.1.nbc", "reach.reach-6.py311.2.nbc"):
+            (kept / name).write_bytes(b"of the fault")
+        assert path.read_text() == "LIMIT = 4\n"
+    assert {file.name: file.read_bytes() for file in kept.iterdir()} == good
+    assert path.read_text() == SOURCE and path.stat().st_mtime_ns == before
+
+
 def test_an_undecided_fault_is_kept_and_counted_apart_and_waits_for_a_verdict(tree):
     (tree / "tests/test_it.py").touch()
     one, two = of_file(tree, "src/lowalt/reach.py")[:2]

@@ -55,14 +55,15 @@ def copy_of_tree(root: Path, folder: Path) -> Path:
 
 @contextmanager
 def _fault(path: Path, text: str) -> Iterator[None]:
-    """Set `text` into the file for the time of the block; its time and the list of its kept machine code come back.
+    """Set `text` into the file for the time of the block; its time and its kept machine code come back.
 
     Numba lists machine code by time and size of the source, so the fault's list would replace that of the good file.
+    A new list numbers machine code from 1 again, so the fault's would also replace what the good file's list names.
     """
     source, times = path.read_text(encoding="utf-8"), path.stat()
-    lists = f"{path.stem}.*.nbi"
+    compiled = f"{path.stem}.*.nb[ic]"
     with tempfile.TemporaryDirectory() as aside:
-        for entry in (path.parent / "__pycache__").glob(lists):
+        for entry in (path.parent / "__pycache__").glob(compiled):
             shutil.copy2(entry, aside)
         try:
             path.write_text(text, encoding="utf-8")
@@ -71,7 +72,7 @@ def _fault(path: Path, text: str) -> Iterator[None]:
             path.write_text(source, encoding="utf-8")
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))
             for entry in [
-                *(path.parent / "__pycache__").glob(lists),
+                *(path.parent / "__pycache__").glob(compiled),
                 *path.parent.glob(f"__pycache__/{path.stem}.*.pyc"),
             ]:
                 entry.unlink()
