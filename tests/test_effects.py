@@ -238,12 +238,8 @@ def test_a_link_budget_and_set_snrs_are_refused_together():
     block = {"carrier_hz": 4.9e9, "subcarrier_spacing_hz": 120e3, "subcarriers": 32, "guard_subcarriers": 10,
              "symbol_interval_s": 2.5e-3, "symbols": 24, "transmit_array": [4, 2], "receive_array": [4, 2],
              "power_w": 1.0, "stations": {"A": {"position_m": [0, 0, 10], "normal_deg": 0}}}  # fmt: skip
-    config = {
-        "network": block,
-        "effects": {"receiver_noise": {}},
-        "noise": {"snr_db": [3]},
-        "echo": {"tolerance": None},
-    }
+    config = {"network": block, "effects": {"receiver_noise": {}}, "noise": {"snr_db": [3]}}
+    config["echo"] = {"tolerance": None}
     with pytest.raises(InputError, match="link budget or set SNRs, not both"):
         check(config)
     check(config | {"noise": {"snr_db": [float("inf")]}})
