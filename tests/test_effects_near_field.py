@@ -105,7 +105,7 @@ def test_a_box_is_made_where_its_terms_at_all_frequencies_are_fewer_than_the_ele
     """With any number of points, a box whose terms cost more than summing elements never pays."""
     array, points = given((16, 4)), 10**9
     low = np.array([0.1, 0.05, 1 / 410])
-    each = np.prod(array.shape) * (4 + array.series.shape[1])
+    each = np.prod(array.shape) * (near_field.ELEMENT + near_field.ORDER * array.series.shape[1])
     box = near_field._box(low, low + 1e-3 * np.array([1.0, 1.0, 1e-3]), 1.0, array, 1e-6, points, 1)
     most = int(each // box.lengths.sum())
     assert most >= 2

@@ -109,15 +109,27 @@ def test_data_are_divided_out_into_a_response_or_in_addition_to_one(subcarriers)
     np.testing.assert_allclose(added, still + alone, rtol=1e-14)
 
 
-def test_weighed_samples_fill_or_add_to_the_first_ones_of_a_row():
+def test_weighed_samples_fill_or_add_to_the_first_ones_of_chosen_rows():
     rng = np.random.default_rng(9)
     samples, before = rng.normal(size=(2, 4, 12)) + 1j * rng.normal(size=(2, 4, 12))
     shape, total, part = rng.normal(size=12), np.full((4, 12), np.nan + 0j), before.copy()
-    tone_loops.weighed(samples, shape, True, total)
-    tone_loops.weighed(samples, shape[:5], False, part)
+    tone_loops.weighed(samples, shape, True, np.arange(4), total)
+    tone_loops.weighed(samples[:2], shape[:5], False, np.array([3, 1]), part)
     np.testing.assert_allclose(total, samples * shape, rtol=1e-14)
-    np.testing.assert_allclose(part[:, :5], before[:, :5] + (samples * shape)[:, :5], rtol=1e-14)
+    np.testing.assert_allclose(part[[3, 1], :5], before[[3, 1], :5] + (samples * shape)[:2, :5], rtol=1e-14)
     np.testing.assert_array_equal(part[:, 5:], before[:, 5:])
+    np.testing.assert_array_equal(part[[0, 2]], before[[0, 2]])
+
+
+@pytest.mark.parametrize("subcarriers", [8, 9])
+def test_the_previous_symbol_stands_in_for_the_symbols_own(subcarriers):
+    rng = np.random.default_rng(10)
+    response, before, now = rng.normal(size=(3, 4, subcarriers)) + 1j * rng.normal(size=(3, 4, subcarriers))
+    turns, rows = np.exp(1j * rng.normal(size=subcarriers)), np.array([2, 0])
+    tones = np.empty((2, subcarriers), np.complex128)
+    tone_loops.carried_before(response, turns, before, now, rows, tones)
+    truth = response * (turns * before - now)
+    np.testing.assert_allclose(tones, np.fft.ifftshift(truth[rows], axes=1), rtol=1e-13)
 
 
 @pytest.mark.parametrize("moving", [False, True])

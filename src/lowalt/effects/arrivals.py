@@ -17,7 +17,7 @@ from lowalt.effects.gain_times import Instant
 from lowalt.effects.near_field import SYMBOLS
 from lowalt.effects.response import ImagePath
 from lowalt.effects.steering import SameSymbols, Steered, at_rows, rows_of
-from lowalt.effects.tone_loops import weighed
+from lowalt.effects.tone_loops import carried_before, weighed
 from lowalt.effects.view import View
 
 if TYPE_CHECKING:
@@ -107,13 +107,14 @@ def _in_orders(
         for mine, own in zip(found, paired, strict=True):
             mine[number] = rays.moments(own)
     series = [time_series.orders(mine) for mine in found]
-    now = echo.sending.aired[rows] if turned is not None or count > 1 else None
-    other = None if turned is None else turned * echo.sending.aired_before[rows] - now
+    now = np.ascontiguousarray(echo.sending.aired[rows]) if turned is not None or count > 1 else None
+    before = None if turned is None else np.ascontiguousarray(echo.sending.aired_before[rows])
     orders = 1
     if count > 1:
         share = allowed if turned is None else 0.5 * allowed
         orders = time_series.kept(series, first, share * float(echo.strengths.sum(axis=1).max()))
     samples = (np.empty if orders > 1 else np.zeros)((len(view.times_s), view.network.subcarriers), np.complex128)
+    every = np.arange(len(samples))
     shapes = interpolation.polynomials(orders, interpolation.samples(samples.shape[1]))
     for order, shape in zip(range(orders)[::-1], shapes[::-1], strict=True):
         spectra = [first.spectrum(mine[order]) for mine in series]
@@ -121,10 +122,12 @@ def _in_orders(
         if order == 0:
             still = whole
         else:
-            weighed(waveform.transmit(whole, now), shape, order == orders - 1, samples)
+            weighed(waveform.transmit(whole, now), shape, order == orders - 1, every, samples)
         for (cut, _, lit), spectrum in zip(groups, spectra, strict=True):
             if cut:
-                samples[lit, :cut] += shape[:cut] * waveform.transmit(spectrum[lit], other[lit])[:, :cut]
+                tones = np.empty((len(every[lit]), len(shape)), np.complex128)
+                carried_before(spectrum, turned, before, now, every[lit], tones)
+                weighed(np.fft.ifft(tones, axis=1, out=tones), shape[:cut], False, every[lit], samples)
     return still, samples
 
 

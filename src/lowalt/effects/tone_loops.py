@@ -53,10 +53,29 @@ def divided(tones, data, fresh, response):
 
 
 @LEAN
-def weighed(samples, shape, fresh, total):
-    """Add samples (N, M) times shape (K,), at the first K of each row, to total (N, K or more); `fresh`: fill it."""
+def carried_before(response, turns, before, now, rows, tones):
+    """Fill tones (K, M), in the transform's order, with the rows (K,) of response, (N, M), times (turns before - now).
+
+    turns: (M,); before, now: (N, M), the data of the previous symbol and the symbol's own.
+    """
+    half = response.shape[1] // 2
+    rest = response.shape[1] - half
+    for k in range(len(rows)):
+        own, old, new, out = response[rows[k]], before[rows[k]], now[rows[k]], tones[k]
+        for m in range(rest):
+            out[m] = own[m + half] * (turns[m + half] * old[m + half] - new[m + half])
+        for m in range(half):
+            out[m + rest] = own[m] * (turns[m] * old[m] - new[m])
+
+
+@LEAN
+def weighed(samples, shape, fresh, rows, total):
+    """Add samples (K, M) times shape (I,), at the first I of each, to the rows (K,) of total (N, I or more).
+
+    Where `fresh` is set, total holds nothing yet and is filled.
+    """
     for n in range(len(samples)):
-        row, out = samples[n], total[n]
+        row, out = samples[n], total[rows[n]]
         for i in range(np.uint64(len(shape) if fresh else 0)):
             out[i] = complex(row[i].real * shape[i], row[i].imag * shape[i])
         for i in range(np.uint64(0 if fresh else len(shape))):

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from lowalt.effects.receiver import _toeplitz
 from lowalt.effects.waveform import turned
 
 SPACING = 90
@@ -148,13 +149,9 @@ def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | N
     lags = covariance(points, at_key, delay_s)
     if lags[0] <= 0:
         return None
-    # Row i holds the lags |i - j|.
-    both = np.concatenate([lags[:0:-1], lags])
-    matrix = np.lib.stride_tricks.sliding_window_view(both, len(lags))[::-1].copy()
-    index = np.arange(len(lags))
     # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
-    matrix[index, index] += 4 * np.finfo(float).eps * len(lags) ** 2 * lags[0]
-    return np.linalg.cholesky(matrix)
+    lags[0] *= 1 + 4 * np.finfo(float).eps * len(lags) ** 2
+    return _toeplitz.root(lags)
 
 
 def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
