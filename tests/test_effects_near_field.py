@@ -112,3 +112,32 @@ def test_a_box_is_made_where_its_terms_at_all_frequencies_are_fewer_than_the_ele
     for frequencies, pays in ((most, True), (most + 1, False)):
         found = near_field._box(low, low + 1e-3 * np.array([1.0, 1.0, 1e-3]), 1.0, array, 1e-6, points, frequencies)
         assert (found is not None) == pays
+
+
+@pytest.mark.parametrize("half", [0.024, 0.0262])
+def test_nodes_stand_on_the_side_of_the_array_that_the_points_are_on(half):
+    """A half is rounded up; a box must not reach through infinity to points behind the array."""
+    array, middle = given((16, 4)), np.array([0.5, 0.2, 0.025])
+    nodes = near_field._nodes((3, 4, 9), middle, np.array([0.01, 0.02, half]), array)
+    if half > middle[2]:
+        assert nodes is None
+        return
+    seen, (sine, cosine) = nodes[0] - array.station, array.axes
+    inverse = 1.0 / np.linalg.norm(seen, axis=1)
+    across, up = (cosine * seen[:, 1] - sine * seen[:, 0]) * inverse, seen[:, 2] * inverse
+    for found, count, axis, size in ((across, 3, 0, 0.01), (up, 4, 1, 0.02), (inverse, 9, 2, half)):
+        grid = middle[axis] + size * np.cos(np.pi * (np.arange(count) + 0.5) / count)
+        shape = [1, 1, 1]
+        shape[axis] = count
+        np.testing.assert_allclose(found.reshape(3, 4, 9), np.broadcast_to(grid.reshape(shape), (3, 4, 9)), rtol=1e-12)
+
+
+def test_boxes_of_nearly_equal_sizes_share_their_numbers_of_nodes_and_terms():
+    array, low = given((16, 4)), np.array([0.1, 0.05, 1 / 410])
+    near_field._orders.cache_clear()
+    boxes = []
+    for move, width in ((0.0, 1.02e-3), (1e-6, 1.05e-3)):
+        size = width * np.array([1.0, 1.0, 2.0**-10])
+        boxes.append(near_field._box(low + move, low + move + size, 1.0, array, 1e-6, 10**9, 1))
+        assert (boxes[-1].half >= 0.5 * size).all() and (boxes[-1].half <= 0.55 * size).all()
+    assert near_field._orders.cache_info().misses == 1 and boxes[0].lengths is boxes[1].lengths

@@ -1,5 +1,7 @@
 """Interpolation of smooth functions on [-1, 1] from their values at Chebyshev points."""
 
+from functools import lru_cache
+
 import numpy as np
 
 
@@ -26,8 +28,14 @@ def samples(count: int) -> np.ndarray:
     return 2.0 * np.arange(count) / count - 1.0
 
 
+@lru_cache(maxsize=64)
 def coefficients(count: int) -> np.ndarray:
-    """Return the matrix (count, count) from values at `points(count)` to the coefficients of Chebyshev polynomials."""
+    """Return the matrix (count, count) from values at `points(count)` to the coefficients of Chebyshev polynomials.
+
+    It is kept and must not be changed.
+    """
     order = np.arange(count)
     angle = np.pi * (order + 0.5) / count
-    return np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count
+    result = np.cos(order[:, None] * angle) * np.where(order == 0, 1.0, 2.0)[:, None] / count
+    result.flags.writeable = False
+    return result

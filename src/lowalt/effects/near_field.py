@@ -9,6 +9,7 @@ and D times the inverse range below NEAR: with a = -(x psi + y omega), b = x^2 +
 its Chebyshev terms (Trefethen, Approximation Theory and Approximation Practice, 2013, theorems 8.1 and 8.2).
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,18 @@ LEBESGUE = 3.5
 """Bound of the norm of an interpolation from up to 50 Chebyshev points, 1 + (2 / pi) log(n + 1)."""
 MOST = 50
 DECAYS = np.log(ELLIPSES)[:, None] * np.arange(MOST)
+
+
+GRID = 8
+"""Steps of an octave to which a box's halves are rounded up, so that boxes share their numbers of nodes and terms."""
+
+
+class Aperture(NamedTuple):
+    """What bounds of an array's sums depend on; as in `Arrays`."""
+
+    shape: tuple[int, int]
+    spacing: float
+    highest: float
 
 
 class Arrays(NamedTuple):
@@ -105,12 +118,12 @@ def _box(
         return None
     middle = 0.5 * (low + high)
     half = wider * np.maximum(0.5 * (high - low), 1e-9 * np.array([1.0, 1.0, high[2]]))
-    sizes = term_bounds(middle, half, array)
-    counts = None if sizes is None else node_counts(sizes, error / 4)
-    nodes = None if counts is None else _nodes(counts, middle, half, array)
-    if sizes is None or counts is None or nodes is None:
+    half = 2.0 ** (np.ceil(GRID * np.log2(half)) / GRID)
+    found = _orders(*_rounded(middle, half), Aperture(array.shape, array.spacing, array.highest), error)
+    nodes = None if found is None else _nodes(found[0], middle, half, array)
+    if found is None or nodes is None:
         return None
-    lengths = _lengths(sizes, counts, error / 4)
+    counts, lengths = found
     if WORK + points * frequencies * lengths.sum() + nodes.shape[1] * each > points * each:
         return None
     return Box(middle, half, _terms(nodes, counts, array, frequencies), lengths)
@@ -121,7 +134,23 @@ def _every_point(places: np.ndarray, array: Arrays, out: np.ndarray) -> None:
     response_loops.near_field(np.ascontiguousarray(places), *array[:-1], out)
 
 
-def term_bounds(middle: np.ndarray, half: np.ndarray, array: Arrays) -> np.ndarray | None:
+def _rounded(middle: np.ndarray, half: np.ndarray) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """A box's middle with each number's size rounded up, which its bounds may do, and its half, as keys of a table."""
+    cosines = np.ceil(64.0 * abs(middle[:2])) / 64.0
+    return (*cosines.tolist(), float(2.0 ** (np.ceil(GRID * np.log2(middle[2])) / GRID))), tuple(half.tolist())
+
+
+@lru_cache(maxsize=256)
+def _orders(
+    middle: tuple[float, ...], half: tuple[float, ...], array: Aperture, error: float
+) -> tuple[tuple[int, int, int], np.ndarray] | None:  # fmt: skip
+    """Nodes of each direction and terms (B, C) that keep a box's sums to an error, None where there are none."""
+    sizes = term_bounds(np.array(middle), np.array(half), array)
+    counts = None if sizes is None else node_counts(sizes, error / 4)
+    return None if sizes is None or counts is None else (counts, _lengths(sizes, counts, error / 4))
+
+
+def term_bounds(middle: np.ndarray, half: np.ndarray, array: Arrays | Aperture) -> np.ndarray | None:
     """Return bounds (3, MOST) whose products bound the Chebyshev terms of the sums over the number of elements.
 
     None where the rates of change do not hold. A function below M on an ellipse has terms below 2 M rho^-k.
@@ -158,15 +187,18 @@ def node_counts(sizes: np.ndarray, error: float) -> tuple[int, int, int] | None:
 
 def _nodes(counts: tuple[int, int, int], middle: np.ndarray, half: np.ndarray, array: Arrays) -> np.ndarray | None:
     """The places (1, K, 3) m of all nodes, None where a node is no direction."""
-    grid = [m + h * interpolation.points(count) for count, m, h in zip(counts, middle, half, strict=True)]
-    across, up, inverse = (axis.ravel() for axis in np.meshgrid(*grid, indexing="ij"))
+    grid = (m + h * interpolation.points(count) for count, m, h in zip(counts, middle, half, strict=True))
+    across, up, inverse = grid
+    across, up = across[:, None, None], up[:, None]
     ahead = 1.0 - across**2 - up**2
-    if not (ahead > 0).all():
+    if not (ahead > 0).all() or inverse.min() <= 0.0:
         return None
-    sine, cosine = array.axes
+    (sine, cosine), front, places = array.axes, np.sqrt(ahead), np.empty((*counts, 3))
     # The sums depend on the direction along the array alone, so its front stands for its back.
-    x, y = np.sqrt(ahead) * cosine - across * sine, np.sqrt(ahead) * sine + across * cosine
-    return (array.station + np.stack([x, y, up], axis=1) / inverse[:, None])[None]
+    for axis, way in enumerate((front * cosine - across * sine, front * sine + across * cosine, up)):
+        np.divide(way, inverse, out=places[..., axis])
+    places += array.station
+    return places.reshape(1, -1, 3)
 
 
 def _terms(nodes: np.ndarray, counts: tuple[int, int, int], array: Arrays, frequencies: int) -> np.ndarray:

@@ -234,6 +234,12 @@ class View:
 
     def nearest_m(self) -> np.ndarray:
         """Return a lower bound (N, P) of the range of any point of each part (m), on a link from the nearer end."""
+        return self._nearest
+
+    @cached_property
+    def _nearest(self) -> np.ndarray:
+        """What `nearest_m` returns, which several bounds ask for."""
         ends = [end for end in (self.station, self.station.transmitter) if end is not None]
-        centres = [np.linalg.norm(self.middles - np.asarray(end.position_m), axis=2) for end in ends]
-        return np.maximum(np.min(centres, axis=0) - self.radii, 0.0)
+        away = [self.middles - np.asarray(end.position_m) for end in ends]
+        squares = np.min([np.einsum("npi,npi->np", one, one) for one in away], axis=0)
+        return np.maximum(np.sqrt(squares) - self.radii, 0.0)
