@@ -52,6 +52,13 @@ def test_an_index_refuses_a_shard_of_another_length_than_its_table_says(folder):
     assert not (folder / "other.json").exists()
 
 
+def test_an_index_has_the_same_bytes_in_whatever_order_settings_and_shards_come(folder):
+    paths, before = [folder / "seen-val-0.tar", folder / "seen-train-0.tar"], (folder / "index.json").read_bytes()
+    turned = {name: dict(reversed(block.items())) for name, block in reversed(RENDER.items())}
+    build(paths, turned, folder / "index.json")
+    assert (folder / "index.json").read_bytes() == before
+
+
 def test_an_index_refuses_a_name_that_stands_twice(folder):
     (folder / "more").mkdir()
     again = [shutil.copy(folder / f"seen-val-0{end}", folder / "more") for end in (".tar", ".npz")]
