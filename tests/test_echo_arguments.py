@@ -7,7 +7,7 @@ import pytest
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import Station
-from lowalt.echo import Path, Rigid, echo_matrix, echo_signal, echo_signals, method_text
+from lowalt.echo import Path, Rigid, echo_matrix, echo_signal, echo_signals, method_text, scene
 from lowalt.echo.api import EchoResult
 from lowalt.echo.refine import Method
 from test_echo import network
@@ -73,10 +73,10 @@ def test_the_refused_value_and_the_sample_are_named_by_every_function():
 
 @pytest.mark.parametrize("rigid", [True, False])
 def test_a_point_in_the_station_is_named_with_its_symbol(rigid):
-    """Point 2 of three stands there at the last of two symbols."""
-    places = nodes(3)
+    """Point 2, of four nodes or of five points on four parts, stands there at the last of two symbols."""
+    places = nodes(4)
     places[1, 2] = SEEN.position_m
-    motion = Rigid(np.zeros((2, 3, 3, 3)), places, np.zeros((4, 3)), np.array([0, 1, 2, 1])) if rigid else places
+    motion = Rigid(np.zeros((2, 4, 3, 3)), places, np.zeros((5, 3)), np.array([0, 1, 2, 1, 3])) if rigid else places
     calls = [
         lambda: echo_signal(NET, SEEN, motion, 1.0, AIM),
         lambda: echo_signal(NET, SEEN, motion, 1.0, AIM, paths=[Path(), Path(1e-7)]),
@@ -85,6 +85,23 @@ def test_a_point_in_the_station_is_named_with_its_symbol(rigid):
     for call in calls:
         with pytest.raises(InputError, match="position of point 2 at symbol 1 is "):
             call()
+
+
+def test_rotations_that_are_one_zero_repeated_are_not_copied():
+    repeated = np.broadcast_to(0.0, (2, 3, 3, 3))
+    kept, known = scene._rotation(repeated, "")
+    assert known and kept is repeated
+    for other in (np.zeros((2, 3, 3, 3)), np.broadcast_to(1.0, (2, 3, 3, 3))):
+        made, known = scene._rotation(other, "")
+        assert not known and made.flags.c_contiguous and (made == other).all()
+
+
+@pytest.mark.parametrize(("apart_m", "held"), [(1.0, True), (60.0, False)])
+def test_a_target_too_deep_for_cell_kernels_has_none_in_its_record(apart_m, held):
+    """Cells of 4.9 m are kept for targets within 2.5 of them."""
+    places = AIM + np.array([[[0.0, 0.0, 0.0], [apart_m, 0.0, 0.0]]]) + np.zeros((2, 1, 1))
+    orders = echo_signal(NET, SEEN, places, 1.0, AIM, 1e-3).method.orders
+    assert min(orders[:2]) > 0 and (orders[2] > 0) == held and orders[2] >= 0
 
 
 def on_axis(cells: float) -> tuple[Station, np.ndarray]:

@@ -43,6 +43,14 @@ def test_positions_give_what_rigid_parts_give():
     assert abs(rigid - plain).max() < 1e-9 * abs(rigid).max()
 
 
+def test_one_point_on_one_part_gives_what_its_places_give():
+    network, track = Network.from_settings(NETWORK), np.full((30, 1, 3), 50.0)
+    motion = Rigid(np.broadcast_to(np.eye(3), (30, 1, 3, 3)), track, np.zeros((1, 3)), np.zeros(1, int))
+    one, two = (device_signal(network, network.stations[0], each, 1.0, track[0, 0], "cpu") for each in (motion, track))
+    np.testing.assert_allclose(one[0], two[0], rtol=1e-12)
+    np.testing.assert_array_equal(one[1], two[1])
+
+
 def test_faults_are_named():
     network = Network.from_settings(NETWORK)
     station = network.stations[0]

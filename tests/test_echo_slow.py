@@ -1,6 +1,7 @@
 """Slow-time interpolation: its bound on complex ellipses, its weights, and the targets it is used for."""
 
 from math import comb
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -133,6 +134,43 @@ def test_weights_carry_polynomials_exactly_and_nothing_grows(degree):
     assert abs(polynomial).sum(axis=1).max() <= interpolate.LEBESGUE
     assert (linear >= 0).all() and abs(linear @ nodes - symbols).max() < 1e-12
     assert abs(linear.sum(axis=1) - 1).max() < 1e-12
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_part_may_turn_by_a_given_phase_at_its_farthest_point(axis):
+    """Part 1's centre is 3 m from the hinge along one axis, its points within 1 m of it; part 0 does not turn."""
+    rotation, centres = np.tile(np.eye(3), (2, 2, 1, 1)), np.zeros((2, 3))
+    centres[1, axis] = -3.0
+    lay = SimpleNamespace(
+        parts=np.array([0, 1]), starts=np.array([0, 5, 12]), centres=centres, radii=np.array([9.0, 1.0])
+    )
+    turns, steps = 33.0, 100
+    limit = pose_series.SWING / (np.pi * turns * steps * (3.0 + 1.0))
+    for entry in np.ndindex(3, 3):
+        for share, kept in ((0.999, True), (1.001, False)):
+            rotation[1, 1] = np.eye(3)
+            rotation[(1, 1, *entry)] += share * limit
+            found = pose_series.candidates.py_func(rotation, lay, steps, turns, 5)
+            assert found.tolist() == [True, kept]
+    rotation[1] = rotation[0]
+    assert pose_series.candidates.py_func(rotation, lay, steps, turns, 6).tolist() == [False, True]
+
+
+def test_what_a_series_leaves_of_poses_is_the_norm_of_its_axes_largest_residuals(monkeypatch):
+    monkeypatch.setattr(pose_series, "_column", pose_series._column.py_func)
+    rng, count, chosen = np.random.default_rng(3), 40, np.array([2, 0])
+    project, back = fits = pose_series.fit(count)
+    rotation, translation = 3 * rng.normal(size=(count, 3, 3, 3)), 3 * rng.normal(size=(count, 3, 3))
+    refs = 3 * rng.normal(size=(count, 7))
+    reference, offset, turned, left = pose_series.series.py_func(rotation, translation, refs, 1, chosen, fits)
+    apart = translation[:, chosen] - translation[:, 1][:, None]
+    rest = []
+    for values, found in ((refs[:, :3], reference), (apart, offset), (rotation[:, chosen], turned)):
+        truth = np.tensordot(project, values, axes=1)
+        np.testing.assert_allclose(found, truth, atol=1e-12)
+        rest.append(abs(values - np.tensordot(back.T, truth, axes=1)).max(axis=0))
+    expected = [np.linalg.norm(rest[0]), *np.linalg.norm(rest[1], axis=1), *np.linalg.norm(rest[2], axis=(1, 2))]
+    np.testing.assert_allclose(left, expected, rtol=1e-10)
 
 
 def test_moments_move_with_the_place_they_are_about():
