@@ -186,3 +186,5 @@ INNER_VECTOR = kernel(inner=True, fastmath=_REORDERED, **_LEAN)
 """As VECTOR, for functions that only kernels call."""
 ORDERED = kernel(fastmath={*_REORDERED, "nnan"}, **_LEAN)
 """As VECTOR, and no number is expected to be none, so that least and largest values become vector instructions."""
+INNER_ORDERED = kernel(inner=True, fastmath={*_REORDERED, "nnan"}, **_LEAN)
+"""As ORDERED, for functions that only kernels call."""

@@ -41,14 +41,17 @@ def local_gain(element: Element, ahead: np.ndarray, side: np.ndarray, up: np.nda
 
 def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
     """Return the power gain (...) toward places (..., 3) m; it equals `local_gain` to rounding."""
-    places = np.ascontiguousarray(places, np.float64)
-    out = np.empty(places.shape[:-1])
+    # The coordinates of a symbol's points stand together in memory (`rigid_loops.carry`).
+    shape, places = np.shape(places)[:-1], np.asarray(places, np.float64)
+    planes = places if places.ndim == 3 else places.reshape(1, -1, 3)
+    planes = np.ascontiguousarray(planes.swapaxes(1, 2))
+    out = np.empty((len(planes), planes.shape[2]))
     tilt, nepers = math.radians(element.downtilt_deg), math.log(10) / 10
     most = nepers * element.back_db
     axes = np.array([math.cos(station.normal_rad), math.sin(station.normal_rad), *station.horizontal[:2]])
     antenna_loops.power_gain(
-        places.reshape(-1, 3), np.asarray(station.position_m, float), axes, np.array([math.cos(tilt), math.sin(tilt)]),
+        planes, np.asarray(station.position_m, float), axes, np.array([math.cos(tilt), math.sin(tilt)]),
         10 ** (element.gain_dbi / 10), nepers * 12.0 * math.degrees(1.0 / element.width_deg) ** 2, most,
-        antenna_loops.halvings(most), np.empty((7, antenna_loops.STRIP)), out.reshape(-1),
+        antenna_loops.halvings(most), np.empty((7, planes.shape[2])), out,
     )  # fmt: skip
-    return out
+    return out.reshape(shape)

@@ -22,8 +22,15 @@ def half_diagonal(shape: tuple[int, int]) -> float:
 def series(rates: np.ndarray, longest: float, error: float) -> np.ndarray:
     """Return the coefficients (Q, K) of exp(-j rate s) as a series in s, for the Q `rates` and |s| <= `longest`.
 
-    The terms from s^K on sum to less than `error`.
+    The terms from s^K on sum to less than `error`. The result is kept and must not be changed.
     """
+    return _series(tuple(rates.tolist()), longest, error)
+
+
+@lru_cache(maxsize=64)
+def _series(given: tuple[float, ...], longest: float, error: float) -> np.ndarray:
+    """What `series` returns for these rates."""
+    rates = np.array(given)
     band = float(abs(rates).max()) * longest
     count, term = 1, band
     # The terms left out sum to at most e^band times the first of them.
