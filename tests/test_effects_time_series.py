@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import arrivals, interpolation, moment_loops, time_series
+from lowalt.effects import arrivals, interpolation, moment_loops, response, time_series, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
@@ -22,15 +22,34 @@ def test_moments_become_subcarriers_as_in_the_plain_sum(count):
     found = np.full((3, count), 1.0 + 0j)
     half = (count + 1) // 2
     work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
-    moment_loops.spread(planes, table, own, whole, cells, *work, False, found)
+    none = np.empty((0, count), complex)
+    moment_loops.spread(planes, table, own, whole, cells, *work, False, none, found)
     off = np.arange(count) - 0.5 * (count - 1)
     delay = np.exp(-2j * np.pi * (whole + cells)[:, None] * off / count)
     truth = own[:, None] * ((planes[:, 0] + 1j * planes[:, 1]) @ table) * delay
     assert abs(found - 1.0 - truth).max() < 1e-11
     # A result that holds nothing yet is filled, with zeros where all moments are zero.
     planes[1], empty = 0.0, np.full((3, count), np.nan + 0j)
-    moment_loops.spread(planes, table, own, whole, cells, *work, True, empty)
+    moment_loops.spread(planes, table, own, whole, cells, *work, True, none, empty)
     assert abs(empty[::2] - truth[::2]).max() < 1e-11 and (empty[1] == 0.0).all()
+    # With data, the result is the tones of symbols that carry them.
+    data, tones = np.exp(2j * np.pi * rng.random((3, count))), np.full((3, count), np.nan + 0j)
+    moment_loops.spread(planes, table, own, whole, cells, *work, True, data, tones)
+    assert abs(tones - waveform.tones_of(empty, data)).max() < 1e-11
+
+
+@pytest.mark.parametrize("paths", [0, 1])
+def test_tones_are_those_of_the_subcarriers_over_one_path_and_over_several(paths):
+    rng, radio = np.random.default_rng(12), network(subcarriers=33)
+    places = np.array([100.0, 60.0, 40.0]) + rng.uniform(-1.0, 1.0, (radio.symbols, 5, 3))
+    images = [response.ImagePath(places * [1.0, 1.0, -1.0], 0.5 - 0.2j)] * paths
+    rays = response.OneWayFactors(
+        radio, radio.stations[0], places, places[0, 0], images, squint=False, wavefront=False, error=1e-12
+    )  # fmt: skip
+    found = rays.moments(rays.paired(rng.uniform(1.0, 2.0, 5)))
+    data = np.exp(2j * np.pi * rng.random((radio.symbols, 33)))
+    truth = waveform.tones_of(rays.spectrum(found), data)
+    np.testing.assert_allclose(rays.tones(found, data), truth, rtol=0, atol=1e-13 * abs(truth).max())
 
 
 def test_orders_are_those_of_the_polynomial_through_the_instants():

@@ -117,6 +117,10 @@ def _in_orders(
     every = np.arange(len(samples))
     shapes = interpolation.polynomials(orders, interpolation.samples(samples.shape[1]))
     for order, shape in zip(range(orders)[::-1], shapes[::-1], strict=True):
+        if order > 0 and turned is None:
+            tones = first.tones(series[0][order], now)
+            weighed(np.fft.ifft(tones, axis=1, out=tones), shape, order == orders - 1, every, samples)
+            continue
         spectra = [first.spectrum(mine[order]) for mine in series]
         whole = sum(spectra[1:], spectra[0])
         if order == 0:

@@ -154,13 +154,26 @@ def ramp(start, step, total, real, imag):
         imag[k] = real[k - STRIDE] * wide.imag + imag[k - STRIDE] * wide.real
 
 
+@INNER_VECTOR
+def carried(response, data, tones):
+    """Fill tones (M,) with a response (2, M), real and imaginary, times data (M,), in the order of `tone_loops`."""
+    low = tones.size // 2
+    real, imag, own, out = response[0, low:], response[1, low:], data[low:], tones[: tones.size - low]
+    for m in range(np.uint64(len(out))):
+        out[m] = complex(real[m], imag[m]) * own[m]
+    real, imag, own, out = response[0, :low], response[1, :low], data[:low], tones[tones.size - low :]
+    for m in range(np.uint64(len(out))):
+        out[m] = complex(real[m], imag[m]) * own[m]
+
+
 @VECTOR
-def spread(planes, table, own, whole, cells, work, turn, sums, fresh, result):
+def spread(planes, table, own, whole, cells, work, turn, sums, fresh, data, result):
     """Add own[n] times the response of moments (N, 2, P), real and imaginary, delayed, to result (N, M).
 
     table: (P, M) real, each order's values at the subcarriers, even or odd about the band's middle as the order is; the
     delay about the middle subcarrier is `whole` (N,) int64 plus `cells` (N,) range cells. With H = (M + 1) // 2, work
-    (4, H), turn (2, H) and sums (2, M) are work space. Where `fresh` is set, result holds nothing yet and is filled.
+    (4, H), turn (2, H) and sums (2, M) are work space. Where `fresh` is set, result holds nothing yet and is filled,
+    and with data (N, M), instead of (0, M), it is filled with the tones of symbols that carry them.
     """
     symbols, total = result.shape
     half = (total + 1) // 2
@@ -186,9 +199,11 @@ def spread(planes, table, own, whole, cells, work, turn, sums, fresh, result):
         for m in range(np.uint64(total - half)):
             a, b, c, d = even_re[m] - odd_re[m], even_im[m] - odd_im[m], x * re[m] + y * im[m], y * re[m] - x * im[m]
             high_re[m], high_im[m] = a * c - b * d, a * d + b * c
-        if fresh:
+        if fresh and len(data) > 0:
+            carried(sums, data[n], row)
+        elif fresh:
             for m in range(np.uint64(total)):
                 row[m] = complex(low_re[m], low_im[m])
-            continue
-        for m in range(np.uint64(total)):
-            row[m] += complex(low_re[m], low_im[m])
+        else:
+            for m in range(np.uint64(total)):
+                row[m] += complex(low_re[m], low_im[m])

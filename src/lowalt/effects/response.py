@@ -12,7 +12,7 @@ import numpy as np
 from lowalt.common.network import Network, Station
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.radar import radar
-from lowalt.effects import moment_loops
+from lowalt.effects import moment_loops, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import Instant, Kept
 from lowalt.effects.one_way import ImagePath as ImagePath
@@ -157,6 +157,16 @@ class OneWayFactors:
 
     def spectrum(self, moments: list[np.ndarray]) -> np.ndarray:
         """Return the subcarriers (N, M) of each pair of paths' `moments`, or of sums of such of instants alike."""
+        return self._spread(moments, np.empty((0, self.radio.subcarriers), np.complex128))
+
+    def tones(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
+        """Return the tones (N, M) (`waveform.tones_of`) of symbols that carry data (N, M), of these `moments`."""
+        if len(moments) > 1:
+            return waveform.tones_of(self.spectrum(moments), data)
+        return self._spread(moments, np.ascontiguousarray(data))
+
+    def _spread(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
+        """The subcarriers (N, M) of moments, or with data (N, M) the tones of those of one pair."""
         refs = self.refs
         own, whole = np.exp(-2j * np.pi * refs[:, TURN]), refs[:, CELL].astype(np.int64)
         count = self.radio.subcarriers
@@ -165,7 +175,7 @@ class OneWayFactors:
         result = np.empty((len(refs), count), np.complex128)
         for number, (planes, (middle, reach)) in enumerate(zip(moments, self.frames, strict=True)):
             cells = refs[:, REST] + middle
-            moment_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, result)
+            moment_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, data, result)
         return result
 
     def largest(self, moments: list[np.ndarray]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.common.network import Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
-from lowalt.effects import lit_points
+from lowalt.effects import lit_points, waveform
 from lowalt.effects.gain_times import Instant
 from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
@@ -94,6 +94,12 @@ class Steered:
         for (rows, phase, rays), mine in zip(self.beams, moments, strict=True):
             result[rows] = phase * rays.spectrum(mine)
         return result
+
+    def tones(self, moments: list[list[np.ndarray]], data: np.ndarray) -> np.ndarray:
+        """Return the tones (N, M) (`waveform.tones_of`) of symbols that carry data (N, M), of every beam's moments."""
+        if self.steady:
+            return self.beams[0][2].tones(moments[0], data)
+        return waveform.tones_of(self.spectrum(moments), data)
 
     def largest(self, moments: list[list[np.ndarray]]) -> float:
         """Return a bound of the largest subcarrier that `spectrum` makes of these moments."""
