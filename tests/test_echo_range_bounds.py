@@ -74,3 +74,17 @@ def test_a_segment_is_a_fifth_and_a_radian_of_gain_phase_wider_than_the_target(c
     assert (out[:count, half] >= turn + 2 * drift).all()
     # As wide as they like, segments end where they are longest.
     assert cut_segments.py_func(extents, 1e-3, 1e-3, 16, out) == 3 and out[:3, END].tolist() == [16, 32, 40]
+
+
+@pytest.mark.parametrize("symbols", [1, 4])
+def test_points_without_parts_are_as_far_as_they_stand(symbols):
+    draws = np.random.default_rng(2)
+    translation, weights = draws.normal(0, 5, (symbols, 7, 3)), draws.dirichlet(np.ones(7))
+    refs = np.full((symbols, 1 + max(RANGE, X, Y, Z)), 100.0)
+    lay = SimpleNamespace(parts=None, centres=None, radii=None, weights=weights, strays=None)
+    scene = SimpleNamespace(rotation=np.empty((0, 0, 3, 3)), translation=translation)
+    out, radar = np.empty((symbols, 5)), SimpleNamespace(sine=0.6, cosine=0.8)
+    fill_extents.py_func(scene, 3, lay, refs, radar, out)
+    away = np.linalg.norm(translation - translation[:, 3][:, None], axis=2)
+    np.testing.assert_allclose(out[:, SIZE], away.max(1), rtol=1e-11)
+    np.testing.assert_allclose(out[:, MEAN], away @ weights, rtol=1e-11)

@@ -1,5 +1,7 @@
 """Exact values round to complex64 as the true values do: the double-double sums, the decision, the strongest cell."""
 
+from types import SimpleNamespace
+
 import mpmath
 import numpy as np
 import pytest
@@ -109,6 +111,9 @@ def test_a_value_is_computed_again_only_where_its_bound_leaves_the_nearest_singl
     totals, out = np.array([1.0, 1, 1, 1, 1, 1, 0]), np.empty(7, np.int64)
     count, unproved = nearest.doubtful(values, bounds, totals, gaps, out)
     assert out[:count].tolist() == [0, 3, 5] and unproved == 1
+    # Where every value is certain nothing is computed again, and nothing of the scene is asked for.
+    certain = SimpleNamespace(values=values[4:5], bounds=bounds[4:5], totals=totals[4:5], gaps=gaps[4:5])
+    assert nearest.correct(None, None, None, np.empty((1, 7)), (0.0, 0.0), certain, (0.0, 0.0)) == (0, 0, 0)
 
 
 def test_a_sum_of_two_doubles_rounds_once():

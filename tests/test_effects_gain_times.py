@@ -1,13 +1,17 @@
 """Array sums of a symbol's other instants, from those of a few: held against the sum over every element."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.common.config import load_yaml
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.effects import gain_times
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
 from lowalt.effects.channel import symbol_motion
+from lowalt.effects.elements import farthest_m
 from lowalt.effects.received import Scene, observe
 from test_effects_bounds import network, target
 from test_effects_near_field import direct
@@ -86,3 +90,19 @@ def test_range_cells_are_those_with_sums_of_every_instant(error, monkeypatch):
     found = chain.cells(on)
     assert any(instant is not None and instant.slot is None for _, instant in used[-1])
     assert 0 < abs(found - truth).max() <= error * chain.peaks.sum(axis=1).max()
+
+
+@pytest.mark.parametrize("kept", [0, 1, 3])
+def test_motion_is_bounded_in_complex_time_while_it_stays_below_a_quarter_of_the_range(kept):
+    """A part of 3 km/s; complex times reach (rho + 1 / rho) / 2 half-symbols, and elements stand off the middle."""
+    network = Network.from_settings(load_yaml("config/default.yaml")["network"])
+    rho, half = symbol_motion.ELLIPSES, 0.5 / network.subcarrier_spacing_hz
+    moved = 3e3 * (1 + 0.5 * (rho + 1 / rho)) * half + farthest_m(network)
+    for share, holds in ((1 - 1e-9, kept), (1 + 1e-9, kept + 1)):
+        speeds = SimpleNamespace(travel_m=lambda s: np.array([3e3 * s]), imaginary_m=lambda s: np.zeros((len(s), 1)))
+        near = np.array([[4 * share * moved[kept]], [9 * moved[-1]]])
+        view = SimpleNamespace(speeds=speeds, nearest_m=lambda near=near: near, network=network)
+        found = symbol_motion.complex_motion(view)
+        assert (0 if found is None else len(found[0])) == holds
+        if found is not None:
+            np.testing.assert_allclose(found[2][:, 0], moved[:holds])

@@ -18,6 +18,7 @@ from lowalt.effects import waveform
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import direct_path
 from lowalt.effects.checks import check
+from lowalt.effects.levels import levels
 from lowalt.effects.one_way import range_sum
 from lowalt.effects.received import Scene, observe, received_signal
 from lowalt.effects.receiver import link_offset
@@ -141,6 +142,11 @@ def test_the_direct_path_is_friis_and_lies_at_the_masts_distance():
     assert cells.argmax() == round(distance / C * 64 * 480e3)
     monostatic = observe(scene({}, radio), A, cloud, row)
     assert not direct_path.scatter(settings, monostatic, None).any()
+    (effect,) = called({"direct_path": settings})
+    for seen, told in ((view, [20 * np.log10(level) + 30]), (monostatic, [])):
+        table = levels(seen, {"direct_path": effect}, 1e-12)
+        values = [line.value for line in table if line.name == "direct path, one subcarrier"]
+        assert values == pytest.approx(told)
 
 
 def test_the_direct_path_enters_by_both_arrays_patterns():

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.effects.channel import occlusion, shadow_rays, still_rays
+from lowalt.effects.channel import occlusion, shadow_rays, still_rays, surface_tree
 from lowalt.effects.channel.ray_tests import cross
 from lowalt.targets.surfaces import Surface
 from test_effects_occlusion import NETWORK, scene
@@ -74,3 +74,14 @@ def test_cross_products_are_numpys_to_the_last_bit():
     rng = np.random.default_rng(3)
     for a, b in rng.normal(size=(200, 2, 3)):
         np.testing.assert_array_equal(cross(a, b), np.cross(a, b))
+
+
+def test_places_on_the_space_filling_curve_take_bits_of_the_axes_by_turns():
+    """0 to 1 are 1024 steps an axis; bit k of x, y and z are bits 3 k, 3 k + 1 and 3 k + 2 of the place."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]], float)
+    steps = surface_tree.BITS
+    ones = sum(8**k for k in range(steps))
+    assert surface_tree.curve(corners).tolist() == [0, ones, 2 * ones, 4 * ones, 7 * ones]
+    inner = np.array([[0.5, 0.25, 0.0], [2.0**-steps, 1 - 2.0**-steps, 0.0]])
+    top = 8 ** (steps - 1)
+    assert surface_tree.curve(inner).tolist() == [top + 2 * top // 8, 1 + 2 * ones]

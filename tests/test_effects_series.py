@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.effects import series
+from lowalt.effects import series, waves
 from lowalt.effects.channel.ground_reflection import roughness
 from lowalt.effects.fresnel import fresnel
 
@@ -36,3 +36,13 @@ def test_a_function_is_asked_at_few_places_where_it_is_smooth_and_at_all_where_i
     asked.clear()
     assert (series.at(counted(abs), places) == abs(places)).all()
     assert asked[-1] == 5000
+
+
+@pytest.mark.parametrize("turns", [1e-9, 1e-3, 0.02, 0.3, 0.5, 3.0])
+def test_waves_within_few_turns_keep_the_orders_that_change_a_bit_and_no_others(turns):
+    found, reach = waves.waves_within(turns), min(turns, 0.5)
+    left, most = waves.WAVE[:, found.shape[1] :], 2.0**-60
+    np.testing.assert_array_equal(found, waves.WAVE[:, : found.shape[1]])
+    sizes = [max(abs(pair)) * reach ** (2 * order) for order, pair in enumerate(waves.WAVE.T)]
+    assert all(size <= most for size in sizes[found.shape[1] :]) and len(sizes) == found.shape[1] + left.shape[1]
+    assert found.shape[1] == 2 or sizes[found.shape[1] - 1] > most

@@ -174,6 +174,14 @@ def test_the_figure_is_a_picture_and_repeats(table):
         draw([row for row in table if row["kind"] != "trained"])
 
 
+def test_a_network_is_timed_on_images_of_all_values_or_on_signals_of_its_views():
+    images = network_speed._inputs(3, schemes.Scheme("x", (0, 2), (1,)), 64)
+    assert images.shape == (3, 2, 64, 64) and np.bincount(images.numpy().ravel(), minlength=256).min() > 0
+    assert (network_speed._inputs(3, schemes.Scheme("x", (0, 2), (1,)), 64) == images).all()
+    signals = network_speed._inputs(3, schemes.Scheme("x", (0, 1, 2), (), method="cnn", size=400), 400).numpy()
+    assert signals.shape == (3, 3, 400) and signals.dtype == np.complex64 and abs(signals).std() > 0.1
+
+
 def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
     from lowalt.common.timing import least_s
 
