@@ -57,6 +57,16 @@ def made_clouds(records: dict[str, dict], seed: int, inputs: Path | None) -> dic
     return {name: make(item, inputs, seed) for name, item in records.items()}
 
 
+def made_occluders(records: dict[str, dict], seed: int, inputs: Path | None) -> dict[str, dict]:
+    """Return the surfaces of each record's target by subtype, as `occluders.read` returns them.
+
+    Raises: InputError where a record or an input is wrong, or a target has no surfaces.
+    """
+    from lowalt.targets.occluders import make
+
+    return {name: make(item, inputs, seed) | {"subtype": name} for name, item in records.items()}
+
+
 class Dataset:
     """The samples of a configuration by number: group by group, model by model, subtype by subtype, SNR by SNR."""
 
@@ -74,7 +84,7 @@ class Dataset:
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
         that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
-        surfaces, where the scene hides points behind them; published: every row of the table of targets by subtype,
+        surfaces, where the scene hides points behind them, made here where the clouds are; published: every row of the table of targets by subtype,
         by default from the records; the classes follow from it.
         Raises: InputError naming the key, value or file that is wrong.
         """
@@ -93,7 +103,10 @@ class Dataset:
         self.groups = tuple(name for name in self.plan.groups if name in groups)
         if clouds is None:
             wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
-            clouds = made_clouds(wanted, config["seed"], Path(inputs) if inputs else None)
+            sources = wanted, config["seed"], Path(inputs) if inputs else None
+            clouds = made_clouds(*sources)
+            if occluders is None and "occlusion" in config["effects"]:
+                occluders = made_occluders(*sources)
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
