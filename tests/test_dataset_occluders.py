@@ -35,5 +35,5 @@ def test_no_surfaces_are_made_where_the_scene_hides_nothing_or_the_caller_has_th
     monkeypatch.setattr(datasets, "made_occluders", lambda *sources: pytest.fail("surfaces were made"))
     plain = Dataset(config_of("DJI Mini 2", rotor_spread={}))
     hidden = Dataset(config_of("DJI Mini 2", occlusion={}), plain.clouds)
-    with pytest.raises(InputError, match="effects.occlusion: DJI Mini 2 has no surfaces"):
+    with pytest.raises(InputError, match=r"effects\.occlusion: DJI Mini 2 has no surfaces"):
         hidden.signal(0)

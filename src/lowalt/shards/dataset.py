@@ -84,8 +84,8 @@ class Dataset:
 
         clouds: the clouds by subtype, or the folder of their files; by default they are made here, from the records
         that the configuration names and the folder `inputs` of meshes and recordings. occluders: each subtype's
-        surfaces, where the scene hides points behind them, made here where the clouds are; published: every row of the table of targets by subtype,
-        by default from the records; the classes follow from it.
+        surfaces, where the scene hides points behind them, made here where the clouds are; published: every row of
+        the table of targets by subtype, by default from the records; the classes follow from it.
         Raises: InputError naming the key, value or file that is wrong.
         """
         config = load_yaml(config) if isinstance(config, (str, Path)) else config
