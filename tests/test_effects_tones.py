@@ -145,13 +145,13 @@ def test_a_chain_that_runs_again_takes_the_numbers_it_has_drawn(moving):
             list(scene.effects), observe(scene, radio.stations[0], cloud, row),
             lambda name: asked.append(name) or scene.stream(name, row, "A"),
         )  # fmt: skip
+        built.receiving.again = again
         for _ in range(1 + again):
             on = frozenset(["symbol_motion"] if moving else [])
             found.append(built.run(on).signal)
     np.testing.assert_array_equal(found[0], found[1])
     np.testing.assert_array_equal(found[1], found[2])
-    built.receiving.bare.drawn.clear()
-    assert np.array_equal(built.run(on).signal, found[0])
+    assert set(built.receiving.bare.drawn) >= {"phase_noise"} and len(built.receiving.bare.drawn) == 2
 
 
 def test_halves_that_a_shuffle_does_not_need_are_drawn_again():

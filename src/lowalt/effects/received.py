@@ -111,6 +111,8 @@ def received_signal(
     if not link and (not exact or (chain.target.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.receiving.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
+    # At a tolerance the chain runs first without the physics by need.
+    chain.receiving.again = share is not None
     chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
         if share is not None and asked and steps_alone(chain):

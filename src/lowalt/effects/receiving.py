@@ -57,6 +57,8 @@ class Receiving:
         power: float,
     ):  # fmt: skip
         self.effects, self.view, self.draws, self.sending, self.power = effects, view, draws, sending, power
+        self.again = False
+        """Whether the look is computed more than once: what effects have drawn is then kept."""
         self._converted: tuple[NamedEffect, np.ndarray] | None = None
 
     def responded(self, spectrum: np.ndarray) -> tuple[np.ndarray, list[NamedEffect]]:
@@ -127,4 +129,5 @@ class Receiving:
         starts = None if view.sampling is None else view.sampling.times_s
         ones = np.broadcast_to(np.ones((), np.complex128), (view.network.symbols, view.network.subcarriers))
         delay_s = 2.0 * range_m / SPEED_OF_LIGHT
-        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts, drawn={})
+        drawn: dict | None = {} if self.again else None
+        return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts, drawn=drawn)
