@@ -6,14 +6,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lowalt.echo import refine
 from lowalt.echo.fast import driver, strongest_cell
 from lowalt.echo.fast.cell_kernel import PLACES, cell_polynomials
+from lowalt.echo.fast.error_model import pointwise_bound
+from lowalt.echo.fast.range_bounds import norm
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
 from lowalt.echo.pointwise import sums as sums_of_points
 from lowalt.echo.pointwise.sums import far_bound
 from lowalt.echo.pointwise.terms import cell_sum
-from lowalt.echo.slow_time.node_count import _growth, choose
+from lowalt.echo.radar import Exact, constants, radar
+from lowalt.echo.slow_time.node_count import _growth, choose, nodes
 from lowalt.echo.slow_time.pose_series import series_sizes
+from test_echo import network
 
 
 def test_sizes_of_a_series_of_poses_are_those_of_plain_sums():
@@ -70,6 +75,48 @@ def test_the_growth_of_an_amplitude_on_an_ellipse_is_that_of_a_range_along_the_l
     whole, bare, v = _growth(rho, reference, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
     least = 2 * np.log(ranges.max() / ranges.min())
     assert least <= bare <= 1.02 * least and whole == bare and v == 0.0
+
+
+@pytest.mark.parametrize("side", ["transmit_h", "receive_h", "transmit_v", "receive_v"])
+def test_an_element_more_on_any_side_adds_the_same_to_the_risk_of_a_direction(side):
+    """Roundings of a direction cosine turn the array's phase by pi kappa / 2 an element beyond the first of a side."""
+    counts = dict(transmit_h=3, receive_h=5, transmit_v=2, receive_v=7)
+    seen = SimpleNamespace(turns=30.0, kappa=1.1, **counts)
+    more = SimpleNamespace(**vars(seen) | {side: counts[side] + 1})
+    (share, risk), found = pointwise_bound(seen, 0.5, 40), pointwise_bound(more, 0.5, 40)
+    unit, each = 40 * 2.0**-53, np.pi * 1.1 / 2
+    assert risk / unit == pytest.approx(1 + each * (2 + 4 + 1 + 6), rel=1e-14)
+    assert found[0] == share and (found[1] - risk) / unit == pytest.approx(each, rel=1e-12)
+
+
+def test_a_plan_saves_a_part_of_the_exact_one_and_more_where_single_precision_is_enough(monkeypatch):
+    monkeypatch.setattr(refine, "slow_parts", lambda *_: None)
+    sample = SimpleNamespace(scene=None, radar=None, lay=SimpleNamespace(amplitude=np.ones(30)), refs=np.ones((20, 7)))
+    loose, tight = refine._Sample.saving(sample, 1e-2), refine._Sample.saving(sample, 1e-9)
+    assert 0 < tight < loose < 20 * 30
+
+
+def test_smaller_parts_leave_a_smaller_error_of_their_series():
+    """Nothing is left of either series but roundings, which grow with a part's reach."""
+    seen, table = radar(network(), network().stations[0]), cell_polynomials(256, 0.5, 1e-9)
+    found = [
+        nodes(seen, (np.array([100.0, 0.01]), size * np.array([1.0, 1e-3]), 0.0), 0.0, table, 1e-6, 1.0, 60)
+        for size in (1e-3, 1e-2, 0.1)
+    ]
+    phases = [each.phase for each in found]
+    assert 0 < phases[0] <= phases[1] < phases[2] < 1e-9
+
+
+def test_the_norm_of_a_pose_is_bounded_by_the_rows_of_its_square():
+    for matrix in np.random.default_rng(3).normal(size=(20, 3, 3)):
+        bound = norm.py_func(matrix[None, None], 0, 0)
+        assert bound == pytest.approx(np.sqrt(abs(matrix @ matrix.T).sum(axis=1).max()), rel=1e-13)
+        assert bound >= np.linalg.norm(matrix, 2) * (1 - 1e-13)
+
+
+def test_constants_of_a_radar_are_pairs_in_the_order_of_their_rows():
+    rows = np.arange(16.0).reshape(8, 2)
+    assert constants(rows) == Exact(*map(tuple, rows.tolist()))
 
 
 def test_where_no_degree_in_time_is_enough_none_is_chosen():
