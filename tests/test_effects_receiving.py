@@ -5,7 +5,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.effects import receiving
+from lowalt.common.errors import InputError
+from lowalt.effects import one_way, receiving
 
 OFFERS = {"plain": ("receive",), "takes": ("receive", "retimed"), "both": ("receive", "retimed", "retoned")}
 
@@ -41,3 +42,11 @@ def test_tones_stay_where_all_that_follows_changes_them_or_the_next_effect_begin
     heard = receiving.Receiving._behind(built, effects, slice(None), tones=tones.copy())
     assert asked == expected
     np.testing.assert_allclose(heard.responses, tones, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("symbol", "point"), [(0, 0), (0, 6), (2, 3)])
+def test_a_point_in_a_station_is_named_with_its_symbol(symbol, point):
+    look = SimpleNamespace(places=np.empty((4, 7, 3)), name="B")
+    with pytest.raises(InputError, match=f"at symbol {symbol} is that of station B"):
+        one_way.PathFactors._check(look, symbol * 7 + point + 1)
+    assert one_way.PathFactors._check(look, 0) is None
