@@ -19,6 +19,8 @@ OFFERS = {"plain": ("receive",), "takes": ("receive", "retimed"), "both": ("rece
         (["both", "takes"], ["retoned", "retimed"]),
         (["both", "plain"], ["retimed", "receive"]),
         (["plain", "both"], ["receive", "retoned"]),
+        (["takes", "both"], ["retimed", "retoned"]),
+        (["takes", "takes"], ["retimed", "retimed"]),
     ],
 )
 def test_tones_stay_where_all_that_follows_changes_them_or_the_next_effect_begins_with_them(kinds, expected):

@@ -96,7 +96,7 @@ class Receiving:
                 tones = np.fft.fft(samples, axis=1)
             stays = len(providing(left[place:], ChangesTones)) == len(left) - place
             next_takes = len(providing(left[place : place + 2], TakesTones)) == 2
-            if tones is not None and (stays or next_takes):
+            if tones is not None and (stays or next_takes) and providing([effect], ChangesTones):
                 tones = effect.module.retoned(effect.settings, tones, *given)
             elif takes:
                 samples, tones = effect.module.retimed(effect.settings, tones, *given), None
