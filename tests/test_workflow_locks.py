@@ -13,9 +13,10 @@ from types import SimpleNamespace
 import pytest
 
 import snakemake_runs
+from lowalt.common.processes import started
 from lowalt.workflow import interrupts
 from lowalt.workflow.locks import guarded, holders, install, numbers, take, take_over
-from lowalt.workflow.owner import TOKEN, Owner, started
+from lowalt.workflow.owner import TOKEN, Owner
 
 ROOT = Path(__file__).parent.parent
 KEYS = {"input": ["in.txt"], "output": ["out.txt"]}

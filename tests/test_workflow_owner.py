@@ -6,8 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from lowalt.common import processes
+from lowalt.common.processes import started
 from lowalt.workflow import owner
-from lowalt.workflow.owner import TOKEN, Owner, started
+from lowalt.workflow.owner import TOKEN, Owner
 
 BOOT = "0f1e2d3c-aaaa-bbbb-cccc-0123456789ab"
 
@@ -20,7 +22,8 @@ def proc(tmp_path, monkeypatch):
         def glob(self, pattern):
             return iter(sorted(super().glob(pattern)))
 
-    monkeypatch.setattr(owner, "Path", lambda path: Sorted(f"{tmp_path}{path}"))
+    for module in (owner, processes):
+        monkeypatch.setattr(module, "Path", lambda path: Sorted(f"{tmp_path}{path}"))
     (tmp_path / "proc/sys/kernel/random").mkdir(parents=True)
     (tmp_path / "proc/sys/kernel/random/boot_id").write_text(f"{BOOT}\n")
     (tmp_path / "proc/self/ns").mkdir(parents=True)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TextIO
 
 from lowalt.common.errors import InputError, SpaceError
+from lowalt.common.processes import lives
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 NEARLY_FULL_BYTES = 1 << 20
@@ -56,19 +57,8 @@ def _sweep(path: Path) -> None:
     begin, end = f".{path.stem}.", f".part{path.suffix}"
     for entry in os.scandir(path.parent):
         number = entry.name.removeprefix(begin).removesuffix(end)
-        if entry.name == f"{begin}{number}{end}" and number.isdigit() and not _lives(int(number)):
+        if entry.name == f"{begin}{number}{end}" and number.isdigit() and not lives(int(number)):
             Path(entry.path).unlink(missing_ok=True)
-
-
-def _lives(process: int) -> bool:
-    """Whether this machine runs a process of that id."""
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except PermissionError:
-        return True
-    return True
 
 
 def free_bytes(path: str | Path) -> int:

@@ -10,6 +10,8 @@ import socket
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from lowalt.common.processes import started, state
+
 TOKEN = "LOWALT_RUN"
 """Environment variable that every job of a run inherits: the token of the run."""
 
@@ -66,32 +68,11 @@ class Owner:
             if int(folder.name) == os.getpid():
                 continue
             try:
-                if mark in (folder / "environ").read_bytes().split(b"\0") and _state(int(folder.name)) != "Z":
+                if mark in (folder / "environ").read_bytes().split(b"\0") and state(int(folder.name)) != "Z":
                     found.append(int(folder.name))
             except OSError:
                 continue
         return found
-
-
-def started(pid: int) -> int | None:
-    """Return when a process started, in clock ticks after boot, or None where no such process lives."""
-    fields = _fields(pid)
-    # A zombie has ended; only its parent has not asked for its status yet.
-    return None if fields is None or fields[0] in "ZX" else int(fields[19])
-
-
-def _state(pid: int) -> str | None:
-    """State of a process as one letter, None where there is no such process."""
-    fields = _fields(pid)
-    return fields and fields[0]
-
-
-def _fields(pid: int) -> list[str] | None:
-    """Fields of /proc/PID/stat from the third (the state) on; the second may itself hold spaces and brackets."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return None
 
 
 def _boot() -> str:

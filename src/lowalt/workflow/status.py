@@ -13,8 +13,8 @@ from pathlib import Path
 
 from lowalt.common import progress
 from lowalt.common.files import replacing
+from lowalt.common.processes import started
 from lowalt.workflow.board import Board, span
-from lowalt.workflow.owner import started
 
 FOLDER = Path(".snakemake/status")
 PLANNED_JOBS = "LOWALT_PLANNED_JOBS"
