@@ -141,3 +141,13 @@ def test_boxes_of_nearly_equal_sizes_share_their_numbers_of_nodes_and_terms():
         boxes.append(near_field._box(low + move, low + move + size, 1.0, array, 1e-6, 10**9, 1))
         assert (boxes[-1].half >= 0.5 * size).all() and (boxes[-1].half <= 0.55 * size).all()
     assert near_field._orders.cache_info().misses == 1 and boxes[0].lengths is boxes[1].lengths
+
+
+def test_a_box_shares_the_bounds_of_one_that_is_nearer_and_farther_from_the_beam():
+    rng = np.random.default_rng(6)
+    for middle, half in zip(rng.uniform([-1, -1, 1e-3], 1, (50, 3)), rng.uniform(1e-4, 1e-2, (50, 3)), strict=True):
+        found, halves = near_field._rounded(middle, half)
+        assert (np.array(found) >= abs(middle) * (1 - 1e-12)).all() and halves == tuple(half)
+        assert (np.array(found[:2]) < abs(middle[:2]) + 1 / 64).all() and found[2] <= middle[2] * 2 ** (1 / 8) * (
+            1 + 1e-12
+        )
