@@ -18,6 +18,7 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.csv_tables import short, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.picture_layout import settle
 from lowalt.recognition import augment, recipe
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.methods import built
@@ -33,6 +34,8 @@ from lowalt.recognition.training import Trainer
 COLUMNS = ("step", "rate", "loss", "smoothed")
 KEPT = 0.9
 """Share of the smoothed loss that a step keeps."""
+DPI = 120
+"""Dots per inch of the picture."""
 END = 4.0
 """The search ends where the smoothed loss exceeds this many times its least value."""
 Samples = ViewSamples | SlowTimeSamples
@@ -119,8 +122,9 @@ def figure(path: Path, rates: np.ndarray, found: np.ndarray, chosen: tuple[float
         axes.axvline(rate, color="C3", linestyle=style, label=f"{words}: {rate:.2g}")
     axes.set(xlabel="learning rate", ylabel="training loss")
     axes.legend()
+    settle(picture, DPI)
     with replacing(path) as temporary:
-        picture.savefig(temporary, dpi=120, metadata={"Software": None})
+        picture.savefig(temporary, dpi=DPI, metadata={"Software": None})
 
 
 def find(

@@ -8,11 +8,13 @@ import numpy as np
 
 from lowalt.common.command import run
 from lowalt.common.files import replacing
+from lowalt.common.picture_layout import settle
 from lowalt.targets import cyclist, quadruped
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS
 
 COLUMNS = 5
+DPI = 110
 DIRECTIONS = {"UAV": (180.0, 62.0), "Bird": (180.0, 80.0), "Vehicle": (90.0, 7.0), "Pedestrian": (75.0, 8.0)}
 """The viewer's azimuth, from the front towards the right, and elevation (degrees), chosen for each category."""
 
@@ -122,7 +124,7 @@ def figure(clouds: list[Cloud]):
     lineups = [min(3.0, 2.7 * COLUMNS * span[:, 1].max() / span[:, 0].sum()) + 0.5 for span in spans]
     panels = [2.6 * aspect + 0.45 for aspect in aspects]
     heights = [top + panel * count for top, panel, count in zip(lineups, panels, rows, strict=True)]
-    result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=110, layout="constrained")
+    result = Figure(figsize=(2.7 * COLUMNS, sum(heights)), dpi=DPI, layout="constrained")
     blocks = result.subfigures(len(groups), 1, squeeze=False, height_ratios=heights)[:, 0]
     for block, members, count, top, panel, aspect in zip(
         blocks, groups, rows, lineups, panels, aspects, strict=True
@@ -140,9 +142,11 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--clouds", required=True, nargs="+", type=Path, help="cloud files")
     line.add_argument("--out", required=True, type=Path, help="picture to write (.png)")
     given = line.parse_args(arguments)
+    picture = figure([read(path) for path in given.clouds])
+    settle(picture, DPI)
     with replacing(given.out) as temporary:
         # The file holds no version or date, so that equal clouds give equal bytes.
-        figure([read(path) for path in given.clouds]).savefig(temporary, metadata={"Software": None})
+        picture.savefig(temporary, metadata={"Software": None})
 
 
 if __name__ == "__main__":

@@ -14,7 +14,10 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from lowalt.common.command import run
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.files import replacing
+from lowalt.common.picture_layout import settle
 
+DPI = 110
+"""Dots per inch."""
 MEASURED = ("method", "category", "points", "range_m", "tolerance", "seconds", "relative_error")
 PIXELS = ("category", "range_m", "tolerance", "changed_share")
 
@@ -64,7 +67,7 @@ def figure(measured: list[dict[str, str]], pixels: list[dict[str, str]]) -> Figu
     by_category = {name: [line for line in measured if line["category"] == name] for name in categories}
     counts = {name: sorted({int(line["points"]) for line in mine}) for name, mine in by_category.items()}
     tall = max(map(len, counts.values()))
-    result = Figure(figsize=(3.6 * len(categories) + 0.6, 3.3 * tall + 4), dpi=110, layout="constrained")
+    result = Figure(figsize=(3.6 * len(categories) + 0.6, 3.3 * tall + 4), dpi=DPI, layout="constrained")
     panels = result.subplots(tall + 1, len(categories), sharey="row", squeeze=False)
     for column, category in enumerate(categories):
         for row in range(tall):
@@ -98,6 +101,7 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--figure", required=True, type=Path, help="figure to write (.png)")
     given = options.parse_args(arguments)
     drawn = figure(read_csv(given.table, *MEASURED), read_csv(given.pixels, *PIXELS))
+    settle(drawn, DPI)
     with replacing(given.figure) as temporary:
         drawn.savefig(temporary, metadata={"Software": None})
 

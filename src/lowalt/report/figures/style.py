@@ -6,9 +6,14 @@ import io
 import matplotlib
 from PIL import Image
 
+from lowalt.common.picture_layout import settle
+
 matplotlib.use("Agg")  # no screen on a cluster node
 from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
+
+DPI, SVG_DPI = 110, 72
+"""Dots per inch of PNG figures; points per inch of SVG ones, which matplotlib lays out at that resolution."""
 
 SNR_LABELS = {"inf": "∞"}
 
@@ -19,7 +24,8 @@ def png(figure: Figure, colours: int = 0) -> bytes:
     colours: largest number of colours (0: no limit); a limit halves the bytes of figures full of spectra.
     """
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110, bbox_inches="tight", metadata={"Software": None})
+    settle(figure, DPI)
+    figure.savefig(buffer, format="png", dpi=DPI, bbox_inches="tight", metadata={"Software": None})
     plt.close(figure)
     if colours:
         few = Image.open(buffer).convert("RGB").quantize(colours, dither=Image.Dither.NONE)
@@ -32,6 +38,7 @@ def svg(figure: Figure) -> str:
     """Return the figure as SVG and close it; no dates and no random names inside, so equal figures are equal texts."""
     buffer = io.StringIO()
     with plt.rc_context({"svg.hashsalt": "lowalt"}):
+        settle(figure, SVG_DPI)
         figure.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None, "Creator": None})
     plt.close(figure)
     return buffer.getvalue()
