@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.heap import keep_freed
+from lowalt.common.memory import keep_freed_arrays
 from lowalt.common.network import Network, Station
 from lowalt.common.power import rms
 from lowalt.common.streams import stream
@@ -101,7 +101,7 @@ def received_signal(
     if not beyond and not link:
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
         return Received(own.signal, own.cell, arriving(own.signal), [])
-    keep_freed()
+    keep_freed_arrays()
     chain = Chain(beyond, view, partial(_drawn, scene, row, station))
     # Bounds and the engine are those of a station that receives its own signal.
     exact = share is None or math.isinf(chain.amplification) or link

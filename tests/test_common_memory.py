@@ -8,7 +8,7 @@ import sys
 PROBE = """
 import resource, sys
 import numpy as np
-from lowalt.common.heap import keep_freed
+from lowalt.common.memory import keep_freed_arrays
 
 def fetched():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
@@ -20,7 +20,7 @@ def fetched():
 fetched()
 first = fetched()
 if sys.argv[1] == "keep":
-    keep_freed()
+    keep_freed_arrays()
 fetched()
 print(first, fetched())
 """
@@ -29,7 +29,7 @@ PAGES = 10 * 4 * 200_000 * 8 // 4096
 
 
 def pages(what, **more):
-    """Pages that arrays fetched before and after `keep_freed`, or before and after nothing; more: environment."""
+    """Pages that arrays fetched before and after `keep_freed_arrays`, or before and after nothing; more: environment."""
     plain = {key: value for key, value in os.environ.items() if not key.startswith(("MALLOC_", "GLIBC_TUNABLES"))}
     done = subprocess.run([sys.executable, "-c", PROBE, what], env=plain | more, check=True, capture_output=True)
     return [int(word) for word in done.stdout.split()]
