@@ -29,7 +29,7 @@ PAGES = 10 * 4 * 200_000 * 8 // 4096
 
 
 def pages(what, **more):
-    """Pages that arrays fetched before and after `keep_freed_arrays`, or before and after nothing; more: environment."""
+    """Pages that arrays fetched before and after `keep_freed_arrays`, or before and after nothing."""
     plain = {key: value for key, value in os.environ.items() if not key.startswith(("MALLOC_", "GLIBC_TUNABLES"))}
     done = subprocess.run([sys.executable, "-c", PROBE, what], env=plain | more, check=True, capture_output=True)
     return [int(word) for word in done.stdout.split()]
