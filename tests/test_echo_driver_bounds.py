@@ -1,0 +1,160 @@
+"""Each part of the fast kernel's error bound, alone, and moments at nodes in time; by the interpreter."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from driven_echo import MOTION, SMALL, bare, computed, slow_of, sums_of, weights
+from interpreted import interpreted
+from lowalt.echo import refine
+from lowalt.echo.fast import driver, segment
+from lowalt.echo.fast.error_model import SINGLE_BLOCK
+from lowalt.echo.fast.range_bounds import MEAN, SIZE, SPREAD, cut_segments
+from lowalt.echo.fast.strip import STRIP
+from lowalt.echo.fast.workspace import SlowMoments, Symbols, workspace
+from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
+from small_echo import pieces, prepared
+
+MOMENTS_AT = interpreted(driver.moments_at)
+
+
+def test_each_kind_of_error_adds_its_own_part_to_the_bound():
+    """Relative to the sum of amplitudes, to that of peak amplitudes, and to amplitudes times distances."""
+    total, _, peaks = sums_of(MOTION)
+    none, *_ = computed(MOTION, change=bare())
+    assert (none.bounds < 1e-12 * total).all()
+    share, *_ = computed(MOTION, change=bare(plan={"share": SMALL}))
+    np.testing.assert_allclose(share.totals, total * (1 + SMALL), rtol=1e-9)
+    np.testing.assert_allclose(share.bounds, total * (1 + SMALL) * SMALL, rtol=1e-7)
+    peak, *_ = computed(MOTION, change=bare(plan={"peak": SMALL}))
+    np.testing.assert_allclose(peak.totals, total + peaks * SMALL, rtol=1e-9)
+    np.testing.assert_allclose(peak.bounds, peaks * SMALL, rtol=1e-7)
+    table, *_ = computed(MOTION, change=bare(cells={"error": SMALL}))
+    np.testing.assert_allclose(table.bounds, total * SMALL, rtol=1e-7)
+    for size, mean in ((0.5, 100.0), (100.0, 0.5)):
+        phase, *_ = computed(MOTION, change=bare(plan={"phase": SMALL}), extents={SIZE: size, MEAN: mean})
+        wanted = total * 0.5 if size == 0.5 else peaks * 0.5
+        np.testing.assert_allclose(phase.bounds, wanted * SMALL, rtol=1e-7)
+
+
+@pytest.mark.parametrize("error", [0.0, 1e-3])
+def test_roundings_of_the_moments_weigh_as_the_cell_kernels_weight_them(error):
+    """c_0 with the sum of |z|, the other c_k with that of |z| v^2, c_1 with the root of both sums' product."""
+    total, second, _ = sums_of(MOTION)
+    _, _, approximation, _ = computed(MOTION, error, change=bare())
+    *_, rounding = interpreted(driver.precision)(approximation.plan, 32, approximation.cells.kernels.shape[2])
+    big = 1e5
+    for sizes, weight in (((big, 0, 0), total), ((0, big, 0), np.sqrt(total * second)), ((0, 0, big), second)):
+        more, *_ = computed(MOTION, error, change=bare(cells={"sizes": tuple(map(float, sizes))}))
+        none, *_ = computed(MOTION, error, change=bare(cells={"sizes": (0.0, 0.0, 0.0)}))
+        tight = 1e-9 if error == 0.0 else 3e-2
+        np.testing.assert_allclose(more.bounds - none.bounds, big * rounding * weight, rtol=tight)
+
+
+@pytest.mark.parametrize(
+    ("single", "padded", "orders"), [(False, 32, 8), (True, 32, 12), (True, 1024, 16), (False, 2**22, 8)]
+)
+def test_a_moment_rounds_as_often_as_powers_products_and_sums_do(single, padded, orders):
+    """3 k + 1 roundings of a power v^k and its argument, one of its product, one for each of the block's points.
+
+    In double, sums of strips add less than a rounding in a million points; seven more are spare at most.
+    """
+    plan = SimpleNamespace(single=single)
+    unit, block, rounding = interpreted(driver.precision)(plan, padded, orders)
+    assert unit == (np.finfo(np.float32) if single else np.finfo(float)).epsneg
+    assert block == (SINGLE_BLOCK if single else STRIP)
+    needed = 3 * (orders - 1) + 2 + min(block, -(-padded // -(-padded // STRIP))) + padded / 2**20
+    assert needed <= rounding / unit <= needed + 7
+
+
+def test_totals_are_upper_bounds_by_as_many_roundings_as_a_strip_has_points():
+    """A sum of |z| rounds once a point and twenty times in each; that of |z| v^2 four times more."""
+    motion = pieces((100, 30, 170), symbols=1)
+    total, second, _ = sums_of(motion)
+    none, *_ = computed(motion, change=bare(cells={"sizes": (0.0, 0.0, 0.0)}))
+    assert 160 < (none.totals / total - 1)[0] * 2.0**53 < 240
+    more, _, approximation, _ = computed(motion, change=bare(cells={"sizes": (0.0, 0.0, 1e30)}))
+    rounding = interpreted(driver.precision)(approximation.plan, 304, approximation.cells.kernels.shape[2])[2]
+    assert 160 < (more.bounds / (1e30 * rounding * second) - 1)[0] * 2.0**53 < 240
+
+
+def test_an_error_of_the_gains_counts_relative_to_the_peak_amplitudes():
+    """Gains fitted to 1e-5: both errors and their product, bounded for each segment by `segment.fit_gains`."""
+    total, _, peaks = sums_of(MOTION)
+    found, sample, approximation, there = computed(
+        MOTION, change=lambda given: bare()(given) | {"plan": bare()(given)["plan"]._replace(fit=1e-5)}
+    )
+    gains, work, segments = approximation.gains, workspace(approximation, there.lay.amplitude), np.empty((2, 6))
+    count = cut_segments(sample.extents, gains.rates_h[0], gains.rates_v[0], refine.LONGEST, segments)
+    fits = [
+        interpreted(segment.fit_gains)(row, there.aims, gains, 1e-5, 2.0**-53, approximation.fold, work)[2]
+        for row in segments[:count]
+    ]
+    assert count == 1 and 1e-7 < fits[0] < 2.1e-5
+    np.testing.assert_allclose(found.totals, total + peaks * fits[0], rtol=1e-5)
+    assert (abs(found.totals - total) <= 1.01 * peaks * fits[0]).all()
+    np.testing.assert_allclose(found.bounds, peaks * fits[0], rtol=1e-6)
+    out, _, sample, approximation, there, _ = at_nodes(
+        lambda given: {"plan": bare()(given)["plan"]._replace(fit=1e-5), "cells": bare()(given)["cells"]}
+    )
+    gains, work, segments = approximation.gains, workspace(approximation, there.lay.amplitude), np.empty((2, 6))
+    cut_segments(sample.extents, gains.rates_h[0], gains.rates_v[0], 1, segments)
+    fits = [
+        interpreted(segment.fit_gains)(row, there.aims, gains, 1e-5, 2.0**-53, approximation.fold, work)[2]
+        for row in segments
+    ]
+    np.testing.assert_allclose(out.errors, there.lay.total / (1 - sample.extents[:, SPREAD]) ** 2 * fits, rtol=1e-5)
+
+
+def at_nodes(change=lambda _: {}, symbols=2):
+    """What `moments_at` fills, its answer, the sample, and the approximation."""
+    motion = pieces(symbols=symbols)
+    there = prepared(motion, weights(28))
+    sample = refine._Sample(there.scene, there.radio, there.refs, there.aims)
+    approximation = sample.approximation(sample.plan(0.0))
+    approximation = approximation._replace(**change(approximation))
+    gains, segments = approximation.gains, np.empty((symbols, 6))
+    count = cut_segments(sample.extents, gains.rates_h[0], gains.rates_v[0], 1, segments)
+    refs = there.refs.copy()
+    refs[:, [TURN, CELL, REST]] = 0.0
+    orders = approximation.cells.kernels.shape[2]
+    out = SlowMoments(np.full((symbols, 2, orders), np.nan), np.full((symbols, 2), np.nan), np.full(symbols, np.nan))
+    fine = MOMENTS_AT(
+        there.scene, there.lay, there.radio, 0, Symbols(np.arange(symbols), refs, sample.extents, segments[:count]),
+        there.aims, approximation, workspace(approximation, there.lay.amplitude), out,
+    )  # fmt: skip
+    return out, fine, sample, approximation, there, motion
+
+
+def test_moments_at_nodes_are_those_of_all_points_about_the_reference():
+    out, fine, _, approximation, there, motion = at_nodes()
+    moments, sums = slow_of(there, motion, approximation.cells.half, approximation.cells.kernels.shape[2])
+    size = there.lay.total
+    assert fine and abs(out.moments - moments).max() < 1e-12 * size
+    np.testing.assert_allclose(out.sums, sums, rtol=1e-11)
+    assert (out.sums >= sums * (1 - 1e-15)).all()
+    assert (out.errors < 1e-11 * size).all()
+
+
+def test_each_kind_of_error_adds_its_own_part_to_the_bound_at_nodes():
+    out, _, sample, approximation, there, _ = at_nodes(bare(cells={"sizes": (0.0, 0.0, 0.0)}))
+    total, second = out.sums.T
+    peaks = there.lay.total / (1 - sample.extents[:, SPREAD]) ** 2
+    assert (out.errors < 1e-12 * total).all()
+    for name, weight in (("share", total), ("peak", peaks), ("phase", np.minimum(
+            total * sample.extents[:, SIZE], peaks * sample.extents[:, MEAN]))):  # fmt: skip
+        more, *_ = at_nodes(bare(plan={name: SMALL}, cells={"sizes": (0.0, 0.0, 0.0)}))
+        np.testing.assert_allclose(more.errors, weight * SMALL, rtol=1e-7, err_msg=name)
+    rounding = interpreted(driver.precision)(approximation.plan, 32, approximation.cells.kernels.shape[2])[2]
+    for sizes, weight in (
+        ((1e8, 0.0, 0.0), total),
+        ((0.0, 1e8, 0.0), np.sqrt(total * second)),
+        ((0.0, 0.0, 1e8), second),
+    ):
+        more, *_ = at_nodes(bare(cells={"sizes": sizes}))
+        np.testing.assert_allclose(more.errors, 1e8 * rounding * weight, rtol=1e-6)
+
+
+def test_nodes_whose_gains_turn_too_fast_are_refused():
+    assert at_nodes(lambda given: {"plan": given.plan._replace(fit=1e-300)})[1] is False
