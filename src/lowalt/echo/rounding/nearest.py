@@ -9,6 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from lowalt.common.exact.arithmetic import two_sum
 from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo.fast.layout import Layout
 from lowalt.echo.fast.workspace import Found
@@ -79,15 +80,18 @@ def compute_again(scene, lay, radar, symbols, found, work, bits):
         twice += 1
         real, imag = cell_value(scene, lay, radar, n, found.cells[n], work)
         error = ERROR * found.totals[n]
-        still += not (same_double(real, error) and same_double(imag, error))
+        still += not (same_double(real, error, bits) and same_double(imag, error, bits))
         found.values[n] = complex(to_odd(real[0], real[1], bits), to_odd(imag[0], imag[1], bits))
     return twice, still
 
 
 @INLINED
-def same_double(x, error):
-    """Return whether all numbers within `error` of a double-double have the same nearest float32."""
-    return np.float32(x[0] + (x[1] - error)) == np.float32(x[0] + (x[1] + error))
+def same_double(x, error, bits):
+    """Return whether all numbers within `error` of a double-double have the same nearest float32; bits: work array."""
+    # Rounded to a double first, both ends could fall on the very tie that lies between them.
+    least, below = two_sum(x[0], x[1] - error)
+    most, above = two_sum(x[0], x[1] + error)
+    return np.float32(to_odd(least, below, bits)) == np.float32(to_odd(most, above, bits))
 
 
 def correct(
