@@ -43,19 +43,24 @@ def computed(motion, error=0.0, **given):
     return found, sample, approximation, there
 
 
-def truth_of(there, motion):
-    """Amplitudes (N, L) complex without the cells' phases, ranges in cells (N, L), and all cells (N, M)."""
+def amplitudes(there, motion):
+    """Truly: amplitudes (N, L) complex without the cells' phases, and ranges in cells (N, L)."""
     view = seen(there, motion)
     net = there.net
     rcs = weights(places(motion).shape[1])
     elements = np.prod(net.transmit) * np.prod(net.receive)
     scale = np.sqrt(net.power / elements) * (299_792_458 / net.carrier_hz) / (2 * TAU) ** 1.5
     size = scale * elements * np.sqrt(rcs) * view.gain_h * view.gain_v / view.range_m**2
-    z = size * np.exp(1j * TAU * (view.turn - np.rint(view.turn)))
+    return size * np.exp(1j * TAU * (view.turn - np.rint(view.turn))), view.cells
+
+
+def truth_of(there, motion):
+    """Amplitudes and ranges as `amplitudes`, and all cells (N, M)."""
+    (z, cells), net = amplitudes(there, motion), there.net
     number = np.arange(net.subcarriers)
-    weight = dirichlet((number[:, None, None] - view.cells) / net.subcarriers, net.subcarriers) / net.subcarriers
+    weight = dirichlet((number[:, None, None] - cells) / net.subcarriers, net.subcarriers) / net.subcarriers
     own = np.exp(1j * TAU / 2 * ((net.subcarriers - 1) * number % (2 * net.subcarriers)) / net.subcarriers)
-    return z, view.cells, ((weight * z).sum(-1) * own[:, None]).T
+    return z, cells, ((weight * z).sum(-1) * own[:, None]).T
 
 
 def bare(**given):
@@ -73,7 +78,7 @@ def bare(**given):
 def sums_of(motion):
     """Truly: each symbol's sum of |z|, of |z| v^2 (v in cells from the middle of all), and of the peak amplitudes."""
     *_, sample, approximation, there = computed(motion)
-    z, cells, _ = truth_of(there, motion)
+    z, cells = amplitudes(there, motion)
     ref = there.refs
     centre = np.rint((ref[:, REST] + 0.5) * 32) / 32 - 0.5
     half = approximation.cells.half
@@ -89,7 +94,7 @@ SMALL = 1e-4
 
 def slow_of(there, motion, half, orders):
     """Moments of all points about the reference's range, without its phase, times r^2, and their sums; by long sums."""
-    z, cells, _ = truth_of(there, motion)
+    z, cells = amplitudes(there, motion)
     square = there.refs[:, RANGE] ** 2
     v = (cells - there.refs[:, [CELL]] - there.refs[:, [REST]]) / half
     plain = z * np.exp(1j * TAU * there.refs[:, [TURN]]) * square[:, None]

@@ -32,7 +32,7 @@ def pieces(sizes=(5, 3, 20), symbols=3, away=(90.0, 120.0, 40.0), size=0.6, seed
 
 def places(motion) -> np.ndarray:
     """Places (N, L, 3) of all points (m)."""
-    if not isinstance(motion, Rigid):
+    if isinstance(motion, np.ndarray):
         return LONG(1) * motion
     turned = np.einsum("nlij,lj->nli", LONG(1) * motion.rotation[:, motion.part], motion.points)
     return turned + motion.translation[:, motion.part]
