@@ -88,3 +88,51 @@ def test_points_without_parts_are_as_far_as_they_stand(symbols):
     away = np.linalg.norm(translation - translation[:, 3][:, None], axis=2)
     np.testing.assert_allclose(out[:, SIZE], away.max(1), rtol=1e-11)
     np.testing.assert_allclose(out[:, MEAN], away @ weights, rtol=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_segments_are_as_long_as_the_width_of_their_first_symbol_allows(seed):
+    """A segment takes symbols while the union of their intervals, times the rate, is within the first one's room."""
+    draws = np.random.default_rng(seed)
+    extents = np.zeros((60, 5))
+    extents[:, SPREAD] = draws.uniform(0.0, 0.1, 60)
+    extents[draws.integers(0, 60, 2), SPREAD] = (1.0, 1.7)
+    for column in (PSI, OMEGA):
+        extents[:, column] = np.cumsum(draws.normal(0, 0.01, 60))
+    rates, longest, out = draws.uniform(10, 60, 2), int(draws.integers(4, 20)), np.full((60, 6), np.nan)
+    count = cut_segments.py_func(extents, *rates, longest, out)
+    # Seen from the reference, a point s ranges away from it stands within 2 s / (2 - s) of its direction cosine.
+    reach = np.where(extents[:, SPREAD] < 1, 2 * extents[:, SPREAD] / (2 - extents[:, SPREAD]), 2.0)
+    low, high = extents[:, [PSI, OMEGA]] - reach[:, None], extents[:, [PSI, OMEGA]] + reach[:, None]
+    assert np.isnan(out[count:]).all() and out[0, START] == 0 and out[count - 1, END] == 60
+    assert (out[1:count, START] == out[: count - 1, END]).all()
+    for start, end, *rest in out[:count]:
+        start, end = int(start), int(end)
+        room = 1.2 * (high[start] - low[start]) * rates + 1.0
+
+        def wide(last, start=start):
+            """Gain phase over the intervals of symbols from the first one of the segment up to `last`."""
+            return (high[start:last].max(0) - low[start:last].min(0)) * rates
+
+        assert 0 < end - start <= longest and (wide(end) <= room).all()
+        assert end == 60 or end - start == longest or (wide(end + 1) > room).any()
+        centre, half = (high[start:end].max(0) + low[start:end].min(0)) / 2, wide(end) / rates / 2
+        np.testing.assert_allclose(rest[0::2], centre, atol=1e-14)
+        np.testing.assert_allclose(rest[1::2], half * (1 + 1e-9) + 1e-9, rtol=1e-13)
+
+
+def test_a_target_at_the_station_is_as_wide_as_any_and_extents_are_rounded_up():
+    """No direction is known there; sizes are a trillionth larger than computed, whatever was rounded in them."""
+    translation = np.zeros((2, 2, 3))
+    translation[:, 1] = (3.0, 0.0, 4.0)
+    lay = SimpleNamespace(parts=None, centres=None, radii=None, weights=np.array([0.5, 0.5]), strays=None)
+    scene = SimpleNamespace(rotation=np.empty((0, 0, 3, 3)), translation=translation)
+    refs = np.zeros((2, 7))
+    refs[1, [X, Y, Z]], refs[1, RANGE] = (60.0, 80.0, 75.0), 125.0
+    out = np.full((2, 5), np.nan)
+    worst = fill_extents.py_func(scene, 0, lay, refs, SimpleNamespace(sine=0.6, cosine=0.8), out)
+    assert worst == np.inf and out[0, :3].tolist() == [0.0, 0.0, np.inf]
+    assert out[1, :2].tolist() == pytest.approx([(0.8 * 80 - 0.6 * 60) / 125, 0.6], rel=1e-15)
+    assert (out[:, SIZE] / 5 - 1).tolist() == pytest.approx([1e-12] * 2, rel=1e-3)
+    assert (out[:, MEAN] / 2.5 - 1).tolist() == pytest.approx([1e-12] * 2, rel=1e-3)
+    assert out[1, SPREAD] == pytest.approx(5 / 125, rel=1e-11)
