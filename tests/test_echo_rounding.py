@@ -57,7 +57,7 @@ def test_array_sums_hold_twenty_digits_and_their_limits(count):
 
 def prepared(net, station, motion, rcs, aim):
     """What `echo_signal` prepares and computes before values are rounded: (arguments of `nearest.correct`)."""
-    scene, radio, refs, aims, _ = api._prepare(net, station, motion, rcs, aim, None, "")
+    scene, radio, refs, aims, _ = api.prepared(net, station, motion, rcs, aim, None, "")
     found, left, method, lay = refine.compute(scene, radio, refs, aims, None)
     assert not len(left)
     return scene, lay, radio, refs, aims, found, method.pointwise_bound
@@ -68,7 +68,7 @@ def test_double_double_sums_keep_their_error(name):
     _, net, station, points, aim = CASES[name]
     rcs = np.linspace(0.5, 1.5, len(points)) if len(points) != 2 else np.ones(2)
     result = echo_signal(net, station, points[None], rcs, aim)
-    scene, radio, refs, aims, _ = api._prepare(net, station, points[None], rcs, aim, None, "")
+    scene, radio, refs, aims, _ = api.prepared(net, station, points[None], rcs, aim, None, "")
     lay = refine.compute(scene, radio, refs, aims, None)[3]
     cell, work = int(result.cell[0]), np.empty((sums.ROWS, len(lay.root) + 4))
     real, imag = sums.cell_value(scene, lay, radio, 0, cell, work)
@@ -152,7 +152,7 @@ def units(scene, lay, radio, found, n, work) -> tuple[float, float]:
 @pytest.mark.parametrize("name", CASES)
 def test_sums_in_double_keep_their_bound_in_hard_cases(name):
     _, net, station, points, aim = CASES[name]
-    scene, radio, refs, aims, _ = api._prepare(net, station, points[None], np.ones(len(points)), aim, None, "")
+    scene, radio, refs, aims, _ = api.prepared(net, station, points[None], np.ones(len(points)), aim, None, "")
     lay = refine.compute(scene, radio, refs, aims, None)[3]
     result = echo_signal(net, station, points[None], np.ones(len(points)), aim)
     found = Found.empty(1)
@@ -173,7 +173,7 @@ def test_sums_in_double_keep_their_bound_in_random_scenes():
         place = rng.normal(size=3) * 10.0 ** rng.uniform(1.5, 3.5)
         motion = cloud_in_motion(rng, 20, int(rng.integers(1, 400)), tuple(place), 10.0 ** rng.uniform(-1.5, 1), 30.0)
         aim = motion.translation[0, 0] + rng.normal(size=3) * rng.choice([0.0, 3.0])
-        scene, radio, refs, aims, _ = api._prepare(net, net.stations[0], motion, 1.3, aim, None, "")
+        scene, radio, refs, aims, _ = api.prepared(net, net.stations[0], motion, 1.3, aim, None, "")
         result = echo_signal(net, net.stations[0], motion, 1.3, aim)
         lay = refine.compute(scene, radio, refs, aims, None)[3]
         found, work = Found.empty(20), np.empty((sums.ROWS, len(lay.root) + 4))

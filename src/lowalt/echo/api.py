@@ -69,14 +69,14 @@ def echo_signal(
     than the bound that float64 can prove for this sample. Source: paper Eqs. 7 and 22 to 25.
     """
     _check_tolerance(tolerance, sample)
-    scene, radio, refs, aims, routes = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
     found, left, method, lay = refine.compute(scene, radio, refs, aims, tolerance)
     if paths is not None:
         left = np.arange(len(refs))
         method = method._replace(error=None, single=False, cheap=0, exact=0, general=len(refs))
     if len(left):
         risks = np.zeros(len(refs))
-        _check_fault(sums.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
+        check_fault(sums.signal(scene, radio, refs, left, aims, routes, found, risks), scene, station, sample)
         share, direction = method.pointwise_bound
         found.bounds[left] = found.totals[left] * share + risks[left] * direction
         found.gaps[left] = np.maximum(found.gaps[left] - 2 * found.bounds[left], 0.0)
@@ -145,10 +145,10 @@ def echo_matrix(
     """
     if columns not in ("cells", "subcarriers"):
         raise InputError(f"columns is {columns!r}, expected 'cells' or 'subcarriers'")
-    scene, radio, refs, aims, routes = _prepare(network, station, motion, rcs_m2, aim_m, paths, sample)
+    scene, radio, refs, aims, routes = prepared(network, station, motion, rcs_m2, aim_m, paths, sample)
     out = np.empty((len(refs), network.subcarriers), np.complex128)
     fault = sums.matrix(scene, radio, refs, aims, routes, columns == "cells", out)
-    _check_fault(fault, scene, station, sample)
+    check_fault(fault, scene, station, sample)
     return out
 
 
@@ -164,8 +164,11 @@ def _check_tolerance(tolerance, sample: str) -> None:
         raise InputError(f"{_named(sample)}tolerance is {tolerance!r}, expected null or a number between 0 and 1")
 
 
-def _prepare(network, station, motion, rcs_m2, aim_m, paths, sample):
-    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines, paths)."""
+def prepared(network, station, motion, rcs_m2, aim_m, paths, sample):
+    """Return the checked input as the kernels take it: (scene, radar, reference ranges, beams' cosines, paths).
+
+    Arguments and errors as for `echo_signal`.
+    """
     if station.transmitter is not None:
         raise InputError(
             f"{_named(sample)}station {station.name} is a link between two stations, expected a station that hears "
@@ -203,7 +206,7 @@ def _paths(paths: Sequence[Path] | None, shape: tuple[int, int], sample: str) ->
     return sums.Paths(*result)
 
 
-def _check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
+def check_fault(fault: int, scene: EchoScene, station: Station, sample: str) -> None:
     """Raise InputError for a point in the station, which a kernel reports as `fault` = 1 + n L + l."""
     if fault:
         points = len(scene.part) or scene.translation.shape[1]
