@@ -75,7 +75,7 @@ def test_the_tiles_stage_draws_the_instants_of_its_motion_table(dataset, tmp_pat
     tiles(["--settings", canonical({**block, **drawn}), *files, "--out", str(tmp_path / "tiles.npz")])
     found = Tiles(tmp_path / "tiles.npz")
     assert [found[number] for number in range(len(rows))] == [
-        dataset.maker.png(signal[0], row) for signal, row in zip(signals, rows, strict=True)
+        dataset.maker.png(signal[0], row, np.inf) for signal, row in zip(signals, rows, strict=True)
     ]
 
 

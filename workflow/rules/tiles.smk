@@ -1,5 +1,6 @@
 # Tiles: three spectra a station, nine images a sample, tiled 3 x 3 and encoded without loss.
-# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants
+# REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants,
+#                  and with it the clouds where spectra show range profiles
 # OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written, and for every size of tiles.reduced
 #          results/{run}/reduced/{size}/{group}-{part}.npy
 
@@ -9,6 +10,7 @@ rule tiles:
         code=code("lowalt.tiles", *options.tile_modules(config)),
         signals="results/{run}/noisy/{group}-{part}.npy",
         motion=products.tile_motion,
+        clouds=products.tile_clouds,
     output:
         tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
         reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
@@ -22,7 +24,8 @@ rule tiles:
         settings=settings.images,
         reduced=options.reduced,
         motion=options.motion,
+        clouds=options.clouds,
     shell:
         "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced}"
-        " {params.motion}"
+        " {params.motion} {params.clouds}"
         " --out {output.tiles:q} 2> {log:q}"

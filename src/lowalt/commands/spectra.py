@@ -11,6 +11,7 @@ from lowalt.common.config import load
 from lowalt.common.hardware import describe
 from lowalt.common.timing import median_s
 from lowalt.spectra import spectrum, windows, zero_index
+from lowalt.spectra.interface import OfProfiles
 from lowalt.tiles.render import Renderer, normalised
 
 REPEATS = 5
@@ -40,11 +41,14 @@ def facts(config: dict) -> list[dict]:
     found = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
-        renderer.image(signal, 0, name, image)
+        given = signal
+        if isinstance(kind, OfProfiles):
+            given = np.repeat(np.abs(signal)[None], kind.rows(settings), axis=0)
+        renderer.image(given, 0, name, image)
         found.append({
             "name": name, "title": kind.TITLE, "rows": kind.rows(settings),
             "windows": windows(symbols, settings.window, settings.hop, name), "zero_index": zero_index(name),
-            "image_ms": 1e3 * median_s(lambda name=name: renderer.image(signal, 0, name, image), REPEATS),
+            "image_ms": 1e3 * median_s(lambda name=name, given=given: renderer.image(given, 0, name, image), REPEATS),
             "settings": asdict(settings), "source": kind.SOURCE,
         })  # fmt: skip
     return found

@@ -54,7 +54,8 @@ def cloud_sha256(cloud: Cloud) -> str:
 
 def views_of(maker: Maker, row: dict, snr_db: float, columns: list[int], size: int) -> np.ndarray:
     """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB)."""
-    images = maker.renderer.some(maker.signal(row, snr_db), columns, maker.late(row))
+    signal = maker.signal(row, snr_db)
+    images = maker.renderer.some(signal, columns, maker.late(row), maker.profiles(row, snr_db, signal))
     return images if images.shape[-1] == size else resize(images, size)
 
 

@@ -69,7 +69,7 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
         if kind == "recipe":
             return npy(maker.received(rows[number])[0])
         signal = maker.signal(rows[number], levels[level])
-        return npy(signal) if kind == "signal" else maker.png(signal, rows[number])
+        return npy(signal) if kind == "signal" else maker.png(signal, rows[number], levels[level])
 
     powers, effects = None, maker.echo["effects"]
     canceller = (effects["canceller"] or {}) if "canceller" in effects else None

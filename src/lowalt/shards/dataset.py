@@ -179,7 +179,9 @@ class Dataset:
         Raises: InputError naming the sample that cannot be computed.
         """
         signal = self.made_signal(place)
-        return Sample(self.maker.tile(signal, self.row(place)), signal, json.loads(self.made_record(place)))
+        return Sample(
+            self.maker.tile(signal, self.row(place), place.snr_db), signal, json.loads(self.made_record(place))
+        )
 
     def __getitem__(self, number: int) -> Sample:
         return self.made(self.place(number))
@@ -208,11 +210,13 @@ class Dataset:
         "recipe", which hold the same)."""
         place = self.place(number)
         signal = self.made_signal(place)
-        return self.made_record(place), self.maker.png(signal, self.row(place)) if kind == "image" else npy(signal)
+        data = self.maker.png(signal, self.row(place), place.snr_db) if kind == "image" else npy(signal)
+        return self.made_record(place), data
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""
-        return self.maker.tile(self.signal(number), self.row(self.place(number)))
+        place = self.place(number)
+        return self.maker.tile(self.made_signal(place), self.row(place), place.snr_db)
 
 
 class Endless:

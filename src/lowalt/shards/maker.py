@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.echo.chunk import clean_signals
 from lowalt.effects.lateness import lateness
@@ -16,6 +17,7 @@ from lowalt.noise.chunk import noisy_signals
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.png import encode
+from lowalt.tiles.profiles import Profiles, profile_cells
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images
 
@@ -44,12 +46,26 @@ class Maker:
     def __getstate__(self) -> dict:
         """State for pickle, without tables and kept echoes."""
         # Workers prepare tables of their own.
-        return {**{name: value for name, value in self.__dict__.items() if name != "renderer"}, "_received": {}}
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("renderer", "_profiles")}
+        return {**kept, "_received": {}}
 
     @functools.cached_property
     def renderer(self) -> Renderer:
         """The renderer that turns signals into tiles."""
         return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
+
+    @functools.cached_property
+    def _profiles(self) -> Profiles | None:
+        """What makes range profiles, where a spectrum shows them."""
+        cells = profile_cells(Spectra.from_settings(self.render["spectra"]), self.network)
+        if cells and self.echo["effects"]:
+            raise InputError(f"spectra: range profiles together with effects {sorted(self.echo['effects'])}")
+        return Profiles(self.network, self.clouds, self.seed, cells, self.kept) if cells else None
+
+    def profiles(self, row: dict, snr_db: float, signal: np.ndarray) -> np.ndarray | None:
+        """Return the magnitudes of the range profiles of one sample, (stations, cells, symbols); None where no spectrum
+        shows them. signal: its noisy signals (stations, symbols)."""
+        return self._profiles.magnitudes(row, snr_db, signal) if self._profiles else None
 
     def received(self, row: dict, snr_db: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
         """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
@@ -99,10 +115,10 @@ class Maker:
         """Return how late the symbols of a motion model are, (stations, symbols); None where images do not ask."""
         return lateness(self.render["spectra"], self.echo["effects"], self.network, self.seed, row)
 
-    def tile(self, signal: np.ndarray, row: dict) -> np.ndarray:
-        """Return the tile of one sample of the motion model `row` from its signals (stations, symbols)."""
-        return self.renderer.tile(signal, late=self.late(row))
+    def tile(self, signal: np.ndarray, row: dict, snr_db: float) -> np.ndarray:
+        """Return the tile of one sample of the motion model `row` at an SNR (dB); signal: (stations, symbols), its own."""
+        return self.renderer.tile(signal, late=self.late(row), profiles=self.profiles(row, snr_db, signal))
 
-    def png(self, signal: np.ndarray, row: dict) -> bytes:
-        """Return the PNG file of the tile of one sample of the motion model `row`."""
-        return encode(self.tile(signal, row), self.images.palette)
+    def png(self, signal: np.ndarray, row: dict, snr_db: float) -> bytes:
+        """Return the PNG file of the tile of one sample of the motion model `row` at an SNR (dB)."""
+        return encode(self.tile(signal, row, snr_db), self.images.palette)

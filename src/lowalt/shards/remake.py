@@ -81,7 +81,7 @@ class Remaker:
         row, snr_db = row_of(entry)
         seed = entry["seed"]
         maker, signal = self._maker(seed), self.signal(entry)
-        data = maker.png(signal, row) if self.shards.kind == "image" else npy(signal)
+        data = maker.png(signal, row, snr_db) if self.shards.kind == "image" else npy(signal)
         row = accompanied(row, self.shards.index["echo"]["effects"], seed)
         return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.spectra.interface import KnowsTimes, Spectrum
+from lowalt.spectra.interface import KnowsTimes, OfProfiles, Spectrum
 from lowalt.spectra.settings import windows
 
 LISTED = ("vrp", "trp", "vt")
@@ -52,6 +52,11 @@ def named(block: Iterable[str]) -> tuple[str, ...]:
     if not found:
         raise InputError(f"spectra: none named, expected some of {list(NAMES)}")
     return found
+
+
+def profiled(block: Iterable[str]) -> bool:
+    """Return whether one of a configuration's spectra is made of range profiles."""
+    return any(isinstance(spectrum(name), OfProfiles) for name in named(block))
 
 
 def zero_index(name: str) -> int:

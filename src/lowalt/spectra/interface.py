@@ -65,6 +65,18 @@ class KnowsTimes(Protocol):
 
 
 @runtime_checkable
+class OfProfiles(Protocol):
+    """A spectrum that is made of range profiles instead of signals; its rows are range cells, its `speeds` ranges."""
+
+    AXIS: str
+    """Name and unit of its rows in figures."""
+
+    def fill_profile(self, profile: np.ndarray, settings: Any, out: np.ndarray) -> None:
+        """Fill out (rows, starts) as `fill`, of magnitudes (cells, symbols) float32 of one profile, at most 1."""
+        ...
+
+
+@runtime_checkable
 class OnDevice(Protocol):
     """A spectrum that PyTorch can compute too; the others are computed on the processor."""
 

@@ -7,7 +7,7 @@ import numpy as np
 from lowalt.common.errors import InputError
 
 
-def _whole(where: str, value: object, least: int) -> int:
+def whole(where: str, value: object, least: int) -> int:
     """Return an integer of at least `least`. Raises: InputError naming `where`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{where} is {value!r}, expected an integer >= {least}")
@@ -16,7 +16,7 @@ def _whole(where: str, value: object, least: int) -> int:
 
 def _power_of_two(where: str, value: object, least: int) -> int:
     """Return a power of two of at least `least`. Raises: InputError naming `where`."""
-    number = _whole(where, value, least)
+    number = whole(where, value, least)
     # The sliding transform doubles its window and its points level by level.
     if number & (number - 1):
         raise InputError(f"{where} is {number}, expected a power of two")
@@ -33,7 +33,7 @@ class Fourier:
 
     def __post_init__(self) -> None:
         _power_of_two("spectra: window", self.window, 2)
-        _whole("spectra: hop", self.hop, 1)
+        whole("spectra: hop", self.hop, 1)
         _power_of_two("spectra: points", self.points, self.window)
 
 
@@ -48,8 +48,8 @@ class Transfer:
     speed_step_mps: float
 
     def __post_init__(self) -> None:
-        _whole("spectra.vt.window", self.window, 1)
-        _whole("spectra.vt.hop", self.hop, 1)
+        whole("spectra.vt.window", self.window, 1)
+        whole("spectra.vt.hop", self.hop, 1)
         values = (self.speed_min_mps, self.speed_max_mps, self.speed_step_mps)
         for name, value in zip(("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True):
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
@@ -63,6 +63,22 @@ class Transfer:
         count = int(np.floor((self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps + 1e-9)) + 1
         last = self.speed_min_mps + (count - 1) * self.speed_step_mps
         return np.linspace(self.speed_min_mps, last, count)
+
+
+@dataclass(frozen=True)
+class RangeCells:
+    """A range profile over slow time: `window` and `hop` in symbols, a column averages the powers of a window; `cells`
+    of a profile, odd."""
+
+    window: int
+    hop: int
+    cells: int
+
+    def __post_init__(self) -> None:
+        whole("spectra.hrrp.window", self.window, 1)
+        whole("spectra.hrrp.hop", self.hop, 1)
+        if whole("spectra.hrrp.cells", self.cells, 3) % 2 == 0:
+            raise InputError(f"spectra.hrrp.cells is {self.cells}, expected an odd number: the strongest is the middle")
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:

@@ -15,14 +15,16 @@ from lowalt.tiles.signals import load_signals
 def encoded(
     signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None],
     late: Callable[[int], np.ndarray | None] = lambda model: None,
+    profiles: Callable[[int, int, np.ndarray], np.ndarray | None] = lambda model, level, sample: None,
 ) -> Iterator[bytes]:  # fmt: skip
     """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile.
 
-    late: how late a model's symbols are, as in `Renderer.tile`.
+    late: how late a model's symbols are, profiles: range profiles of a model at an SNR, both as in `Renderer.tile`.
     """
     palette, models = tiles.images.palette, reported(signals, len(signals), "models")
-    for number, (place, sample) in enumerate((place, one) for place, model in enumerate(models) for one in model):
-        tile = tiles.tile(sample, late=late(place))
+    samples = ((place, level, one) for place, model in enumerate(models) for level, one in enumerate(model))
+    for number, (place, level, sample) in enumerate(samples):
+        tile = tiles.tile(sample, late=late(place), profiles=profiles(place, level, sample))
         seen(number, tile)
         yield encode(tile, palette)
 
@@ -39,15 +41,17 @@ def main(arguments: list[str]) -> None:
         metavar="SIZE=PATH",
         help="also write the images at SIZE pixels a side (.npy)",
     )
-    options.add_argument("--motion", help="the chunk's motion table, where spectra know the instants of late symbols")
+    options.add_argument("--motion", help="the chunk's motion table, for late symbols and range profiles")
+    options.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range profiles")
     given = options.parse_args(arguments)
-    drawn = given.settings.pop("drawn", None)
+    drawn, profiled = given.settings.pop("drawn", None), given.settings.pop("profiled", None)
     tiles = Renderer.from_settings(given.settings)
     late = _late(given.settings["spectra"], drawn, tiles, given.motion) if drawn else lambda model: None
+    more = {"profiles": _profiles(profiled, tiles, given.motion, given.clouds)} if profiled else {}
     signals = load_signals(given.signals, tiles.network)
     targets = [reduced.target(text) for text in given.reduced]
     with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
-        files.write(given.out, encoded(signals, tiles, seen, late))
+        files.write(given.out, encoded(signals, tiles, seen, late, **more))
 
 
 def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
@@ -57,6 +61,20 @@ def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[
 
     rows, (seed, effects) = read_table(motion), pick(drawn, "seed", "effects")
     return lambda model: lateness(spectra, effects, tiles.network, seed, rows[model])
+
+
+def _profiles(
+    profiled: dict, tiles: Renderer, motion: str, clouds: list[str]
+) -> Callable[[int, int, np.ndarray], np.ndarray | None]:
+    """The range profiles of a chunk's samples by model, SNR and signals; profiled: {seed, snr_db} of the noise."""
+    from lowalt.motion import read_table
+    from lowalt.targets.cloud import read
+    from lowalt.tiles.profiles import Profiles, profile_cells
+
+    rows, (seed, snrs) = read_table(motion), pick(profiled, "seed", "snr_db")
+    found = {cloud.subtype: cloud for cloud in map(read, clouds)}
+    maker = Profiles(tiles.network, found, seed, profile_cells(tiles.spectra, tiles.network))
+    return lambda model, level, sample: maker.magnitudes(rows[model], float(snrs[level]), sample)
 
 
 if __name__ == "__main__":

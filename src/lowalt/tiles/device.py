@@ -13,7 +13,7 @@ from torch import Tensor
 
 from lowalt.common.errors import InputError
 from lowalt.spectra import spectrum
-from lowalt.spectra.interface import OnDevice
+from lowalt.spectra.interface import OfProfiles, OnDevice
 from lowalt.tiles.render import Renderer, levels
 
 
@@ -37,10 +37,12 @@ class DeviceRenderer:
     def __init__(self, renderer: Renderer, device: str | torch.device = "cpu") -> None:
         """Copy the tables of `renderer` to `device`.
 
-        Raises: InputError for spectra that know the instants of symbols, which are computed on the processor alone.
+        Raises: InputError for spectra of range profiles, or that know the instants of symbols: the processor makes both.
         """
         if renderer.spectra.times != "even":
             raise InputError(f"spectra.times is {renderer.spectra.times!r}, expected even on a device")
+        if any(isinstance(spectrum(name), OfProfiles) for name in renderer.spectra):
+            raise InputError(f"spectra: {list(renderer.spectra)}, expected none of range profiles on a device")
         self.renderer, self.device = renderer, torch.device(device)
         self._plans = {name: [self._put(table) for table in renderer.plan(name)] for name in renderer.spectra}
         self._tables = {

@@ -9,62 +9,17 @@ so nothing is lost.
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.spectra import Spectra, spectrum, windows
-from lowalt.spectra.interface import KnowsTimes
+from lowalt.spectra.interface import KnowsTimes, OfProfiles
 from lowalt.spectra.known_times import even
+from lowalt.tiles.pixels import index_image
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
-
-
-@njit(cache=True)
-def _peak(values):
-    """The largest |value| of an image, as an array of one float32."""
-    bits = values.view(np.int32)
-    top = np.int32(0)
-    # Non-negative floats order like their bits, which keeps the search free of branches.
-    for j in range(bits.shape[0]):
-        row = bits[j]
-        for c in range(row.size):
-            top = max(top, row[c] & np.int32(0x7FFFFFFF))
-    peak = np.empty(1, np.int32)
-    peak[0] = top
-    return peak.view(np.float32)
-
-
-@njit(cache=True)
-def _index(values, signed, lowest, shift, base, cut, out):
-    """Index values of one image (S, S) float32 -> out (S, S) uint8; see `lowalt.tiles.scale`."""
-    size = values.shape[1]
-    largest = _peak(values)[0]
-    if largest == 0:
-        out[:] = 128 if signed else 0
-        return
-    x = np.empty(size, np.float32)
-    bits = x.view(np.int32)
-    keys = np.empty(size, np.uint32)
-    steps = np.empty(size, np.int32)
-    for j in range(values.shape[0]):
-        line = values[j]
-        row = out[j]
-        # Short loops over a row, which the compiler turns into vectors one by one.
-        for c in range(size):
-            x[c] = np.abs(line[c]) / largest
-        for c in range(size):
-            keys[c] = max(bits[c] - lowest, np.int32(0)) >> shift
-        for c in range(size):
-            steps[c] = base[keys[c]] + np.int32(bits[c] >= cut[keys[c]])
-        if signed:
-            for c in range(size):
-                row[c] = 128 - steps[c] if line[c] < 0 else 128 + steps[c]
-        else:
-            for c in range(size):
-                row[c] = steps[c]
 
 
 class Renderer:
@@ -77,6 +32,7 @@ class Renderer:
         """
         self.network, self.spectra, self.images = network, spectra, images
         spectra.check(network.symbols)
+        self._of_profiles = {name for name in spectra if isinstance(spectrum(name), OfProfiles)}
         self._plans = {name: self._plan(name) for name in spectra}
         self._tables = {
             name: [
@@ -136,14 +92,17 @@ class Renderer:
     def values(
         self, signal: np.ndarray, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None
     ) -> None:
-        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,).
+        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,), or of a
+        profile (cells, symbols) float32 where the spectrum is made of profiles.
 
         late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None for 0. Where
         `spectra.times` is "known", symbols that are exactly zero were not received.
         """
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
         setting, kind = self.spectra[name], spectrum(name)
-        if self.spectra.times == "even" or even(signal, late):
+        if name in self._of_profiles:
+            kind.fill_profile(signal, setting, values)  # type: ignore[attr-defined]
+        elif self.spectra.times == "even" or even(signal, late):
             re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
             kind.fill(re, im, setting, self._tables[name][station], values)
         else:
@@ -174,12 +133,23 @@ class Renderer:
     ) -> None:
         """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as in `values`."""
         self.values(signal, station, name, self._image, late)
-        _index(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
+        index_image(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
 
-    def tile(self, signals: np.ndarray, out: np.ndarray | None = None, late: np.ndarray | None = None) -> np.ndarray:
+    def _source(self, name: str, signal: np.ndarray, profiles: np.ndarray | None, station: int) -> np.ndarray:
+        """What the spectrum `name` is made of at a station: its normalised signal, or its range profile."""
+        if name not in self._of_profiles:
+            return signal
+        if profiles is None:
+            raise InputError(f"spectrum {name}: made of range profiles, and a signal alone does not hold them")
+        return profiles[station]
+
+    def tile(
+        self, signals: np.ndarray, out: np.ndarray | None = None, late: np.ndarray | None = None,
+        profiles: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
         """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S) uint8.
 
-        late: (stations, symbols), as in `values`, None for symbols on time.
+        late: (stations, symbols), as in `values`, None for symbols on time; profiles: (stations, cells, symbols).
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
@@ -189,10 +159,14 @@ class Renderer:
             signal = normalised(signals[station])
             for view, name in enumerate(self.spectra):
                 part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
-                self.image(signal, station, name, part, None if late is None else late[station])
+                source = self._source(name, signal, profiles, station)
+                self.image(source, station, name, part, None if late is None else late[station])
         return out
 
-    def some(self, signals: np.ndarray, numbers: Sequence[int], late: np.ndarray | None = None) -> np.ndarray:
+    def some(
+        self, signals: np.ndarray, numbers: Sequence[int], late: np.ndarray | None = None,
+        profiles: np.ndarray | None = None,
+    ) -> np.ndarray:  # fmt: skip
         """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n, S, S) uint8.
 
         They are those of `tile`, and only these are computed.
@@ -204,7 +178,8 @@ class Renderer:
         for place, number in enumerate(numbers):
             station, view = divmod(int(number), len(names))
             own = None if late is None else late[station]
-            self.image(normalised(signals[station]), station, names[view], out[place], own)
+            source = self._source(names[view], normalised(signals[station]), profiles, station)
+            self.image(source, station, names[view], out[place], own)
         return out
 
 

@@ -8,6 +8,7 @@ from typing import Any
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.effects.lateness import timed
+from lowalt.spectra.catalogue import profiled
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
@@ -111,8 +112,13 @@ class DataProducts:
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
     def tile_motion(self, wildcards: Any) -> list[str]:
-        """The motion table of a chunk, where spectra know the instants of late symbols; none in other runs."""
-        return [self.motion(wildcards)] if timed(self._config) else []
+        """The motion table of a chunk, where spectra know the instants of late symbols or show range profiles; none in
+        other runs."""
+        return [self.motion(wildcards)] if timed(self._config) or profiled(self._config["spectra"]) else []
+
+    def tile_clouds(self, wildcards: Any) -> list[str]:
+        """The clouds of a chunk, where spectra show range profiles; none in other runs."""
+        return self.chunk_clouds(wildcards) if profiled(self._config["spectra"]) else []
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal) or clean

@@ -8,6 +8,7 @@ from typing import Any
 
 from lowalt.effects.catalogue import dotted
 from lowalt.effects.lateness import timed
+from lowalt.spectra.catalogue import profiled
 
 
 def occluders(wildcards: Any, input: Any) -> str:
@@ -30,9 +31,15 @@ def noise_modules(config: dict) -> list[str]:
     return ["lowalt.effects.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
+def clouds(wildcards: Any, input: Any) -> str:
+    """The clouds of a chunk, where the job has them."""
+    return f"--clouds {input.clouds}" if input.clouds else ""
+
+
 def tile_modules(config: dict) -> list[str]:
-    """The modules that the tiles stage loads where spectra know the instants of late symbols."""
-    return ["lowalt.effects.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
+    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range profiles."""
+    late = ["lowalt.effects.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
+    return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late
 
 
 def content(wildcards: Any, input: Any) -> str:

@@ -13,6 +13,7 @@ from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import Scheme
 from lowalt.shards.clean import refuse
+from lowalt.spectra.catalogue import named, profiled
 from lowalt.targets.records import missing_inputs, records_of
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
@@ -38,6 +39,21 @@ def refuse_input(config: dict) -> None:
     block = config["recognition"]
     if block.get("input") == "dataset" and block["cache"]:
         raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
+
+
+def refuse_profiles(config: dict) -> None:
+    """Refuse range profiles where no stage makes them: in scenes, of links, and of shards that hold signals alone."""
+    if not profiled(config["spectra"]):
+        return
+    links = sorted(name for name, place in config["network"]["stations"].items() if "transmit" in place)
+    kind = config["shards"]["kind"]
+    given = {"effects": sorted(config["effects"]), "links": links, "shards.kind": "" if kind == "image" else kind}
+    for key, value in given.items():
+        if value:
+            raise InputError(
+                f"spectra: {list(named(config['spectra']))} and {key} is {value!r}, expected no {key}: range profiles "
+                "are made of clean targets, by stations that hear themselves, where tiles are"
+            )
 
 
 def refuse_signals(config: dict, scheme: Scheme) -> None:

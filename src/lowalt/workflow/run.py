@@ -19,6 +19,7 @@ from lowalt.recognition.schemes import Scheme, columns_in, named
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named as spectra_named
 from lowalt.targets.records import missing_inputs, records_of
+from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
@@ -28,6 +29,7 @@ from lowalt.workflow.refusals import (
     refuse_heights,
     refuse_input,
     refuse_no_files,
+    refuse_profiles,
     refuse_signals,
     refuse_sizes,
     refuse_starts,
@@ -61,7 +63,10 @@ class Run:
         classes, plan = classes_of(published), Plan.of(config, published)
         refuse_heights(config["motion"]["height_m"], published, classes)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
-        Spectra.from_settings(config["spectra"]).check(Network.from_settings(config["network"]).symbols)
+        network, spectra = Network.from_settings(config["network"]), Spectra.from_settings(config["spectra"])
+        spectra.check(network.symbols)
+        refuse_profiles(config)
+        profile_cells(spectra, network)
         Images.from_settings(config["images"])
         block = config["recognition"]
         schemes = {

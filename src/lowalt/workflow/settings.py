@@ -13,6 +13,7 @@ from lowalt.common.shipped import as_named
 from lowalt.effects.lateness import timed
 from lowalt.effects.set_noise import in_all_cells
 from lowalt.motion.sample import masts_in_reach
+from lowalt.spectra.catalogue import profiled
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
@@ -92,12 +93,16 @@ class Settings:
         return self._text("noise", *snrs, **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
-        """Network, spectra and images; what late symbols are drawn from, where spectra know their instants."""
+        """Network, spectra and images; what late symbols are drawn from, where spectra know their instants; what the
+        noise of range profiles is drawn from, where spectra show them."""
         blocks = self._blocks("network", "spectra", "images")
         if timed(self._config):
             given = {"slow_time": self._config["effects"]["slow_time"]}
             blocks["drawn"] = {"seed": self._config["seed"], "effects": given}
-        return self._text("images", **blocks)
+        if not profiled(self._config["spectra"]):
+            return self._text("images", **blocks)
+        snrs = self._snrs(wildcards)
+        return self._text("images", *snrs, **blocks, profiled={"seed": self._config["seed"], "snr_db": snrs})
 
     def index(self, wildcards: Any) -> str:
         """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""

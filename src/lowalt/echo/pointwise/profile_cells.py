@@ -9,7 +9,6 @@ from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.terms import cell_phase, cell_weight, sin_pi, terms
 
 
-
 @INNER_VECTOR
 def _add_shares(z, first, last, at, top, s, c, sines, cosines, re, im):
     """Add z top / sin(pi (k + a) / M) to the cells first .. last - 1, where k = i + at - K; s, c: of pi a / M."""

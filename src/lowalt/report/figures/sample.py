@@ -7,11 +7,13 @@ import numpy as np
 from lowalt.common.network import Station
 from lowalt.report.figures.style import plt, png
 from lowalt.spectra import spectrum
+from lowalt.spectra.interface import OfProfiles
 from lowalt.tiles.render import Renderer, split
 
 
 class Axes(NamedTuple):
-    """The scales of an image: its width (s), and the speeds (m/s) of its lowest and highest row."""
+    """The scales of an image: its width (s), and the speeds (m/s) of its lowest and highest row; ranges (cells) for a
+    spectrum of range profiles."""
 
     seconds: float
     bottom_mps: float
@@ -46,9 +48,11 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
             extent=(0.0, axes.seconds, axes.bottom_mps, axes.top_mps),
         )  # fmt: skip
         panel.set_ylim(sorted(axes[1:]))
-        most = max(map(abs, axes[1:]))
-        panel.set_title(f"{station.name}: {spectrum(name).TITLE}\nfolds beyond {most:.1f} m/s", fontsize=8)
-        panel.set_ylabel("" if column else "radial speed (m/s)\nreceding upwards", fontsize=8)
+        most, kind = max(map(abs, axes[1:])), spectrum(name)
+        ranged = isinstance(kind, OfProfiles)
+        below = kind.AXIS if ranged else f"folds beyond {most:.1f} m/s"
+        panel.set_title(f"{station.name}: {kind.TITLE}\n{below}", fontsize=8)
+        panel.set_ylabel("" if column or ranged else "radial speed (m/s)\nreceding upwards", fontsize=8)
         panel.set_xlabel("time (s)" if row == shape[0] - 1 else "", fontsize=8)
         panel.tick_params(labelsize=7)
     return png(drawn)

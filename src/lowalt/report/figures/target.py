@@ -19,6 +19,7 @@ from lowalt.motion.sample import draw, region_polygon
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
 from lowalt.spectra import Spectra, spectrum
+from lowalt.spectra.interface import OfProfiles
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gallery import bones
 
@@ -107,6 +108,8 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
     given = (station.frequency_hz, network.symbol_interval_s)
     for panel, (name, windows) in zip(panels, settings.items(), strict=False):
         kind = spectrum(name)
+        if isinstance(kind, OfProfiles):
+            continue
         values = kind.definition(signal, windows, name, *given)
         values = values if kind.SIGNED else _decibel(values)
         half = windows.window / 2
