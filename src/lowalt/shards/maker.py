@@ -116,7 +116,7 @@ class Maker:
         return lateness(self.render["spectra"], self.echo["effects"], self.network, self.seed, row)
 
     def tile(self, signal: np.ndarray, row: dict, snr_db: float) -> np.ndarray:
-        """Return the tile of one sample of the motion model `row` at an SNR (dB); signal: (stations, symbols), its own."""
+        """Return the tile of one sample of the motion model `row` at an SNR (dB); signal: (stations, symbols)."""
         return self.renderer.tile(signal, late=self.late(row), profiles=self.profiles(row, snr_db, signal))
 
     def png(self, signal: np.ndarray, row: dict, snr_db: float) -> bytes:

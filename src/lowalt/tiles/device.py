@@ -37,7 +37,7 @@ class DeviceRenderer:
     def __init__(self, renderer: Renderer, device: str | torch.device = "cpu") -> None:
         """Copy the tables of `renderer` to `device`.
 
-        Raises: InputError for spectra of range profiles, or that know the instants of symbols: the processor makes both.
+        Raises: InputError for spectra of range profiles, or that know the instants of symbols: processors make both.
         """
         if renderer.spectra.times != "even":
             raise InputError(f"spectra.times is {renderer.spectra.times!r}, expected even on a device")
