@@ -56,7 +56,7 @@ def named(block: Iterable[str]) -> tuple[str, ...]:
 
 def profiled(block: Iterable[str]) -> bool:
     """Return whether one of a configuration's spectra is made of range profiles."""
-    return any(isinstance(spectrum(name), OfProfiles) for name in named(block))
+    return any(isinstance(spectrum(name), OfProfiles) for name in NAMES if name in set(block))
 
 
 def zero_index(name: str) -> int:
