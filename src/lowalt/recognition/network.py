@@ -25,7 +25,7 @@ from torch import nn
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.recognition import own_backbone, spectrogram_transformer
+from lowalt.recognition import convolution_transformer, own_backbone, spectrogram_transformer
 from lowalt.recognition.fusion import Fused
 from lowalt.recognition.height_cue import HeightCue, WithHeight, images_of
 from lowalt.recognition.schemes import SPECTRA, Scheme
@@ -34,17 +34,23 @@ KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forw
 
 
 def backbone(name: str, weights: str, size: int) -> nn.Module:
-    """Return the timm model `name`, one of `spectrogram_transformer`, or the user's own FILE.py:FUNCTION, as a feature
-    extractor for size x size RGB images.
+    """Return the timm model `name`, one of `spectrogram_transformer` or `convolution_transformer`, or the user's own
+    FILE.py:FUNCTION, as a feature extractor for size x size RGB images.
 
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
-    own = own_backbone.file_of(name) is not None
-    if own or name in spectrogram_transformer.SHAPES:
+    ours = None
+    if own_backbone.file_of(name) is not None:
+        ours = own_backbone.backbone
+    elif name in spectrogram_transformer.SHAPES:
+        ours = spectrogram_transformer.backbone
+    elif name in convolution_transformer.NAMES:
+        ours = convolution_transformer.backbone
+    if ours is not None:
         if weights != "none":
             raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
-        return (own_backbone if own else spectrogram_transformer).backbone(name, size)
+        return ours(name, size)
     if not timm.is_model(name):
         raise InputError(f"network: backbone {name!r} is not a timm model (timm {timm.__version__})")
     options: dict = {"num_classes": 0}
