@@ -79,7 +79,9 @@ class Palettes(nn.Module):
     def __init__(self, palettes: np.ndarray, spectra: tuple[int, ...], mean: tuple, std: tuple) -> None:
         """palettes (spectra, 256, 3) uint8 by SPECTRA; mean, std: per channel, on colours in 0..1."""
         super().__init__()
-        if np.shape(palettes) != (len(SPECTRA), 256, 3):
+        shape = np.shape(palettes)
+        # The palettes of the first spectra are enough where the scheme sees no later one.
+        if len(shape) != 3 or shape[1:] != (256, 3) or not max(spectra) < shape[0] <= len(SPECTRA):
             raise InputError(f"palettes have shape {np.shape(palettes)}, expected ({len(SPECTRA)}, 256, 3)")
         colours = torch.as_tensor(np.asarray(palettes, dtype=np.float32)[list(spectra)] / 255)
         self.register_buffer("table", (colours - torch.tensor(mean)) / torch.tensor(std))
