@@ -74,15 +74,17 @@ def test_an_order_without_a_square_is_refused():
 # Amplifier
 
 
-def test_a_saturated_waveform_is_that_of_the_time_signal_summed_directly(rng):
-    settings, count = {"backoff_db": 2.0, "smoothness": 2.0}, 12
+@pytest.mark.parametrize("count", [12, 256])
+@pytest.mark.parametrize("smoothness", [2.0, 3.0])
+def test_a_saturated_waveform_is_that_of_the_time_signal_summed_directly(rng, count, smoothness):
+    settings = {"backoff_db": 2.0, "smoothness": smoothness}
     sent = waveform.sent(rng, 3, count)
     over = power_amplifier.OVERSAMPLING
     t = np.arange(over * count) / (over * count)
     tones = np.exp(2j * np.pi * np.outer(np.arange(count) - count // 2, t))
     signal = sent @ tones
     limit = np.sqrt(count) * 10**0.1
-    loud = signal / (1 + (abs(signal) / limit) ** 4) ** 0.25
+    loud = signal / (1 + (abs(signal) / limit) ** (2 * smoothness)) ** (0.5 / smoothness)
     truth = loud @ tones.conj().T / (over * count)
     np.testing.assert_allclose(power_amplifier.aired(settings, sent), truth, atol=1e-13)
 

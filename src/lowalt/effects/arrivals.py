@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lowalt.effects import gain_times, interpolation, lit_points, time_series, waveform
+from lowalt.effects import gain_times, interpolation, lit_points, time_series, transforms, waveform
 from lowalt.effects.gain_times import Instant
 from lowalt.effects.near_field import SYMBOLS
 from lowalt.effects.response import ImagePath
@@ -119,7 +119,7 @@ def _in_orders(
     for order, shape in zip(range(orders)[::-1], shapes[::-1], strict=True):
         if order > 0 and turned is None:
             tones = first.tones(series[0][order], now)
-            weighed(np.fft.ifft(tones, axis=1, out=tones), shape, order == orders - 1, every, samples)
+            weighed(transforms.inverse(tones, out=tones), shape, order == orders - 1, every, samples)
             continue
         spectra = [first.spectrum(mine[order]) for mine in series]
         whole = sum(spectra[1:], spectra[0])
@@ -131,7 +131,7 @@ def _in_orders(
             if cut:
                 tones = np.empty((len(every[lit]), len(shape)), np.complex128)
                 carried_before(spectrum, turned, before, now, every[lit], tones)
-                weighed(np.fft.ifft(tones, axis=1, out=tones), shape[:cut], False, every[lit], samples)
+                weighed(transforms.inverse(tones, out=tones), shape[:cut], False, every[lit], samples)
     return still, samples
 
 

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import strongest_cell, waveform
+from lowalt.effects import strongest_cell, transforms, waveform
 from lowalt.effects.catalogue import NamedEffect, providing, stream_name
 from lowalt.effects.interface import ChangesResponse, Quantises
 from lowalt.effects.sending import Sending
@@ -93,7 +93,7 @@ class Receiving:
             given = self.frame, self.draws(stream_name(effect.name))
             takes = bool(providing([effect], TakesTones))
             if tones is None and takes:
-                tones = np.fft.fft(samples, axis=1)
+                tones = transforms.forward(samples)
             stays = len(providing(left[place:], ChangesTones)) == len(left) - place
             next_takes = len(providing(left[place : place + 2], TakesTones)) == 2
             if tones is not None and (stays or next_takes) and providing([effect], ChangesTones):
@@ -101,11 +101,11 @@ class Receiving:
             elif takes:
                 samples, tones = effect.module.retimed(effect.settings, tones, *given), None
             else:
-                samples, tones = samples if tones is None else np.fft.ifft(tones, axis=1, out=tones), None
+                samples, tones = samples if tones is None else transforms.inverse(tones, out=tones), None
                 if providing([effect], Quantises):
                     self._converted = effect, samples
                 samples = effect.module.receive(effect.settings, samples, *given)
-        return Heard(*self.sending.carrying(np.fft.fft(samples, axis=1) if tones is None else tones, rows))
+        return Heard(*self.sending.carrying(transforms.forward(samples) if tones is None else tones, rows))
 
     @property
     def step(self) -> float:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from lowalt.common.network import Network
-from lowalt.effects import waveform
+from lowalt.effects import transforms, waveform
 from lowalt.effects.catalogue import NamedEffect, providing
 from lowalt.effects.interface import ChangesWaveform, DrawsData, PicksSubcarriers
 from lowalt.effects.tone_loops import divided
@@ -54,17 +54,17 @@ class Sending:
     def cells(self, spectrum: np.ndarray) -> np.ndarray:
         """Return the range cells of responses (N, M): all M, or those of the pilots' comb."""
         if self.pilots is None:
-            return np.fft.ifft(spectrum, axis=1)
+            return transforms.inverse(spectrum)
         return self.pilots.module.range_cells(self.pilots.settings, spectrum)
 
     def received(self, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
         """Return the responses (N, M) of the time samples of the symbols `rows`, the known data divided out."""
-        found, data = self.carrying(np.fft.fft(samples, axis=1), rows)
+        found, data = self.carrying(transforms.forward(samples), rows)
         return found if data is None else waveform.without(found, data)
 
     def with_samples(self, responses: np.ndarray, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
         """Return responses (N, M) plus those of time samples (N, M) of the symbols `rows`; both are overwritten."""
-        found, data = self.carrying(np.fft.fft(samples, axis=1, out=samples), rows)
+        found, data = self.carrying(transforms.forward(samples, out=samples), rows)
         if data is None:
             return responses + found
         divided(found, np.ascontiguousarray(data), False, responses)
@@ -91,7 +91,7 @@ class Sending:
         symbols = waveform.transmit(whole, self.aired), waveform.transmit(whole, self.aired_before)
         # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2 higher, in samples:
         # the phase turns by pi from cell to cell.
-        cells = np.fft.ifft(np.fft.ifftshift(spectrum, axes=1), axis=1)
+        cells = transforms.inverse(np.fft.ifftshift(spectrum, axes=1))
         return prefix.module.convolved(prefix.settings, self.network, cells, symbols)
 
     def _drawn(self, name: str) -> np.ndarray:

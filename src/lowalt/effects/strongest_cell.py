@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from lowalt.common.jit import INNER_VECTOR, VECTOR
+from lowalt.effects import transforms
 from lowalt.effects.tone_loops import divided
 
 MOST = 8
@@ -144,4 +145,4 @@ def _cells(responses: np.ndarray, data: np.ndarray) -> np.ndarray:
         spectrum = np.empty(responses.shape, np.complex128)
         divided(np.ascontiguousarray(responses), np.ascontiguousarray(data), True, spectrum)
         responses = spectrum
-    return np.fft.ifft(responses, axis=1)
+    return transforms.inverse(responses)

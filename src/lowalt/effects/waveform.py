@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from lowalt.common.network import Network, Station
+from lowalt.effects import transforms
 from lowalt.effects.phasors import phasors
 from lowalt.effects.tone_loops import carried, divided, looked_up
 
@@ -41,7 +42,7 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     response's. Source: 3GPP TS 38.211, 5.3.1.
     """
     tones = tones_of(response, data)
-    return np.fft.ifft(tones, axis=-1, out=tones)
+    return transforms.inverse(tones, out=tones)
 
 
 def tones_of(response: np.ndarray, data: np.ndarray) -> np.ndarray:
@@ -59,7 +60,7 @@ def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
 
     The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
     """
-    return without(np.fft.fft(samples, axis=-1), np.broadcast_to(data, samples.shape))
+    return without(transforms.forward(samples), np.broadcast_to(data, samples.shape))
 
 
 def without(tones: np.ndarray, data: np.ndarray) -> np.ndarray:

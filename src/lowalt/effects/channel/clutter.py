@@ -15,6 +15,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import radar
+from lowalt.effects import transforms
 from lowalt.effects.antenna import Element, gain, local_gain
 from lowalt.effects.channel import clutter_loops, land_between, patches
 from lowalt.effects.channel.windblown import speckle, windblown
@@ -192,6 +193,6 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     # Land beyond the unambiguous range folds into the cells it shares with nearer land.
     cells = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
     clutter_loops.folded(lit, waves, cells)
-    np.fft.fft(cells, axis=1, out=cells)
+    transforms.forward(cells, out=cells)
     cells *= patches.ramp(network.subcarriers)
     return cells

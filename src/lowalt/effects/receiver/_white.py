@@ -4,6 +4,7 @@ import numpy as np
 
 from lowalt.common.jit import LEAN
 from lowalt.common.normals import circular
+from lowalt.effects import transforms
 from lowalt.effects.waveform import Frame
 
 
@@ -42,4 +43,4 @@ def _tones(shape: tuple[int, ...], scale: float, rng: np.random.Generator) -> np
     """The transform of noise (N, M)."""
     noise = np.empty(shape, np.complex128)
     _joined(*circular(rng.bit_generator.random_raw(2 * noise.size), scale), noise.reshape(-1))
-    return np.fft.fft(noise, axis=1, out=noise)
+    return transforms.forward(noise, out=noise)

@@ -9,6 +9,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.jit import LEAN
+from lowalt.effects import transforms
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
@@ -73,13 +74,13 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
     station.
     """
-    return retimed(settings, np.fft.fft(samples, axis=1), frame, rng)
+    return retimed(settings, transforms.forward(samples), frame, rng)
 
 
 def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the samples of `receive` from the tones (N, M) of its samples, in the transform's order, as work space."""
     rates, places = _slipped(settings, tones, frame, rng)
-    samples = np.fft.ifft(tones, axis=1)
+    samples = transforms.inverse(tones)
     _stretch(tones, rates, places, samples)
     return samples
 
@@ -89,7 +90,7 @@ def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Gene
     rates, places = _slipped(settings, tones, frame, rng)
     change = np.zeros(tones.shape, np.complex128)
     _stretch(tones, rates, places, change)
-    tones += np.fft.fft(change, axis=1, out=change)
+    tones += transforms.forward(change, out=change)
     return tones
 
 
@@ -116,7 +117,7 @@ def _stretch(tones: np.ndarray, rates: np.ndarray, places: np.ndarray, samples: 
     while term * math.exp(reach) > ROUNDING:
         powers = np.multiply(powers, rates, out=None if powers is tones else powers)
         column = column * (1j * places / order)
-        np.fft.ifft(powers, axis=1, out=work)
+        transforms.inverse(powers, out=work)
         _grow(work, column, samples)
         order += 1
         term *= reach / order

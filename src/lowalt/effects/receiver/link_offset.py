@@ -7,6 +7,7 @@ from B to A the opposite. A station that receives its own signal has no offset.
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects import transforms
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.clocks import errors
 from lowalt.effects.waveform import Frame, turned
@@ -42,7 +43,7 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     found = errors(settings, frame.network, rng)
     ppm, late = (theirs - ours for theirs, ours in zip(found[sends.name], found[hears.name], strict=True))
     ramp = turned(-2 * np.pi * np.fft.ifftshift(frame.baseband_hz) * late)
-    moved = np.fft.ifft(np.fft.fft(samples, axis=1) * ramp, axis=1)
+    moved = transforms.inverse(transforms.forward(samples) * ramp)
     return moved * turned(2e-6 * np.pi * ppm * frame.oscillator_hz * frame.times_s)
 
 

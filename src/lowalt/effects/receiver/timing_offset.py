@@ -7,6 +7,7 @@ Past the prefix it would take in the neighbouring symbol, whose data no scene st
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.effects import transforms
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
 from lowalt.effects.waveform import Frame, turned
@@ -45,13 +46,13 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     A late window makes all echoes seem nearer by c d / 2. The oscillator's own phase runs on and is not touched.
     Source: Speth et al. 1999; one draw a sample and station.
     """
-    return retimed(settings, np.fft.fft(samples, axis=1), frame, rng)
+    return retimed(settings, transforms.forward(samples), frame, rng)
 
 
 def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the samples (N, M) of `receive` from the tones of its samples, which are overwritten."""
     tones = retoned(settings, tones, frame, rng)
-    return np.fft.ifft(tones, axis=1, out=tones)
+    return transforms.inverse(tones, out=tones)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:

@@ -7,10 +7,12 @@ distortion (Bussgang): `soft_limit` states both for an ideal limiter.
 """
 
 import math
+from functools import cache
 
 import numpy as np
 
-from lowalt.common.jit import kernel
+from lowalt.effects import transforms
+from lowalt.effects.transmitter import _amplifier_loops
 
 SOURCE = (
     "C. Rapp, Effects of HPA-nonlinearity on a 4-DPSK/OFDM-signal for a digital sound broadcasting system, ESA SP-332, "
@@ -22,26 +24,11 @@ DEFAULTS = {"backoff_db": 8.0, "smoothness": 2.0}
 TOGETHER = 16
 """Symbols amplified together; their samples fit into a core's cache."""
 OVERSAMPLING = 4
-LOOPS = kernel(error_model="numpy")
 
 
 def idle(settings: dict) -> bool:
     """Return whether the amplifier never saturates."""
     return settings["backoff_db"] is None
-
-
-@LOOPS
-def _compress(samples, over_square, smoothness):
-    """Divide samples (K,) by (1 + (|s|^2 over_square)^p)^(1/(2p)); at p = 2, roots take a tenth of the powers' time."""
-    if smoothness == 2.0:
-        for i in range(len(samples)):
-            power = (samples[i].real ** 2 + samples[i].imag ** 2) * over_square
-            gain = 1.0 / math.sqrt(math.sqrt(1.0 + power * power))
-            samples[i] = complex(samples[i].real * gain, samples[i].imag * gain)
-        return
-    for i in range(len(samples)):
-        power = (samples[i].real ** 2 + samples[i].imag ** 2) * over_square
-        samples[i] /= (1.0 + power**smoothness) ** (0.5 / smoothness)
 
 
 def rapp(samples: np.ndarray, saturation: float, smoothness: float) -> np.ndarray:
@@ -50,8 +37,22 @@ def rapp(samples: np.ndarray, saturation: float, smoothness: float) -> np.ndarra
     Source: Rapp 1991: g(a) = a / (1 + (a / A)^(2p))^(1/(2p)).
     """
     result = np.array(samples, np.complex128, order="C")
-    _compress(result.reshape(-1), 1.0 / saturation**2, float(smoothness))
+    _compress(result.reshape(-1), saturation, smoothness)
     return result
+
+
+def _compress(samples: np.ndarray, saturation: float, smoothness: float) -> None:
+    """Amplify samples (K,) in place."""
+    _amplifier_loops.compress(samples, 1.0 / saturation**2, float(smoothness), np.empty((2, 256)))
+
+
+@cache
+def _later() -> np.ndarray:
+    """Phases (OVERSAMPLING, 2, LENGTH) of the subcarriers in the shares of a sample (`_amplifier_loops.symbols`)."""
+    count = transforms.LENGTH
+    turns = np.outer(np.arange(OVERSAMPLING), np.fft.fftfreq(count) / OVERSAMPLING)
+    phase = np.exp(2j * np.pi * turns)
+    return np.stack([phase.real, phase.imag], axis=1)
 
 
 def soft_limit(backoff_db: float) -> tuple[float, float]:
@@ -75,6 +76,12 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
     last = length - half
     saturation = math.sqrt(count) * 10 ** (settings["backoff_db"] / 20)
     result = np.empty(sent.shape, np.complex128)
+    if count == transforms.LENGTH:
+        over, smoothness, tables = 1.0 / saturation**2, float(settings["smoothness"]), (_later(), transforms.table())
+        _amplifier_loops.symbols(
+            np.ascontiguousarray(sent), over, smoothness, *tables, np.empty((6, count)), result
+        )  # fmt: skip
+        return result
     work = np.empty((min(TOGETHER, symbols), length), np.complex128)
     for first in range(0, symbols, TOGETHER):
         data = sent[first : first + TOGETHER]
@@ -84,7 +91,7 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
         wide[:, count - half : last] = 0.0
         # Without the inverse transform's 1 / length, the mean power of the samples is the number of subcarriers.
         np.fft.ifft(wide, axis=1, norm="forward", out=wide)
-        _compress(wide.reshape(-1), 1.0 / saturation**2, float(settings["smoothness"]))
+        _compress(wide.reshape(-1), saturation, settings["smoothness"])
         np.fft.fft(wide, axis=1, norm="forward", out=wide)
         amplified = result[first : first + TOGETHER]
         amplified[:, half:], amplified[:, :half] = wide[:, : count - half], wide[:, last:]

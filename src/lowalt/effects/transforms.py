@@ -1,0 +1,41 @@
+"""Fourier transforms of symbols, row by row: compiled ones of 256 numbers, and NumPy's of any other number."""
+
+from functools import cache
+
+import numpy as np
+
+from lowalt.effects import transform_loops
+
+LENGTH = transform_loops.LENGTH
+"""Numbers of a row that compiled loops transform, the default's subcarriers."""
+
+
+@cache
+def table() -> np.ndarray:
+    """Return the table of `transform_loops.turns`, which must not be changed."""
+    return transform_loops.turns()
+
+
+def work() -> np.ndarray:
+    """Return new work space (4, LENGTH) of a compiled transform."""
+    return np.empty((4, LENGTH))
+
+
+def forward(given: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    """Return np.fft.fft of each row of given (N, M) to rounding, in `out` where it is named, which may be given."""
+    return _rows(given, False, 1.0, out)
+
+
+def inverse(given: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    """Return np.fft.ifft of each row of given (N, M) to rounding, in `out` where it is named, which may be given."""
+    return _rows(given, True, 1.0 / given.shape[-1], out)
+
+
+def _rows(given: np.ndarray, back: bool, scale: float, out: np.ndarray | None) -> np.ndarray:
+    """The transforms of `forward`, or with `back` those of `inverse`; scale: of the latter's sums."""
+    if given.ndim != 2 or given.shape[1] != LENGTH:
+        return (np.fft.ifft if back else np.fft.fft)(given, axis=-1, out=out)
+    given = np.ascontiguousarray(given, np.complex128)
+    result = np.empty(given.shape, np.complex128) if out is None else out
+    transform_loops.rows(given, back, scale, table(), work(), result)
+    return result
