@@ -17,20 +17,22 @@ def block(**changes):
 def test_augmentation_without_strength_changes_nothing_and_never_its_input():
     images = stream(3, "images").integers(0, 256, (4, 9, 12, 12), dtype=np.uint8)
     before = images.copy()
-    assert (augment(images, list(range(9)), block(), stream(1, "a")) == images).all()
+    assert (augment(images, [0, 1, 2, 4, 5, 6, 8, 9, 10], block(), stream(1, "a")) == images).all()
     strong = block(
         mirror=0.5, shift_doppler=0.3, shift_time=0.3, contrast=1, mask_time=0.5, mask_doppler=0.5, drop_view=0.5
     )
-    changed = augment(images, list(range(9)), strong, stream(1, "a"))
+    changed = augment(images, [0, 1, 2, 4, 5, 6, 8, 9, 10], strong, stream(1, "a"))
     assert (images == before).all()
-    assert (changed == augment(images, list(range(9)), strong, stream(1, "a"))).all()
+    assert (changed == augment(images, [0, 1, 2, 4, 5, 6, 8, 9, 10], strong, stream(1, "a"))).all()
     assert (changed != images).any()
 
 
 def test_all_views_of_a_sample_move_together_and_samples_apart():
     one = stream(4, "image").integers(0, 256, (1, 1, 16, 16), dtype=np.uint8)
     images = np.broadcast_to(one, (30, 9, 16, 16))
-    moved = augment(images, list(range(9)), block(mirror=0.5, shift_doppler=0.4, shift_time=0.4), stream(2, "a"))
+    moved = augment(
+        images, [0, 1, 2, 4, 5, 6, 8, 9, 10], block(mirror=0.5, shift_doppler=0.4, shift_time=0.4), stream(2, "a")
+    )
     assert (moved == moved[:, :1]).all()
     assert len(np.unique(moved[:, 0].reshape(30, -1), axis=0)) > 20
 

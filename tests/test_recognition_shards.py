@@ -74,7 +74,7 @@ def test_cache_and_shards_hold_the_same_samples(dataset, tmp_path):
     shards = ShardSet(dataset / "index.json")
     keys = [key.decode() for key in shards.keys]
     number = keys.index(str(direct.facts.key[3]))
-    assert (direct.views(np.array([3]))[0] == resize(shards.images(number), SIZE)[SCHEME.columns]).all()
+    assert (direct.views(np.array([3]))[0] == resize(shards.images(number), SIZE)[[3, 5, 6, 8]]).all()
 
 
 def test_facts_are_those_of_the_records(dataset):
@@ -116,7 +116,7 @@ def test_predicting_from_a_signal_and_from_its_tile_agree_with_the_network(datas
         assert given[0] == given[1]
         assert list(given[0]) == ["UAV", "Bird", "Vehicle", "Pedestrian"]
         assert sum(given[0].values()) == pytest.approx(1, abs=1e-12)
-        index = torch.from_numpy(resize(shards.images(number), SIZE)[SCHEME.columns][None])
+        index = torch.from_numpy(resize(shards.images(number), SIZE)[[3, 5, 6, 8]][None])
         with torch.inference_mode():
             assert list(given[0].values()) == trained.model(index).double().softmax(1)[0].tolist()
     np.save(tmp_path / "short.npy", np.zeros((3, 10), np.complex64))
