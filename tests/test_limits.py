@@ -178,7 +178,7 @@ def test_sample_numbers_of_any_integer_type_name_the_same_sample(published):
     assert data.place(np.int64(MANY)) != data.place(np.int64(MANY - 1))
     with pytest.raises(IndexError):
         data.place(np.int64(len(data)))
-    fresh = Stream(data, list(range(9)), 24, ("seen", "unseen"))
+    fresh = Stream(data, [0, 1, 2, 4, 5, 6, 8, 9, 10], 24, ("seen", "unseen"))
     place = fresh.place(np.int64(MANY))
     assert place == fresh.place(MANY) and (place.model - 416_670) % STRIDE == MANY // 40
     # Motion models of the stream pass 32 bits, and their random streams keep every bit of the number.

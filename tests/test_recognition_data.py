@@ -97,9 +97,10 @@ def test_samples_in_memory_are_those_written_and_no_others(tmp_path):
     halves = [np.arange(len(found)) % 2 == part for part in (0, 1)]
     views = [cache(tmp_path / f"{part}.npz", found.take(half)) for part, half in enumerate(halves)]
     pairs = {("seen", "train"), ("unseen", "val")}
-    source = samples.ViewSamples([tmp_path / "1.npz", tmp_path / "0.npz"], [0, 5], pairs)
+    source = samples.ViewSamples([tmp_path / "1.npz", tmp_path / "0.npz"], [0, 6], pairs)
     kept = [np.array([pair in pairs for pair in zip(found.group[h], found.fold[h], strict=True)]) for h in halves]
     assert source.size == 16
+    # The second station's VT is view 6 of the catalogue, and image 5 of a data set without its fourth spectrum.
     expected = np.concatenate([part[keep][:, [0, 5]] for part, keep in zip(views, kept, strict=True)])
     assert (source.views(np.arange(len(source.facts))) == expected).all()
     assert set(zip(source.facts.group.tolist(), source.facts.fold.tolist(), strict=True)) == pairs
