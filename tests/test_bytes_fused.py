@@ -19,7 +19,7 @@ llvm = pytest.importorskip("llvmlite.binding")
 MODULES = (
     "common.exact.arithmetic", "common.exact.sines", "echo.rounding.nearest", "echo.rounding.sums", "motion.kernels",
     "common.normals", "spectra.sliding", "tiles.filters", "tiles.huffman",
-    "tiles.huffman_code", "tiles.render", "tiles.resample",
+    "tiles.huffman_code", "tiles.pixels", "tiles.resample",
 )  # fmt: skip
 LOOSE = re.compile(
     r"\bf(?:add|sub|mul|div|neg) (?:(?:nnan|ninf|nsz|arcp|afn) )*(?:fast|contract|reassoc)\b|@llvm\.fmuladd"
@@ -33,7 +33,7 @@ SIGNATURES = {
     ("common.normals", "fill"): "uint64[::1], float64, float64[:, ::1]",
     ("spectra.sliding", "fourier_magnitudes"): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
     ("spectra.sliding", "transfer"): f"{LINE}, {LINE}, int64, {TABLE}, {TABLE}, {LINE}, {TABLE}",
-    ("tiles.render", "_index"): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",
+    ("tiles.pixels", "index_image"): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",
     ("tiles.resample", "along_rows"): f"{TABLE}, uint64[:, ::1], {TABLE}, {TABLE}",
     ("tiles.resample", "across_rows"): f"{TABLE}, int64[:, ::1], {TABLE}, {TABLE}",
 }
@@ -85,7 +85,7 @@ def test_the_code_of_kernels_has_no_loose_operation_and_no_library_function(name
     kernel = kernels(name)[key]
     text = code(kernel.py_func, SIGNATURES[name, key], **options_of(kernel))
     # The index of a colour is found by comparing alone.
-    assert bool(re.search(r"\bfmul\b", text)) == (key != "_index")
+    assert bool(re.search(r"\bfmul\b", text)) == (key != "index_image")
     assert not LOOSE.search(text) and not LIBRARY.search(text)
 
 

@@ -154,10 +154,10 @@ def test_a_tolerance_is_a_number_between_nought_and_one(tolerance):
 
 def test_a_point_in_the_station_is_named_by_its_number_and_symbol():
     scene = check(NETWORK, SEEN, PLACES, 1.0, (1.0, 2.0, 3.0))
-    assert api._check_fault(0, scene, SEEN, "") is None
+    assert api.check_fault(0, scene, SEEN, "") is None
     for fault, named in ((1, "point 0 at symbol 0"), (3, "point 2 at symbol 0"), (4, "point 0 at symbol 1")):
         with pytest.raises(InputError, match=f"^tern: position of {named} is .*, the place of station A"):
-            api._check_fault(fault, scene, SEEN, "tern")
+            api.check_fault(fault, scene, SEEN, "tern")
 
 
 def test_what_kernels_get_is_about_the_first_point_s_part():
@@ -165,7 +165,7 @@ def test_what_kernels_get_is_about_the_first_point_s_part():
     motion = pieces(symbols=2)
     moved = motion._replace(part=motion.part[::-1].copy())
     for given, first in ((motion, 0), (moved, 2), (PLACES, 0)):
-        *_, refs, aims, paths = api._prepare(NETWORK, SEEN, given, 1.0, (9.0, 4.0, 30.0), None, "")
+        *_, refs, aims, paths = api.prepared(NETWORK, SEEN, given, 1.0, (9.0, 4.0, 30.0), None, "")
         places = given if given is PLACES else given.translation
         np.testing.assert_allclose(refs[:, :3], places[:, first] - [4.0, -7.0, 25.0], atol=1e-13)
         apart = np.array([5.0, 11.0, 5.0])
@@ -173,7 +173,7 @@ def test_what_kernels_get_is_about_the_first_point_s_part():
         assert aims == pytest.approx((across / np.linalg.norm(apart), 5.0 / np.linalg.norm(apart)), rel=1e-13)
         assert len(paths.delays) == 0
     with pytest.raises(InputError, match=r"^tern: station A is a link between two stations"):
-        api._prepare(NETWORK, dataclasses.replace(SEEN, transmitter="B"), PLACES, 1.0, (9.0, 4.0, 30.0), None, "tern")
+        api.prepared(NETWORK, dataclasses.replace(SEEN, transmitter="B"), PLACES, 1.0, (9.0, 4.0, 30.0), None, "tern")
 
 
 def test_cells_and_subcarriers_are_each_other_s_transform_and_the_signal_is_the_strongest_cell():

@@ -42,7 +42,7 @@ def prepared(motion, rcs_m2=1.0, net: Network = NETWORK):
     """What the kernels get of a scene, under the names of their arguments."""
     where = motion.translation[0, 0] if isinstance(motion, Rigid) else motion[0, 0]
     aim = where + np.array([1.0, 2.0, -1.5])
-    scene, radio, refs, aims, _ = api._prepare(net, net.stations[0], motion, rcs_m2, aim, None, "")
+    scene, radio, refs, aims, _ = api.prepared(net, net.stations[0], motion, rcs_m2, aim, None, "")
     peak = radio.scale * radio.transmit_h * radio.transmit_v * radio.receive_h * radio.receive_v
     return SimpleNamespace(net=net, scene=scene, radio=radio, refs=refs, aims=aims, lay=layout(scene, peak), peak=peak)
 
