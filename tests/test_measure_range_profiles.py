@@ -72,3 +72,11 @@ def test_schemes_tested_on_different_samples_are_refused(folder):
     predictions.write(path, found.__class__(np.char.add("x", found.key), *tuple(vars(found).values())[1:]))
     with pytest.raises(InputError, match="tested on different samples"):
         range_profiles.rows_of(folder)
+
+
+def test_unseen_subtypes_are_drawn_as_wholes(folder, monkeypatch):
+    asked = []
+    real = range_profiles.strict_difference
+    monkeypatch.setattr(range_profiles, "strict_difference", lambda *given: asked.append(given[4]) or real(*given))
+    range_profiles.rows_of(folder)
+    assert asked == [True, True]

@@ -108,6 +108,28 @@ def test_magnitudes_are_those_of_the_echo_s_profile(dataset):
     assert same == [cell == 4 for cell in range(9)]
 
 
+def test_every_station_draws_noise_of_its_own(dataset, monkeypatch):
+    row, maker = dataset.row(dataset.place(1)), dataset.maker
+    drawn = []
+    monkeypatch.setattr(
+        "lowalt.tiles.profiles.noisy_profile",
+        lambda profile, signal, snr, rng: drawn.append(rng.normal()) or np.ones_like(profile),
+    )
+    Profiles(maker.network, dataset.clouds, 5, 9).magnitudes(row, 3.0, np.ones((3, maker.network.symbols)))
+    assert len(set(drawn)) == 3
+
+
+def test_no_more_motion_models_are_kept_than_asked_for(dataset):
+    made = Profiles(dataset.maker.network, dataset.clouds, 5, 9, kept=2)
+    rows = [dataset.row(dataset.place(number)) for number in range(len(dataset))]
+    keys = list(dict.fromkeys((row["subtype"], row["model"]) for row in rows))
+    for row in rows:
+        made.clean(row)
+        assert (row["subtype"], row["model"]) in made._clean and len(made._clean) <= 2
+    assert len(keys) > 2
+    assert list(made._clean) == keys[-2:]
+
+
 def test_the_kernel_is_the_definition(dataset):
     values = abs(np.random.default_rng(1).normal(size=(9, 40))).astype(np.float32)
     for settings in (hrrp.Settings(1, 1, 9), hrrp.Settings(5, 1, 9)):

@@ -65,6 +65,12 @@ def test_each_spectrum_is_coloured_by_its_own_palette():
     assert torch.allclose(colours[:, :, 1], torch.tensor(30 / 255))
 
 
+@pytest.mark.parametrize("shape", [(2, 256, 3), (1, 256, 3), (3, 255, 3), (3, 256, 4), (3, 256)])
+def test_palettes_that_leave_a_spectrum_without_colours_are_refused(shape):
+    with pytest.raises(InputError, match="palettes"):
+        network.Palettes(np.zeros(shape, np.uint8), (0, 2), (0.0,) * 3, (1.0,) * 3)
+
+
 @torch.inference_mode()
 def test_pooling_is_mean_within_a_station_and_max_between_stations():
     fusion = fusion_of.AttentionFusion(8, 3, {**BLOCK, "intra_depth": 0, "inter_depth": 0})

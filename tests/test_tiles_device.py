@@ -6,6 +6,7 @@ import pytest
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.spectra import Fourier, Spectra, Transfer
+from lowalt.spectra.settings import RangeCells
 from lowalt.tiles import Images, Renderer, Scale, split
 from pictures import SCALES, echoes, renderer
 
@@ -47,6 +48,12 @@ def test_other_windows_sizes_and_hops_are_equal(device):
     found = DeviceRenderer(compiled, device).images(batch()[:2]).cpu().numpy()
     np.testing.assert_array_equal(found, [split(compiled.tile(sample), 3) for sample in batch()[:2]])
     assert isinstance(network, Network)
+
+
+def test_range_profiles_are_refused():
+    profiled = Renderer(renderer().network, Spectra(hrrp=RangeCells(1, 1, 9)), Images(100, Scale("linear")))
+    with pytest.raises(InputError, match="none of range profiles on a device"):
+        DeviceRenderer(profiled)
 
 
 def test_wrong_batches_are_refused():
