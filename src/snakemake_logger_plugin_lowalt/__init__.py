@@ -2,7 +2,8 @@
 
 On a terminal the lines of the stages that run are drawn anew in place; in a log each stage has a line when it starts,
 every half minute and when it ends. Everything else is in files: Snakemake's own log, whose path it prints at the end,
-and the log of each job, whose last lines are shown when it fails. A dry run prints what Snakemake prints.
+and the log of each job, whose last lines are shown when it fails. A dry run prints what Snakemake prints. A quiet run
+shows warnings and failures alone and keeps no status, since Snakemake then does not say which jobs have ended.
 """
 
 import contextlib
@@ -16,6 +17,7 @@ import time
 from pathlib import Path
 
 from snakemake.logging import ColorizingTextHandler, DefaultFilter, DefaultFormatter
+from snakemake.settings.enums import Quietness
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
@@ -73,6 +75,7 @@ class LogHandler(LogHandlerBase):
         )  # fmt: skip
         # These options of Snakemake ask for its own messages.
         self._all = given.dryrun or given.verbose or given.debug_dag or given.printshellcmds
+        self._quiet = bool({Quietness.PROGRESS, Quietness.ALL} & set(given.quiet or ()))
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
         self._full, self._outcome = False, "ended"
@@ -116,6 +119,8 @@ class LogHandler(LogHandlerBase):
     def _take(self, record: logging.LogRecord) -> None:
         """Update the display by one record of Snakemake."""
         event = getattr(record, "event", None)
+        if self._quiet and record.levelno <= logging.INFO:
+            return
         if event == LogEvent.RUN_INFO and getattr(record, "stats", None):
             totals = {name: count for name, count in record.stats.items() if name != "total"}
             self._board, self._shown = Board(totals, record.created), record.created
