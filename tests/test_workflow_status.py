@@ -8,7 +8,8 @@ import time
 import pytest
 
 from lowalt.workflow import status
-from test_workflow_board import board_of, handler_of, record
+from test_workflow_board import board_of
+from test_workflow_display import handler_of, record
 
 
 def test_the_state_of_a_run_is_seen_from_elsewhere_and_a_killed_one_is_called_so(tmp_path):
