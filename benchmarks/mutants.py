@@ -24,7 +24,7 @@ from queue import Queue
 
 import numpy as np
 from mutation.candidates import Mutant, draw, of_file
-from mutation.coverage_map import Coverage, joined, measure, naming, shown_tests, unmapped
+from mutation.coverage_map import ROOM_WIDE, Coverage, joined, measure, naming, shown_tests, unmapped
 from mutation.forked import LIBRARIES, TRAINING, load
 from mutation.kept import Kept
 from mutation.survivors import earlier, survivor_row
@@ -70,9 +70,11 @@ FILE_S = 12.0
 
 
 def near(root: Path, asked: list[str]) -> list[str]:
-    """Files of tests that are named after one of these rooms."""
+    """Files of tests that are named after one of these rooms, or hold all of it."""
     begins = tuple(f"test_{name}" for room in asked for name in NEAR.get(room, (room,)))
-    return sorted(path.name for path in (root / "tests").glob("test_*.py") if path.name.startswith(begins))
+    wide = {name for name, held in ROOM_WIDE.items() if set(held) & set(asked)}
+    names = {path.name for path in (root / "tests").glob("test_*.py") if path.name.startswith(begins)}
+    return sorted(names | wide)
 
 
 def rooms(root: Path) -> dict[str, list[Mutant]]:

@@ -22,6 +22,9 @@ from xml.etree import ElementTree
 
 from coverage import CoverageData
 
+ROOM_WIDE = {"test_kept_numbers.py": ("echo", "effects")}
+"""Files of tests that hold all functions of some rooms, whatever modules their text names."""
+
 
 class Coverage(NamedTuple):
     """`lines[file][line]`: names of tests; `seconds[test]`: what a test took; files from the root of the repository."""
@@ -126,7 +129,8 @@ def _module(file: str) -> str:
 
 def naming(root: Path, names: list[str], file: str) -> set[str]:
     """Files of tests among `names` whose text names the module of a source file, or else a module that imports it; all
-    where there are none."""
+    where there are none. Those that hold the whole room are always among them."""
+    wide = {name for name in names if _room(file) in ROOM_WIDE.get(name, ())}
     texts = {name: (root / "tests" / name).read_text(encoding="utf-8") for name in names}
     for files in ({file}, importers(root, file)):
         parts = [_module(each).removeprefix("lowalt.").rpartition(".") for each in files]
@@ -135,7 +139,7 @@ def naming(root: Path, names: list[str], file: str) -> set[str]:
                     for package, _, name in parts]  # fmt: skip
         found = {name for name, text in texts.items() if any(pattern.search(text) for pattern in patterns)}
         if found:
-            return found
+            return found | wide
     return set(names)
 
 
@@ -158,10 +162,15 @@ def importers(root: Path, file: str) -> set[str]:
             if pattern.search(path.read_text(encoding="utf-8"))}  # fmt: skip
 
 
+def _room(file: str) -> str:
+    """The room of a source file, empty where it stands in none."""
+    return Path(file).parts[2].removesuffix(".py") if len(Path(file).parts) > 2 else ""
+
+
 def _of_room(test: str, file: str) -> bool:
-    """Whether the name of a file of tests says that it tests the room of `file`: tests/test_ROOM..."""
-    room = Path(file).parts[2].removesuffix(".py") if len(Path(file).parts) > 2 else ""
-    return bool(room) and test.startswith(f"tests/test_{room}")
+    """Whether a file of tests is named after the room of `file`, tests/test_ROOM..., or holds all of it."""
+    room, name = _room(file), test.partition("::")[0].removeprefix("tests/")
+    return bool(room) and (name.startswith(f"test_{room}") or room in ROOM_WIDE.get(name, ()))
 
 
 def _in_function(path: Path, line: int) -> bool:
