@@ -12,12 +12,15 @@ import yaml
 from configured import Inputs, parts
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
+from lowalt.effects import chunk
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
-from lowalt.recognition.made import DatasetSamples, opened
+from lowalt.recognition.made import DatasetSamples, opened, stations_of
 from lowalt.recognition.reader import Reader
+from lowalt.recognition.stream import Stream
 from lowalt.recognition.views import ShardSamples
+from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.workflow import options
@@ -123,3 +126,40 @@ def test_the_configuration_names_the_source():
     assert options.samples(None, Inputs(found)) == "--dataset results/default/config.yaml"
     with pytest.raises(InputError, match=r"recognition\.input"):
         parts({"recognition": {"input": "dataset"}})
+
+
+@pytest.mark.parametrize("effects", [{}, {"carrier_offset": {}}, {"cell_noise": {}}])
+def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeypatch):
+    """The second station of three alone, and its signal has the same bits as with the others next to it."""
+    dataset = opened(run / "config.yaml")
+    asked = []
+
+    def heard(original, names):
+        def counted(*given, **more):
+            asked.extend(names(given))
+            return original(*given, **more)
+
+        return counted
+
+    monkeypatch.setattr(maker, "clean_signals", heard(maker.clean_signals, lambda given: given[1]))
+    monkeypatch.setattr(chunk, "scene_signals", heard(chunk.scene_signals, lambda given: [given[1]]))
+    dataset.maker.echo["effects"] = effects
+    row = dataset.row(dataset.place(3))
+    whole = dataset.maker.signal(row, 8.0)
+    assert asked == ["A", "B", "C"] and (abs(whole).max(axis=1) > 0).all()
+    one = dataset.maker.signal(row, 8.0, [1])
+    assert asked == ["A", "B", "C", "B"]
+    assert (one[1] == whole[1]).all() and not one[[0, 2]].any()
+    asked.clear()
+    station = [len(schemes.SPECTRA) + spectrum for spectrum in range(3)]
+    fresh = Stream(opened(run / "config.yaml"), station, SIZE, ["seen"])
+    images = fresh.views(np.arange(2))
+    assert asked == ["B", "B"] and np.unique(images).size > 30
+
+
+def test_all_stations_are_asked_for_range_profiles(run):
+    dataset = opened(run / "config.yaml")
+    assert stations_of(dataset.maker, [3, 5]) == [1]
+    assert stations_of(dataset.maker, [0, 2, 3]) == [0, 1]
+    dataset.maker.render["spectra"] = dataset.maker.render["spectra"] | {"hrrp": {"window": 1, "hop": 1, "cells": 9}}
+    assert stations_of(dataset.maker, [4, 7]) is None

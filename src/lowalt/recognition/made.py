@@ -24,8 +24,10 @@ from lowalt.shards.dataset import Dataset
 from lowalt.shards.maker import Maker
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.write import select
+from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import named
 from lowalt.targets.cloud import Cloud
+from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
@@ -52,9 +54,21 @@ def cloud_sha256(cloud: Cloud) -> str:
     return hashlib.sha256(b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).hexdigest()
 
 
-def views_of(maker: Maker, row: dict, snr_db: float, columns: list[int], size: int) -> np.ndarray:
-    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB)."""
-    signal = maker.signal(row, snr_db)
+def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
+    """Return the numbers of the stations that images show, None where range profiles need all of them."""
+    spectra = Spectra.from_settings(maker.render["spectra"])
+    shown = sorted({number // len(spectra) for number in columns})
+    return None if profile_cells(spectra, maker.network) else shown
+
+
+def views_of(
+    maker: Maker, row: dict, snr_db: float, columns: list[int], size: int, stations: list[int] | None = None
+) -> np.ndarray:  # fmt: skip
+    """Return the index images (len(columns), size, size) uint8 of a sample: of a motion table's row at an SNR (dB).
+
+    stations: those that the images show (`stations_of`), the only ones that are computed; all by default.
+    """
+    signal = maker.signal(row, snr_db, stations)
     images = maker.renderer.some(signal, columns, maker.late(row), maker.profiles(row, snr_db, signal))
     return images if images.shape[-1] == size else resize(images, size)
 
@@ -73,6 +87,7 @@ class DatasetSamples:
         self.dataset, self.size = dataset, size
         stations = len(dataset.maker.network.stations)
         self.columns = columns_in(columns, named(dataset.maker.render["spectra"]), stations, "dataset")
+        self.stations = stations_of(dataset.maker, self.columns)
         self.rows, self.chosen, parts = [], [], []
         for name in sorted(dataset.plan.shards, key=lambda shard: f"{shard}.tar"):
             group, fold, part = name.split("-")
@@ -118,10 +133,11 @@ class DatasetSamples:
             # The echoes of such a scene hold the noise of one SNR, so other SNRs cannot use them.
             return
         used = sorted({number for number, _ in self.chosen})
-        if 8 * len(maker.network.stations) * maker.network.symbols * len(used) <= CLEAN_BYTES:
+        heard = len(maker.network.stations if self.stations is None else self.stations)
+        if 8 * heard * maker.network.symbols * len(used) <= CLEAN_BYTES:
             maker.kept = max(maker.kept, len(used))
             for number in used:
-                maker.received(self.rows[number])
+                maker.received(self.rows[number], stations=self.stations)
 
     def keep(self, numbers: np.ndarray) -> None:
         """Drop all samples but those at `numbers`."""
@@ -132,7 +148,7 @@ class DatasetSamples:
         maker, found = self.dataset.maker, []
         for number in numbers:
             place, snr_db = self.chosen[number]
-            found.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size))
+            found.append(views_of(maker, self.rows[place], snr_db, self.columns, self.size, self.stations))
         return np.stack(found)
 
     def sha256(self) -> str:

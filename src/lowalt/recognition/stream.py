@@ -18,7 +18,7 @@ from lowalt.common.classes import label
 from lowalt.common.errors import InputError
 from lowalt.common.splits import fold
 from lowalt.common.streams import stream
-from lowalt.recognition.made import CLEAN_BYTES, cloud_sha256, opened, views_of
+from lowalt.recognition.made import CLEAN_BYTES, cloud_sha256, opened, stations_of, views_of
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import columns_in
 from lowalt.shards.dataset import Dataset, Place
@@ -53,6 +53,7 @@ class Stream:
         if not self.subtypes or 0 < models < len(self.subtypes):
             raise InputError(f"stream: {models or 'endless'} motion models of {len(self.subtypes)} subtypes")
         self.columns = columns_in(columns, named(maker.render["spectra"]), len(maker.network.stations), "stream")
+        self.stations = stations_of(maker, self.columns)
         self._labels = [
             label(dataset.classes, dataset.published[name] | {"subtype": name}) for _, name in self.subtypes
         ]
@@ -101,7 +102,8 @@ class Stream:
         """Return the images of one sample; those of motion models that repeat are kept, as far as memory allows."""
         if place in self._made:
             return self._made[place]
-        images = views_of(self.dataset.maker, self.dataset.row(place), place.snr_db, self.columns, self.size)
+        maker, row = self.dataset.maker, self.dataset.row(place)
+        images = views_of(maker, row, place.snr_db, self.columns, self.size, self.stations)
         if self.models and (len(self._made) + 1) * images.nbytes < CLEAN_BYTES:
             self._made[place] = images
         return images

@@ -4,7 +4,7 @@ It runs the stages' own functions on one row, so its bytes are those that the st
 """
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -67,23 +67,29 @@ class Maker:
         shows them. signal: its noisy signals (stations, symbols)."""
         return self._profiles.magnitudes(row, snr_db, signal) if self._profiles else None
 
-    def received(self, row: dict, snr_db: float | None = None) -> tuple[np.ndarray, np.ndarray | None]:
+    def received(
+        self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
+    ) -> tuple[np.ndarray, np.ndarray | None]:  # fmt: skip
         """Return clean echoes (stations, symbols) complex64 of a motion model, and the powers (stations, 1) W that SNRs
         refer to, None where these are the echoes' powers. With an SNR (dB), the echoes include noise of all range
-        cells.
+        cells. stations: numbers of those to compute, all by default.
 
         Raises: InputError naming the sample that cannot be computed.
         """
-        key = row["subtype"], row["model"], snr_db
+        chosen = tuple(range(len(self.network.stations)) if stations is None else stations)
+        key = row["subtype"], row["model"], snr_db, chosen
         if key not in self._received:
             if len(self._received) >= self.kept:
                 del self._received[next(iter(self._received))]
-            self._received[key] = self._listen(row, snr_db)
+            self._received[key] = self._listen(row, snr_db, self._names(chosen))
         return self._received[key]
 
-    def _listen(self, row: dict, snr_db: float | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Compute `received` for a motion model whose echoes are not kept."""
-        names = [station.name for station in self.network.stations]
+    def _names(self, stations: Sequence[int]) -> list[str]:
+        """Names of stations by number."""
+        return [self.network.stations[number].name for number in stations]
+
+    def _listen(self, row: dict, snr_db: float | None, names: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
+        """Compute `received` for a motion model whose echoes are not kept, at the stations `names`."""
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
             return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
@@ -97,19 +103,28 @@ class Maker:
         found = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
         return np.stack([signal[0] for signal, _ in found]), np.stack([power for _, power in found])
 
-    def signal(self, row: dict, snr_db: float) -> np.ndarray:
+    def signal(self, row: dict, snr_db: float, stations: Sequence[int] | None = None) -> np.ndarray:
         """Return the noisy signals of one sample, (stations, symbols) complex64.
 
-        Raises: InputError naming the sample that cannot be computed.
+        stations: numbers of those that are asked for, rising; the others' signals are then zeros, and nothing is
+        computed for them. Raises: InputError naming the sample that cannot be computed.
         """
+        every = len(self.network.stations)
+        if stations is not None and len(stations) < every:
+            result = np.zeros((every, self.network.symbols), np.complex64)
+            result[list(stations)] = self._noisy(row, snr_db, stations)
+            return result
+        return self._noisy(row, snr_db, range(every))
+
+    def _noisy(self, row: dict, snr_db: float, stations: Sequence[int]) -> np.ndarray:
+        """The noisy signals of one sample at some stations."""
         effects, behind = self.echo["effects"], None
         if in_all_cells(effects):
-            return self.received(row, snr_db)[0]
+            return self.received(row, snr_db, stations)[0]
         if "canceller" in effects:
             behind = functools.partial(behind_canceller, canceller=effects["canceller"] or {})
-        clean, powers = self.received(row)
-        names = [station.name for station in self.network.stations]
-        return noisy_signals(clean[:, None], [row], names, [snr_db], self.seed, powers, behind)[0, 0]
+        clean, powers = self.received(row, None, stations)
+        return noisy_signals(clean[:, None], [row], self._names(stations), [snr_db], self.seed, powers, behind)[0, 0]
 
     def late(self, row: dict) -> np.ndarray | None:
         """Return how late the symbols of a motion model are, (stations, symbols); None where images do not ask."""

@@ -50,14 +50,22 @@ def taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
     return first, weights
 
 
+@lru_cache(maxsize=64)
 def row_taps(size: int, out: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps) float32."""
+    """Return `taps` as `across_rows` wants them: sources (out, taps) int64, weights (out, taps) float32.
+
+    All callers share the arrays, which must not be changed.
+    """
     first, weights = taps(size, out)
     return np.ascontiguousarray(first[:, None] + np.arange(weights.shape[1])), weights.astype(np.float32)
 
 
+@lru_cache(maxsize=64)
 def column_taps(size: int, out: int, hop: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares float32."""
+    """Return `taps` as `along_rows` wants them: columns (taps, out) uintp, every hop-th, and shares float32.
+
+    All callers share the arrays, which must not be changed.
+    """
     first, weights = taps(size, out)
     weights = np.pad(weights, ((0, 0), (0, weights.shape[1] % 2)))
     columns = np.minimum(first[:, None] + np.arange(weights.shape[1]), size - 1) * hop
