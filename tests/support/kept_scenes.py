@@ -29,8 +29,8 @@ SHIPPED = (
 )  # fmt: skip
 SCHEMA = "workflow/schemas/config.schema.yaml"
 SYMBOLS = 20
-EACH = 8
-"""Random scenes of effects in a group."""
+RANDOM, EACH = 3, 8
+"""Groups of random scenes of effects, and scenes in each."""
 
 
 def turning(symbols: int, sizes: tuple[int, ...], away: tuple[float, float, float], seed: int) -> Rigid:
@@ -130,6 +130,6 @@ SCENES = {
     "near and far": near_and_far,
     "many points": many_points,
     "interpreted": interpreted_echo,
-    **{f"effects {group}": partial(random_effects, group) for group in range(3)},
+    **{f"effects {group}": partial(random_effects, group) for group in range(RANDOM)},
     "scenes": partial(shipped, SHIPPED),
 }
