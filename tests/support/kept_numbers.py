@@ -26,14 +26,17 @@ from lowalt.common.csv_tables import read_csv, write_csv
 
 ROOT = Path(__file__).resolve().parents[2]
 TABLE = ROOT / "tests/data/kept_numbers.csv"
-COLUMNS = ("scenes", "function", "calls", "numbers", "sizes", "values")
+COLUMNS = ("scenes", "function", "calls", "numbers", "sizes", "values", "rounding")
 ROOMS = ("echo", "effects")
 SMALL = 1e-9
 """Numbers below this share of the largest one of their array count less and less: they may be rounding."""
 MOST = 1000
 """Numbers of an array that enter the sums, about."""
-ROUNDING = 1e-6
-"""Largest difference of a sum, times the root of the numbers in it, that rounding may make."""
+ROUNDING, LARGEST_ROUNDING = 1e-9, 1e-5
+"""Difference of a sum over the root of the numbers in it: at least this may be rounding, and more than the second is
+not kept."""
+ROOM = 100.0
+"""How much more two processors may differ than the two that were compared."""
 GOLDEN = (math.sqrt(5.0) - 1.0) / 2.0
 
 
@@ -135,7 +138,7 @@ def rows(scenes: dict[str, Callable[[], object]]) -> list[dict[str, str]]:
     for title, call in scenes.items():
         forget()
         for name, sums in sorted(traced(call).items()):
-            values = (title, name, sums.calls, sums.numbers, f"{sums.sizes:.10g}", f"{sums.values:.12g}")
+            values = (title, name, sums.calls, sums.numbers, f"{sums.sizes:.15g}", f"{sums.values:.15g}", "")
             result.append(dict(zip(COLUMNS, map(str, values), strict=True)))
     return result
 
@@ -145,12 +148,20 @@ def read(path: Path = TABLE) -> list[dict[str, str]]:
     return read_csv(path)
 
 
-def differs(one: dict[str, str], other: dict[str, str]) -> bool:
-    """Whether two rows of a function tell of other numbers than rounding explains."""
+def apart(one: dict[str, str], other: dict[str, str]) -> float:
+    """How far two rows of a function are apart: the largest difference of a sum over the root of the numbers in it.
+
+    It is infinite where calls or numbers are more or fewer.
+    """
     if one["calls"] != other["calls"] or one["numbers"] != other["numbers"]:
-        return True
-    allowed = ROUNDING * (1.0 + math.sqrt(float(one["numbers"])))
-    return any(abs(float(one[key]) - float(other[key])) > allowed for key in ("sizes", "values"))
+        return math.inf
+    root = 1.0 + math.sqrt(float(one["numbers"]))
+    return max(abs(float(one[key]) - float(other[key])) / root for key in ("sizes", "values"))
+
+
+def differs(kept: dict[str, str], found: dict[str, str]) -> bool:
+    """Whether a function's row tells of other numbers than its kept row, by more than rounding explains."""
+    return not apart(kept, found) <= float(kept["rounding"] or ROUNDING)
 
 
 def by_name(table: list[dict[str, str]]) -> dict[tuple[str, str], dict[str, str]]:
@@ -172,7 +183,11 @@ def main() -> None:
         os.environ["MALLOC_PERTURB_"] = filled
         found.append(by_name(json.loads(run(name, __file__, "rows"))))
     here, there = found
-    kept = [row for name, row in here.items() if name in there and not differs(row, there[name])]
+    kept = []
+    for name, row in here.items():
+        rounding = max(ROUNDING, ROOM * apart(row, there[name])) if name in there else math.inf
+        if rounding <= LARGEST_ROUNDING:
+            kept.append(row | {"rounding": f"{rounding:.1g}" if rounding > ROUNDING else ""})
     print(f"{len(kept)} of {len(here)} rows are kept; not these: {sorted(here.keys() - by_name(kept).keys())}")
     write_csv(TABLE, COLUMNS, kept)
 
