@@ -1,8 +1,8 @@
 """Every number that the functions of the echo and of the effects return in small scenes, against kept ones.
 
 Laws and slow references say what is right; these rows say that nothing has changed, also bounds and choices of which
-no result tells. Where a change is wanted, `PYTHONPATH=tests/support:src .venv/bin/python -m kept_numbers` keeps
-the new numbers; its difference shows which functions have changed.
+no result tells. Where a change is wanted, `make kept-numbers` keeps the new numbers; its difference shows which
+functions have changed.
 """
 
 import numpy as np

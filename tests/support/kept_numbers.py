@@ -1,6 +1,6 @@
 """What every function of some rooms returns while scenes are computed, in a few numbers a function.
 
-    PYTHONPATH=tests/support:src .venv/bin/python -m kept_numbers          (keeps tests/data/kept_numbers.csv again)
+    make kept-numbers          (keeps tests/data/kept_numbers.csv again)
 
 A function's row tells how often it was called, how many numbers it returned, and two sums over these: of the logarithms
 of each array's largest number, and of all numbers relative to it, each with a weight of its own. Where it returns
