@@ -165,3 +165,25 @@ def test_a_companion_of_no_cross_section_changes_nothing():
     found = received_signal(scene(given), STATION, cloud, at, None, {"Pigeon": faint})
     plain = received_signal(scene({}), STATION, cloud, at)
     assert abs(found.signal - plain.signal).max() < 1e-11 * abs(plain.signal).max()
+
+
+class Fixed:
+    """A generator whose normals are all this number, and whose uniforms are the lower end."""
+
+    def __init__(self, normal: float):
+        self.normal = normal
+
+    def standard_normal(self) -> float:
+        return self.normal
+
+    def uniform(self, low: float, high: float) -> float:
+        return low
+
+
+@pytest.mark.parametrize("normal, speed", [(0.0, 5.0), (-9.0, 0.5), (-20.0, 0.0)])
+def test_a_companion_on_the_ground_drives_slowly_or_stands_but_never_backwards(normal, speed):
+    """A car at 5 m/s, and a spread of half a metre a second."""
+    at = row("Audi A6L 2019") | {"vx_mps": 3.0, "vy_mps": 4.0, "yaw_rad": 0.7}
+    given = {**companions.DEFAULTS, "speed_mps": 0.5}
+    found = companions._moving(given, clouds()["Audi A6L 2019"], at, Fixed(normal))
+    assert np.hypot(found["vx_mps"], found["vy_mps"]) == pytest.approx(speed, abs=1e-12)

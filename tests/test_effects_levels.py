@@ -83,6 +83,15 @@ def test_a_pattern_averages_to_the_tables_mean_cross_section(faces, mean):
     assert 10 * np.log10(around @ weight / weight.sum()) == pytest.approx(mean, abs=0.02)
 
 
+@pytest.mark.parametrize("azimuth", [0.0, 90.0, 200.0])
+def test_a_vehicle_without_a_floor_of_its_own_shows_its_side_from_straight_below(azimuth):
+    below, nearly = (fluctuation.pattern_dbsm(fluctuation.VEHICLE, np.array([azimuth]), np.array([zenith]))
+                     for zenith in (180.0, 180.0 - 1e-9))  # fmt: skip
+    assert below[0] == pytest.approx(nearly[0], abs=1e-6) and below[1] == nearly[1]
+    above = fluctuation.pattern_dbsm(fluctuation.VEHICLE, np.array([azimuth]), np.array([10.0]))
+    assert above[0] != pytest.approx(below[0], abs=1.0)
+
+
 @pytest.mark.parametrize("yaw, azimuth", [(0.0, 90.0), (np.pi / 2, 0.0), (np.pi, 270.0), (-np.pi / 2, 180.0)])
 def test_a_pattern_follows_the_body(builtin, yaw, azimuth):
     row = {**CAR_ROW, "yaw_rad": yaw, "subtype": "Audi A6L 2019", "category": "Vehicle", "model": 0, "rate_hz": 0.0}

@@ -6,8 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from interpreted import interpreted
 from lowalt.effects.chain import Chain
-from lowalt.effects.channel import fluctuation, still_rays, symbol_motion
+from lowalt.effects.channel import fluctuation, ray_lists, still_rays, symbol_motion
 from lowalt.effects.channel.cross_sections import facet_radius_m
 from lowalt.effects.received import observe
 from test_effects import network
@@ -65,3 +66,35 @@ def test_a_ray_that_starts_in_the_plane_of_a_triangle_is_left_open(monkeypatch):
 def test_a_vehicle_and_a_large_craft_reflect_alike_to_the_left_and_to_the_right():
     for lobes in (fluctuation.VEHICLE, fluctuation.LARGE_UAV):
         assert lobes[1]._replace(azimuth=270) == lobes[3]
+
+
+def test_a_point_that_reaches_the_station_within_a_symbol_has_no_bound_and_a_nearer_one_a_larger_bound():
+    """The range that is left counts, not the one at the symbol's start: travel and the array's size are taken off it."""
+    radio = network()
+    station, size = radio.stations[0], symbol_motion.farthest_m(radio)
+
+    def bounds(nearest_m: float, travel_m: float, others: frozenset = frozenset()) -> float:
+        speeds = SimpleNamespace(travel_m=lambda seconds: np.array([travel_m]))
+        view = SimpleNamespace(
+            network=radio, station=station, speeds=speeds, nearest_m=lambda: np.array([[nearest_m]])
+        )  # fmt: skip
+        return float(symbol_motion.bound({}, view, others)[0, 0])
+
+    wavefront, without = frozenset({"wavefront"}), 1e300
+    assert bounds(2.0, 1.9) < without < bounds(2.0, 2.0)
+    assert bounds(2.0 + size, 1.9, wavefront) < without < bounds(2.0 + 0.9 * size, 2.0, wavefront)
+    left = np.array([bounds(1.0 + room, 1.0) for room in (0.5, 1.0, 4.0)])
+    assert (np.diff(left) < 0).all()
+
+
+@pytest.mark.filterwarnings("ignore:overflow encountered")
+def test_slots_of_kept_lists_lie_in_the_table_and_a_key_finds_its_own():
+    slot = interpreted(ray_lists._slot)
+    for size in (4, 64):
+        keys = np.full(size, -1)
+        for key in range(3, 3 + 7 * size // 2, 7):
+            own = slot(keys, key)
+            assert 0 <= own < size and keys[own] == -1
+            keys[own] = key
+        taken = [slot(keys, key) for key in range(3, 3 + 7 * size // 2, 7)]
+        assert len(set(taken)) == len(taken) and keys[taken].tolist() == list(range(3, 3 + 7 * size // 2, 7))

@@ -32,6 +32,11 @@ def test_functions_return_the_kept_numbers_in_the_shipped_scenes():
     assert not changed("scenes")
 
 
+@pytest.mark.parametrize("title", ["rare effects", "near field"])
+def test_functions_return_the_kept_numbers_in_scenes_that_run_the_others(title):
+    assert not changed(title)
+
+
 @pytest.mark.parametrize("group", range(RANDOM))
 def test_functions_return_the_kept_numbers_in_random_scenes(group):
     assert not changed(f"effects {group}")

@@ -67,7 +67,8 @@ class Sums:
         """Count a call that returned this."""
         self.calls += 1
         for array in arrays(value):
-            parts = np.ascontiguousarray(array, np.complex128 if array.dtype.kind == "c" else np.float64)
+            with np.errstate(invalid="ignore"):
+                parts = np.ascontiguousarray(array, np.complex128 if array.dtype.kind == "c" else np.float64)
             parts = np.nan_to_num(parts.reshape(-1).view(np.float64), nan=-0.1234, posinf=1e300, neginf=-1e300)
             largest = float(abs(parts).max())
             # Of a large array every so-many-th number will do: what changes it changes most of it.

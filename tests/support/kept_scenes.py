@@ -16,7 +16,8 @@ from lowalt.echo import Path, Rigid, echo_matrix, echo_signal, range_profile
 from lowalt.echo.fast import workspace
 from lowalt.effects.catalogue import called
 from lowalt.effects.chunk import scene_signals
-from lowalt.effects.received import Scene
+from lowalt.effects.explain import ExplainedSample, sample_facts
+from lowalt.effects.received import Scene, received_signal
 from lowalt.shards.dataset import Dataset
 from lowalt.targets.occluders import make
 from lowalt.targets.records import records_of
@@ -31,6 +32,10 @@ SCHEMA = "workflow/schemas/config.schema.yaml"
 SYMBOLS = 20
 RANDOM, EACH = 3, 8
 """Groups of random scenes of effects, and scenes in each."""
+RECORDED = 4
+"""Which number of a random scene says whether its target is a recording."""
+RARE = {50: False, 51: True, 101: True, 136: False, 220: False}
+"""Random scenes of `rare_effects`, and whether their target must be a recording."""
 
 
 def turning(symbols: int, sizes: tuple[int, ...], away: tuple[float, float, float], seed: int) -> Rigid:
@@ -73,8 +78,8 @@ def near_and_far() -> None:
 
 def many_points() -> None:
     """More points than a strip holds, in many symbols: slow parts are interpolated in time."""
-    net = replace(NETWORK, symbols=150, subcarriers=256, transmit=(16, 4), receive=(16, 4))
-    echoes(turning(150, (150, 20, 150), (150.0, 80.0, 60.0), 2), net, (1e-2, 1e-4, 1e-6, None))
+    net = replace(NETWORK, symbols=400, subcarriers=256, transmit=(16, 4), receive=(16, 4))
+    echoes(turning(400, (300, 20, 100), (150.0, 80.0, 60.0), 2), net, (1e-2, 1e-4, 1e-6, None))
     wide = replace(NETWORK, symbols=90)
     echoes(turning(90, (3, 200, 40), (40.0, 20.0, 30.0), 3), wide)
 
@@ -91,9 +96,22 @@ def interpreted_echo() -> None:
 def random_effects(group: int) -> None:
     """Scenes of any of all effects, with what their tolerance leaves out and without."""
     for number in range(EACH):
-        one = case(np.random.default_rng([77, group, number]).random(NUMBERS_OF_A_SCENE))
-        one.received(one.tolerance)
-        one.received(None)
+        _received(np.random.default_rng([77, group, number]).random(NUMBERS_OF_A_SCENE))
+
+
+def rare_effects() -> None:
+    """Random scenes that run functions which those of `random_effects` do not."""
+    for number, recorded in RARE.items():
+        numbers = np.random.default_rng([78, number]).random(NUMBERS_OF_A_SCENE)
+        numbers[RECORDED] = 0.95 if recorded else numbers[RECORDED]
+        _received(numbers)
+
+
+def _received(numbers: np.ndarray) -> None:
+    """The signal of the scene of these numbers, to its tolerance and exactly."""
+    one = case(numbers)
+    one.received(one.tolerance)
+    one.received(None)
 
 
 @cache
@@ -122,8 +140,22 @@ def shipped(names: tuple[str, ...]) -> None:
         echo = dataset.maker.echo
         scene = Scene(dataset.maker.network, 1, echo["tolerance"], tuple(called(echo["effects"])))
         row = dataset.row(dataset.place(count % 2 * (len(dataset) // 2)))
-        for station in scene.network.stations[:: len(scene.network.stations) - 1]:
-            scene_signals(scene.at_snr(8.0), station.name, clouds, [row], surfaces)
+        scene, (first, *_, last) = scene.at_snr(8.0), scene.network.stations
+        scene_signals(scene, first.name, clouds, [row], surfaces)
+        explained = ExplainedSample(clouds[row["subtype"]], row, surfaces[row["subtype"]])
+        sample_facts(scene, explained, last.name)
+
+
+def near_field_boxes() -> None:
+    """A craft near a station with the physics of its near field, whose sums over elements are polynomials."""
+    config, clouds, _ = _targets()
+    network = replace(Dataset(config, clouds).maker.network, symbols=100)
+    dataset = Dataset(config, clouds)
+    row = dataset.row(dataset.place(0)) | {"x_m": 30.0, "y_m": 45.0, "z_m": 60.0}
+    for effects in ({"wavefront": {}}, {"squint": {}, "wavefront": {}, "symbol_motion": {}, "ground_reflection": {}}):
+        for tolerance in (None, 1e-4):
+            scene = Scene(network, 1, tolerance, tuple(called(effects)))
+            received_signal(scene, network.stations[0], clouds[row["subtype"]], row)
 
 
 SCENES = {
@@ -131,5 +163,7 @@ SCENES = {
     "many points": many_points,
     "interpreted": interpreted_echo,
     **{f"effects {group}": partial(random_effects, group) for group in range(RANDOM)},
+    "rare effects": rare_effects,
+    "near field": near_field_boxes,
     "scenes": partial(shipped, SHIPPED),
 }
