@@ -69,7 +69,7 @@ def test_a_vehicle_and_a_large_craft_reflect_alike_to_the_left_and_to_the_right(
 
 
 def test_a_point_that_reaches_the_station_within_a_symbol_has_no_bound_and_a_nearer_one_a_larger_bound():
-    """The range that is left counts, not the one at the symbol's start: travel and the array's size are taken off it."""
+    """What counts is the range less the travel and the array's size, not the range at the symbol's start."""
     radio = network()
     station, size = radio.stations[0], symbol_motion.farthest_m(radio)
 
