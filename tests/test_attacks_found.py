@@ -1,4 +1,4 @@
-"""Damaged files on which the fuzzer (`make fuzz`) once saw a reader end with a traceback: each is refused by name."""
+"""Damaged files on which a reader once ended with a traceback or without the file's name: each is refused by name."""
 
 import struct
 import zipfile
@@ -10,13 +10,21 @@ import torch
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
+from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
 from lowalt.recognition import checkpoint, schemes
+from lowalt.recognition.runs import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
 from lowalt.targets.records import load_table
 from lowalt.tiles.files import Tiles
 from lowalt.tiles.files import write as write_tiles
+from lowalt.tiles.png import encode
+
+
+def encoded(height: int, width: int) -> bytes:
+    """A good palette PNG of this size."""
+    return encode(np.zeros((height, width), np.uint8), np.zeros((256, 3), np.uint8))
 
 
 @pytest.mark.parametrize("reads", [read_csv, lambda path: schemes.read(path, "ABC"), load_table])
@@ -67,3 +75,29 @@ def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
     path.write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunk)) + b"WAVE" + chunk)
     with pytest.raises(InputError, match=r"a\.wav: a \.wav file without a format or without samples"):
         read(Record(file=path, carrier_hz=24e9, channel="real", source="test", licence="none"))
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("a.png", encoded(90, 99), "tile: 90 x 99 pixels, expected rows of 3 square images"),
+        ("a.png", encoded(40, 100), "tile: 40 x 100 pixels, expected rows of 3 square images"),
+        ("a.png", encoded(3, 2), "tile: 3 x 2 pixels, expected rows of 3 square images"),
+        ("a.png", b"", "no PNG signature"),
+        ("a.npy", np.zeros((3, 400)), r"float64 \(3, 400\), expected complex \(stations, symbols\)"),
+        ("a.npy", np.zeros(400, complex), r"complex128 \(400,\), expected complex \(stations, symbols\)"),
+        ("a.npy", np.zeros((2, 400), complex), r"signals have shape \(2, 400\), expected \(3, 400\)"),
+        ("a.npy", np.full((3, 400), np.nan, complex), "NaN or infinite"),
+        ("a.npy", b"x", "not an array file"),
+        ("a.wav", b"x", r"expected signals \(.npy\) or a tile \(.png\)"),
+    ],
+)  # fmt: skip
+def test_what_is_no_sample_is_refused_by_its_file(name, content, expected, tmp_path):
+    path = tmp_path / name
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    else:
+        np.save(path, content)
+    config = load_yaml("config/default.yaml")
+    with pytest.raises(InputError, match=f"{path}: .*{expected}"):
+        images_of(path, {key: config[key] for key in ("network", "spectra", "images")})

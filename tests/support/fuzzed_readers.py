@@ -137,7 +137,9 @@ def _arrays() -> list[Reader]:
     """Readers of arrays, shards and models, each with a good file."""
     import torch
 
+    from lowalt.common.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
+    from lowalt.recognition.runs import images_of
     from lowalt.recognition.tracked import Tracked
     from lowalt.shards import recipe, table
     from lowalt.shards.index import load as load_index
@@ -150,6 +152,11 @@ def _arrays() -> list[Reader]:
 
     image = np.add.outer(np.arange(24), np.arange(24)).astype(np.uint8)
     png = encode(image, np.stack([np.arange(256)] * 3, 1).astype(np.uint8))
+    config = load_yaml("config/default.yaml")
+    render = {key: config[key] for key in ("network", "spectra", "images")}
+    tile = encode(np.add.outer(np.arange(48), np.arange(48)).astype(np.uint8), np.zeros((256, 3), np.uint8))
+    wave = np.exp(0.3j * np.arange(1200)).reshape(3, 400).astype(np.complex64)
+    signals = _bytes(lambda p: np.save(p, wave), "a.npy")
     count = 6
     facts = samples.Facts(
         *(np.array([f"{name}{n}" for n in range(count)]) for name in ("k", "s")), np.arange(count), np.full(count, 3.0),
@@ -172,6 +179,8 @@ def _arrays() -> list[Reader]:
         Reader("index", "index.json", json.dumps(index).encode(), load_index),
         Reader("tiles", "a.npz", _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"), lambda p: [*_all(Tiles(p))]),
         Reader("image", "a.png", png, lambda p: decode(p.read_bytes())),
+        Reader("tile to predict", "a.png", tile, lambda p: images_of(p, render)),
+        Reader("signals to predict", "a.npy", signals, lambda p: images_of(p, render)),
         Reader("checkpoint", "a.pt", model, checkpoint.load),
         Reader("predictions", "a.csv", _bytes(lambda p: predictions.write(p, said), "a.csv"), predictions.read),
         Reader("recipe", "a.tar", _recipe(), lambda p: recipe.unpack(p, p.parent / "out")),

@@ -201,24 +201,30 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     """Return all index images (stations spectra, S, S) uint8 of a signal file or a tile.
 
     path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
-    Raises: InputError for another kind of file or a shape that does not fit.
+    Raises: InputError naming the file, for another kind of file or a shape that does not fit.
     """
     from lowalt.tiles import Renderer, decode, split
 
-    spectra = len(named(settings["spectra"]))
-    if path.suffix == ".png":
-        return split(decode(path.read_bytes())[0], spectra)
-    return split(Renderer.from_settings(settings).tile(_signals(path)), spectra)
+    spectra, tiled = len(named(settings["spectra"])), path.suffix == ".png"
+    signals = None if tiled else _signals(path)
+    renderer = None if tiled else Renderer.from_settings(settings)
+    try:
+        return split(decode(path.read_bytes())[0] if renderer is None else renderer.tile(signals), spectra)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
 
 
 def _signals(path: Path) -> np.ndarray:
-    """Return the array of a signal file. Raises: InputError for another kind of file."""
+    """Return the complex array of a signal file. Raises: InputError naming the file, for another kind of file."""
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
     try:
-        return np.load(path, allow_pickle=False)
+        found = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: not an array file ({error})") from error
+    if found.dtype.kind != "c" or found.ndim != 2:
+        raise InputError(f"{path}: {found.dtype} {found.shape}, expected complex (stations, symbols)")
+    return found
 
 
 def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:

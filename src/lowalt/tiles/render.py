@@ -201,8 +201,14 @@ def levels(name: str) -> int:
 
 
 def split(tile: np.ndarray, spectra: int) -> np.ndarray:
-    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by station."""
-    size = tile.shape[1] // spectra
+    """Return the images of a tile, (stations S, spectra S) -> (stations spectra, S, S), station by station.
+
+    Raises: InputError where the tile is not made of rows of so many squares.
+    """
+    rows, columns = tile.shape
+    size = columns // spectra
+    if not size or columns != spectra * size or not rows or rows % size:
+        raise InputError(f"tile: {rows} x {columns} pixels, expected rows of {spectra} square images")
     grid = tile.reshape(tile.shape[0] // size, size, spectra, size)
     return np.ascontiguousarray(grid.swapaxes(1, 2)).reshape(-1, size, size)
 
