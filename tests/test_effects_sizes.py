@@ -8,7 +8,7 @@ import pytest
 
 from interpreted import interpreted
 from lowalt.effects.chain import Chain
-from lowalt.effects.channel import fluctuation, ray_lists, still_rays, symbol_motion
+from lowalt.effects.channel import fluctuation, ray_lists, still_rays, symbol_motion, turning_rays
 from lowalt.effects.channel.cross_sections import facet_radius_m
 from lowalt.effects.received import observe
 from test_effects import network
@@ -98,3 +98,9 @@ def test_slots_of_kept_lists_lie_in_the_table_and_a_key_finds_its_own():
             keys[own] = key
         taken = [slot(keys, key) for key in range(3, 3 + 7 * size // 2, 7)]
         assert len(set(taken)) == len(taken) and keys[taken].tolist() == list(range(3, 3 + 7 * size // 2, 7))
+
+
+def test_a_vector_is_taken_apart_along_a_part_s_axis_and_across_it():
+    axes, vector = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0], np.array([0.3, -2.0, 5.0])
+    found = interpreted(turning_rays._across)(axes, *vector)
+    assert found == pytest.approx([axes[1] @ vector, axes[2] @ vector, axes[0] @ vector], rel=1e-14)
