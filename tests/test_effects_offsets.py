@@ -129,3 +129,8 @@ def test_carrier_offset_leaks_as_the_dirichlet_kernel_says():
     own = np.mean(moved * turn.conj())
     assert abs(own) == pytest.approx(kept, rel=0.02)
     assert np.mean(abs(moved) ** 2) == pytest.approx(1, rel=1e-12)
+
+
+def test_an_offset_without_a_fixed_part_reaches_as_far_as_its_draws():
+    assert _offsets.largest({}, 0.5) == _offsets.largest(0.0, 0.5) == _offsets.CUT * 0.5
+    assert _offsets.largest({"A": -3.0, "B": 2.0}, 0.5) == 3.0 + _offsets.CUT * 0.5
