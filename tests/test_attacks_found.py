@@ -13,7 +13,7 @@ from lowalt.common.files import existing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
 from lowalt.recognition import checkpoint, schemes
-from lowalt.recognition.runs import images_of
+from lowalt.recognition.one_sample import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
 from lowalt.targets.records import load_table

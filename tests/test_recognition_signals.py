@@ -10,7 +10,7 @@ import torch
 from dataset import SNRS, build
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition import methods, runs, schemes, signal_networks, slow_time
+from lowalt.recognition import methods, one_sample, runs, schemes, signal_networks, slow_time
 from lowalt.recognition.augment_signals import augment_signals
 from lowalt.shards import ShardSet
 from pictures import IMAGES, NETWORK, SPECTRA
@@ -172,10 +172,10 @@ def test_a_short_training_learns_turns_of_the_phase_and_its_model_is_read_back(m
     signal = np.load(path)["signals"][-1]
     np.save(tmp_path / "one.npy", signal)
     blocks = {"network": {**NETWORK, "symbols": 64}, "spectra": SPECTRA, "images": IMAGES}
-    shares = runs.predict(trained, tmp_path / "one.npy", blocks)
+    shares = one_sample.predict(trained, tmp_path / "one.npy", blocks)
     assert max(shares, key=shares.get) == "Pedestrian"
     with pytest.raises(InputError, match="expected \\(3, 400\\)"):
-        runs.predict(trained, tmp_path / "one.npy", {**blocks, "network": NETWORK})
+        one_sample.predict(trained, tmp_path / "one.npy", {**blocks, "network": NETWORK})
 
 
 @pytest.mark.parametrize(

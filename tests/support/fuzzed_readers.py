@@ -139,7 +139,7 @@ def _arrays() -> list[Reader]:
 
     from lowalt.common.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
-    from lowalt.recognition.runs import images_of
+    from lowalt.recognition.one_sample import images_of
     from lowalt.recognition.tracked import Tracked
     from lowalt.shards import recipe, table
     from lowalt.shards.index import load as load_index

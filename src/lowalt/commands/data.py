@@ -88,7 +88,7 @@ def predict(given: argparse.Namespace) -> str:
     A model file that knows how its images were made of signals is asked with that, unless overlays are given.
     Raises: InputError for a file that is no model, tile or signal.
     """
-    from lowalt.recognition.runs import predict as probabilities
+    from lowalt.recognition.one_sample import predict as probabilities
     from lowalt.recognition.zoo import opened
 
     if given.input.suffix not in (".png", ".npy"):

@@ -1,4 +1,4 @@
-"""From settings to files: build a network and train it, read it back, evaluate it, predict with it.
+"""From settings to files: build a network and train it, read it back, evaluate it.
 
 `model.pt` carries everything a model needs to be used again: scheme, protocol, network settings, image size and
 palettes and the weights.
@@ -20,7 +20,6 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, sha256
 from lowalt.common.hardware import describe
-from lowalt.common.network import Network
 from lowalt.recognition import (
     augment,
     checkpoint,
@@ -37,13 +36,11 @@ from lowalt.recognition.classical_models import of_arrays
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.methods import built
 from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import Scheme, columns_in, of_record, refuse_cues
-from lowalt.recognition.slow_time import SlowTimeSamples, of_stations
+from lowalt.recognition.schemes import Scheme, of_record
+from lowalt.recognition.slow_time import SlowTimeSamples
 from lowalt.recognition.start import Start, carry
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
-from lowalt.spectra.catalogue import named
-from lowalt.tiles import resize
 
 Samples = ViewSamples | ShardSamples | SlowTimeSamples
 
@@ -195,62 +192,3 @@ def evaluate(
         "hardware": describe(), "evaluated_samples": len(found), "evaluate_s": seconds,
         "trained_on": trained_on, "mirror": mirror, "classes": list(trained.classes), **(more or {}),
     })  # fmt: skip
-
-
-def images_of(path: Path, settings: dict) -> np.ndarray:
-    """Return all index images (stations spectra, S, S) uint8 of a signal file or a tile.
-
-    path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
-    Raises: InputError naming the file, for another kind of file or a shape that does not fit.
-    """
-    from lowalt.tiles import Renderer, decode, split
-
-    spectra, tiled = len(named(settings["spectra"])), path.suffix == ".png"
-    signals = None if tiled else _signals(path)
-    renderer = None if tiled else Renderer.from_settings(settings)
-    try:
-        return split(decode(path.read_bytes())[0] if renderer is None else renderer.tile(signals), spectra)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from error
-
-
-def _signals(path: Path) -> np.ndarray:
-    """Return the complex array of a signal file. Raises: InputError naming the file, for another kind of file."""
-    if path.suffix != ".npy":
-        raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
-    try:
-        found = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: not an array file ({error})") from error
-    if found.dtype.kind != "c" or found.ndim != 2:
-        raise InputError(f"{path}: {found.dtype} {found.shape}, expected complex (stations, symbols)")
-    return found
-
-
-def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:
-    """Return the input of a model, one sample (1, ...), from a signal file or, for models on images, a tile.
-
-    Raises: InputError where a model on signals is given something else than the signals of its network.
-    """
-    if trained.scheme.sees == "images":
-        images = images_of(path, settings)
-        names = named(settings["spectra"])
-        places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
-        return resize(images, trained.size)[places][None]
-    network_of, signals = Network.from_settings(settings["network"]), _signals(path)
-    if signals.shape != (len(network_of.stations), network_of.symbols):
-        raise InputError(f"{path}: shape {signals.shape}, expected {len(network_of.stations), network_of.symbols}")
-    signals = signals.astype(np.complex64)[None]
-    values = signals if trained.scheme.sees == "signals" else of_stations(signals, network_of)
-    return values[:, trained.scheme.columns]
-
-
-def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
-    """Return the probability of each category for one signal file or tile, in full precision.
-
-    Raises: InputError for a model that also asks for a measured height, which no such file has.
-    """
-    refuse_cues(trained.scheme, "predict")
-    with torch.inference_mode():
-        found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
-    return dict(zip(trained.classes, found.tolist(), strict=True))
