@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.blas_threads import one_blas_thread
 from lowalt.common.memory import keep_freed_arrays
 from lowalt.common.network import Network, Station
 from lowalt.common.power import rms
@@ -80,6 +81,7 @@ class Received(NamedTuple):
     decisions: list[Decision]
 
 
+@one_blas_thread()
 def received_signal(
     scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None,
     clouds: Mapping[str, Cloud] | None = None,
