@@ -15,7 +15,8 @@ class _Callers:
     """How many callers ask for one thread at the moment, and what gives the library its number back."""
 
     def __init__(self) -> None:
-        self.lock, self.count, self.limited = threading.Lock(), 0, None
+        self.lock, self.count = threading.Lock(), 0
+        self.limited: Any = None
 
     def enter(self) -> None:
         """Let BLAS use one thread from the first caller on."""
