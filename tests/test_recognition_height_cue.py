@@ -9,7 +9,7 @@ import torch
 
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.recognition import checkpoint, height_cue, methods, recipe, runs, samples, schemes
+from lowalt.recognition import checkpoint, height_cue, methods, one_sample, recipe, runs, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.export import export
 from lowalt.recognition.height_cue import WithHeight
@@ -141,7 +141,7 @@ def test_a_model_evaluates_with_the_heights_it_is_given(blank, tmp_path):
     assert json.loads(name)["scheme"]["cues"] == state["scheme"]["cues"] == "height"
     with pytest.raises(InputError, match="--tracks: scheme 'AB:VRP height' has the cue 'height'"):
         main([*line, "--out", str(tmp_path / "none.csv")])
-    for ask in (lambda: runs.predict(runs.load(model), tmp_path / "a.npy", {}),
+    for ask in (lambda: one_sample.predict(runs.load(model), tmp_path / "a.npy", {}),
                 lambda: export(runs.load(model), tmp_path / "model.onnx")):  # fmt: skip
         with pytest.raises(InputError, match="scheme 'AB:VRP height' has the cue 'height', expected one without"):
             ask()

@@ -29,7 +29,7 @@ def checkout(tmp_path, monkeypatch):
 
 def test_every_row_of_the_methods_is_trained_in_both_protocols_or_timed():
     run = run_of(load_yaml("config/methods.yaml"))
-    assert len(run.trainings) == 11 * 2 * 3 and len(run.schemes) == 15
+    assert len(run.trainings) == 12 * 2 * 3 and len(run.schemes) == 16
     assert {run.schemes[name].sees for name in run.schemes} == {"images", "signals", "features"}
     assert run.image_sizes == [24] and run.asked.sees == "images"
 
