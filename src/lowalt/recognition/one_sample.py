@@ -1,6 +1,8 @@
 """One sample from a file, its signals or its tile, and what a trained model says of it."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -11,7 +13,7 @@ from lowalt.recognition.runs import Trained
 from lowalt.recognition.schemes import columns_in, refuse_cues
 from lowalt.recognition.slow_time import of_stations
 from lowalt.spectra.catalogue import named
-from lowalt.tiles import resize
+from lowalt.tiles import Renderer, decode, resize, split
 
 
 def images_of(path: Path, settings: dict) -> np.ndarray:
@@ -20,13 +22,17 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     path: .npy, complex (stations, symbols), or .png, an indexed tile; settings: {network, spectra, images}.
     Raises: InputError naming the file, for another kind of file or a shape that does not fit.
     """
-    from lowalt.tiles import Renderer, decode, split
+    if path.suffix == ".png":
+        tile, _ = _named(path, decode, path.read_bytes())
+    else:
+        tile = _named(path, Renderer.from_settings(settings).tile, _signals(path))
+    return _named(path, split, tile, len(named(settings["spectra"])))
 
-    spectra, tiled = len(named(settings["spectra"])), path.suffix == ".png"
-    signals = None if tiled else _signals(path)
-    renderer = None if tiled else Renderer.from_settings(settings)
+
+def _named(path: Path, call: Callable[..., Any], *given: object) -> Any:
+    """Return call(*given); a refusal of it gets the file's name in front."""
     try:
-        return split(decode(path.read_bytes())[0] if renderer is None else renderer.tile(signals), spectra)
+        return call(*given)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
