@@ -82,6 +82,7 @@ def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
     [
         ("a.png", encoded(90, 99), "tile: 90 x 99 pixels, expected rows of 3 square images"),
         ("a.png", encoded(40, 100), "tile: 40 x 100 pixels, expected rows of 3 square images"),
+        ("a.png", encoded(33, 100), "tile: 33 x 100 pixels, expected rows of 3 square images"),
         ("a.png", encoded(3, 2), "tile: 3 x 2 pixels, expected rows of 3 square images"),
         ("a.png", b"", "no PNG signature"),
         ("a.npy", np.zeros((3, 400)), r"float64 \(3, 400\), expected complex \(stations, symbols\)"),
