@@ -5,8 +5,8 @@ divisor can be zero, and without a check for it these loops become vector instru
 """
 
 import numpy as np
-from numba import njit
 
+from lowalt.common.jit import LEAN
 from lowalt.common.portable import COSINE, LN2, LOGARITHM, SINE
 
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = LOGARITHM
@@ -18,7 +18,7 @@ _STEP = 2.0**-53
 _TURN = 2 * np.pi
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def _minus_log(first, out):
     """out = -ln((upper 53 bits of first + 1) 2^-53)."""
     for i in range(first.size):
@@ -39,7 +39,7 @@ def _minus_log(first, out):
         out[i] = -(k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f))
 
 
-@njit(cache=True, error_model="numpy")
+@LEAN
 def fill(words, scale, out):
     """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64."""
     count = out.shape[1]

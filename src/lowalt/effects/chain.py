@@ -114,7 +114,7 @@ class Chain:
 
     def cells(self, on: frozenset[str], chosen: np.ndarray | None = None) -> np.ndarray:
         """Return the range cells (N, M) before detection with the physics `on`, of the symbols `chosen` (all)."""
-        return self.sending.cells(self.heard(on, chosen).responses)
+        return self.heard(on, chosen).cells(self.sending)
 
     def heard(self, on: frozenset[str], chosen: np.ndarray | None = None) -> Heard:
         """Return what the receiver makes of the symbols `chosen` (all) with the physics `on`."""
@@ -123,27 +123,28 @@ class Chain:
         if chosen is not None:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
-        left = self.receiver
+        noise, left = self.receiving.noise()
+        plain = not left and not self.sending.distorts and self._unknown is None
+        samples = None
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:
-            still, samples = self._moving(view, on, factor, rows)
-            if not left and not self.sending.distorts and self._unknown is None:
-                return Heard(self.sending.with_samples(still, samples, rows))
-            samples += waveform.transmit(still, self.sending.aired[rows])
+            spectrum, samples = self._moving(view, on, factor, rows)
+            if plain:
+                spectrum = self.sending.with_samples(spectrum, samples, rows)
         else:
             spectrum = self.target.subcarriers(view, on, factor)
-            for other in self.others:
-                spectrum = spectrum + other.own_response[rows]
-            if self._clutter is not None:
-                spectrum = spectrum + self._clutter[rows]
-            if self._unknown is None:
-                spectrum, left = self.receiving.responded(spectrum)
-                if not left and not self.sending.distorts:
-                    return Heard(spectrum)
-                return self.receiving.aired(spectrum, left, rows)
-            samples = waveform.transmit(spectrum, self.sending.aired[rows])
-        if self._unknown is not None:
-            samples = samples + self._unknown[rows]
-        return self.receiving.sampled(samples, left, rows)
+            for one in [*(other.own_response for other in self.others), self._clutter]:
+                spectrum = spectrum if one is None else spectrum + one[rows]
+        if plain:
+            return Heard(spectrum, noise=noise)
+        spectrum = spectrum if noise is None else spectrum + noise.response
+        if samples is None and self._unknown is None:
+            spectrum, left = self.receiving.responded(spectrum, left)
+            done = not left and not self.sending.distorts
+            return Heard(spectrum) if done else self.receiving.aired(spectrum, left, rows)
+        heard = waveform.transmit(spectrum, self.sending.aired[rows])
+        for one in (samples, None if self._unknown is None else self._unknown[rows]):
+            heard = heard if one is None else heard + one
+        return self.receiving.sampled(heard, left, rows)
 
     def _moving(
         self, view: View, on: frozenset[str], factor: np.ndarray | float, rows: slice | np.ndarray
@@ -170,7 +171,7 @@ class Chain:
             value, cell = self._strongest(heard)
             outcome = Outcome(value, cell, np.full(len(value), np.nan))
             return outcome if self.timing is None else self._evenly(outcome)
-        cells = self.sending.cells(heard.responses)
+        cells = heard.cells(self.sending)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
         for effect in providing(self.detection, FiltersCells):
@@ -190,7 +191,7 @@ class Chain:
                 draws = self.draws(effect.name)
                 responses = effect.module.process(effect.settings, responses, self.receiving.bare, draws)
             return strongest_cell.strongest(responses)
-        if heard.given is self.target.__dict__.get("direct"):
+        if heard.noise is None and heard.given is self.target.__dict__.get("direct"):
             return self.target.strongest
         return heard.strongest()
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from lowalt.effects.catalogue import NamedEffect
     from lowalt.effects.checks import CheckedScene
     from lowalt.effects.listening import Listening
+    from lowalt.effects.range_noise import RangeNoise
     from lowalt.effects.response import ImagePath
     from lowalt.effects.transmitter.slow_time import Sampling
     from lowalt.effects.view import Beams, View
@@ -222,6 +223,14 @@ class ChangesResponse(Protocol):
         self, settings: dict, response: np.ndarray, frame: Frame, rng: np.random.Generator
     ) -> np.ndarray | None:
         """Return the response (N, M) with the samples of `receive`, None for none; frame: ones instead of its data."""
+
+
+@runtime_checkable
+class AddsNoise(Protocol):
+    """Optional, receiver: white noise, of which few numbers are made where nothing comes behind it."""
+
+    def noise(self, settings: dict, frame: Frame, rng: np.random.Generator) -> RangeNoise | None:
+        """Return the noise of all range cells (`range_noise.RangeNoise`), None for none; frame: ones for its data."""
 
 
 @runtime_checkable

@@ -105,8 +105,9 @@ def received_signal(
         return Received(own.signal, own.cell, arriving(own.signal), [])
     keep_freed_arrays()
     chain = Chain(beyond, view, partial(_drawn, scene, row, station))
-    # Bounds and the engine are those of a station that receives its own signal.
-    exact = share is None or math.isinf(chain.amplification) or link
+    # Bounds and the engine are those of a station that receives its own signal. Where no physics can be left out, one
+    # exact run takes less time than finding out what error is allowed.
+    exact = share is None or not asked or math.isinf(chain.amplification) or link
     weighed = bool(providing(beyond, WeighsPoints)) or view.beams is not None
     # Noise that an effect sets by this power must not depend on the engine's approximations.
     weighed = weighed or "cell_noise" in chain.names
@@ -116,7 +117,7 @@ def received_signal(
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
     chain.receiving.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     # At a tolerance the chain runs first without the physics by need.
-    chain.receiving.again = share is not None
+    chain.receiving.again = share is not None and bool(asked)
     chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
         if share is not None and asked and steps_alone(chain):
@@ -201,9 +202,8 @@ def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: 
     grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
     sampling = None
     for effect in providing(scene.effects, SamplesTime):
-        sampling = effect.module.sampling(
-            effect.settings, scene.network, scene.stream(effect.name, row, station.name)
-        )  # fmt: skip
+        draws = scene.stream(effect.name, row, station.name)
+        sampling = effect.module.sampling(effect.settings, scene.network, draws)
         times_s = sampling.times_s
     moved = tuple(
         effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))

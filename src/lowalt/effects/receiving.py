@@ -10,7 +10,8 @@ import numpy as np
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import strongest_cell, transforms, waveform
 from lowalt.effects.catalogue import NamedEffect, providing, stream_name
-from lowalt.effects.interface import ChangesResponse, Quantises
+from lowalt.effects.interface import AddsNoise, ChangesResponse, Quantises
+from lowalt.effects.range_noise import RangeNoise
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
 from lowalt.effects.waveform import Frame
@@ -35,17 +36,32 @@ class TakesTones(Protocol):
 class Heard:
     """What a receiver has made of a look: responses (N, M), or their tones and the data (N, M) that they carried."""
 
-    def __init__(self, responses: np.ndarray, data: np.ndarray | None = None):
-        """Keep responses, or with `data`, of unit modulus, the tones (`waveform.tones_of`) of symbols of such data."""
-        self.given, self.data = responses, data
+    def __init__(self, responses: np.ndarray, data: np.ndarray | None = None, noise: RangeNoise | None = None):
+        """Keep responses, or with `data`, of unit modulus, the tones (`waveform.tones_of`) of symbols of such data.
+
+        noise: what is to be added to the range cells of responses.
+        """
+        self.given, self.data, self.noise = responses, data, noise
 
     @cached_property
     def responses(self) -> np.ndarray:
         """The responses (N, M), the data divided out."""
+        if self.noise is not None:
+            return self.given + self.noise.response
         return self.given if self.data is None else waveform.without(self.given, self.data)
+
+    def cells(self, sending: Sending) -> np.ndarray:
+        """Return the range cells, all M or those of the pilots' comb."""
+        if self.noise is None or sending.pilots is not None:
+            return sending.cells(self.responses)
+        cells = sending.cells(self.given)
+        cells += self.noise.cells()
+        return cells
 
     def strongest(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the strongest range cells of all symbols, values (N,) and numbers (N,), from no response at all."""
+        if self.noise is not None:
+            return self.noise.strongest(self.given)
         return strongest_cell.strongest(self.given, self.data)
 
 
@@ -61,15 +77,25 @@ class Receiving:
         """Whether the look is computed more than once: what effects have drawn is then kept."""
         self._converted: tuple[NamedEffect, np.ndarray] | None = None
 
-    def responded(self, spectrum: np.ndarray) -> tuple[np.ndarray, list[NamedEffect]]:
-        """Return responses (N, M) behind the leading effects that act on responses, and the remaining effects."""
-        for place, effect in enumerate(self.effects):
+    def noise(self) -> tuple[RangeNoise | None, list[NamedEffect]]:
+        """Return the noise of range cells with which the effects begin, if any, and the other effects.
+
+        Noise is drawn in range cells where a cell has as much of it as any other, whatever the data.
+        """
+        first = self.effects[:1]
+        if not providing(first, AddsNoise) or self.sending.source is not None or self.sending.distorts:
+            return None, self.effects
+        return first[0].module.noise(first[0].settings, self.bare, self.draws(first[0].name)), self.effects[1:]
+
+    def responded(self, spectrum: np.ndarray, left: list[NamedEffect]) -> tuple[np.ndarray, list[NamedEffect]]:
+        """Return responses (N, M) behind those effects `left` that come first and act on responses, and the others."""
+        for place, effect in enumerate(left):
             changed = None
             if providing([effect], ChangesResponse):
                 draws = self.draws(stream_name(effect.name))
                 changed = effect.module.respond(effect.settings, spectrum, self.bare, draws)
             if changed is None:
-                return spectrum, self.effects[place:]
+                return spectrum, left[place:]
             spectrum = changed
         return spectrum, []
 

@@ -20,6 +20,8 @@ FEWEST = 16
 """Least number of range cells for a search; a transform of so few takes no longer."""
 SLOTS = 16
 """Range cells whose phase factors are held, a power of two of at least MOST."""
+NONE = np.empty(0, np.complex128)
+"""No data."""
 ROOM = 1e-12
 """Share of a symbol's power added to what its cells leave: a difference keeps the rounding of its parts."""
 
@@ -77,35 +79,53 @@ def _cell(parts, q, wave, held, rows):
     return complex(x / count, y / count)
 
 
+@INNER_VECTOR
+def walked(parts, near, n, total, clear, wave, held, rows, seen):
+    """Work out range cells round `near` until all others are smaller by `clear`, or MOST of them.
+
+    total: power of all cells together; n: the symbol's number. seen (SLOTS,) gets the value of cell q at q % SLOTS, for
+    q from the first to the last one returned, modulo M. Returns these two, the largest one, and the power left.
+    """
+    count = parts.shape[1]
+    first, last, best, top, rest = near, near - 1, near, -1.0, (1.0 + ROOM) * total
+    # Where no cells as large as the strongest could make it certain, no more are worked out.
+    while last < first or (
+        not (top > rest and (clear == 0.0 or np.sqrt(top) - np.sqrt(max(rest, 0.0)) > clear))
+        and last - first + 1 < MOST
+        and rest < MOST * top
+    ):
+        q = last + 1
+        if last - best > best - first or (last - best == best - first and last > first and n % 2):
+            q = first - 1
+        first, last = min(first, q), max(last, q)
+        z = _cell(parts, q % count, wave, held, rows)
+        seen[q % SLOTS] = z
+        size = z.real * z.real + z.imag * z.imag
+        rest -= size
+        # Of equal cells the lowest counts, as in a transform's maximum.
+        if size > top or (size == top and q % count < best % count):
+            top, best = size, q
+    return first, last, best, top, rest
+
+
 @VECTOR
-def found(responses, data, none, wave, start, parts, held, rows, value, cell):
+def found(responses, data, none, start, space, value, cell):
     """Fill value and cell (N,) with the strongest range cells of responses (N, M); return whether few are left.
 
-    data: (N, M) where `responses` are tones, else (0, M); none: (0,); start: a cell near the first symbol's; parts
-    (2, M), held (SLOTS,) of -1 and rows (SLOTS, 2, M): work space. Symbols whose strongest cell is not certain after
-    MOST cells are left, with cell -1; once more than a quarter of the look and 16 are left, the loop gives up.
+    data: (N, M) where `responses` are tones, else (0, M); none: (0,); start: a cell near the first symbol's; space: of
+    `space`. Symbols whose strongest cell is not certain after MOST cells are left, with cell -1; once more than a
+    quarter of the look and 16 are left, the loop gives up.
     """
     symbols, count = responses.shape
+    wave, parts, held, rows, seen = space
     left, near = 0, start
     for n in range(symbols):
         own = none
         if len(data) > 0:
             own = data[n]
         total = _power(responses[n], own, parts) / count
-        first, last, best, top, rest = near, near - 1, near, -1.0, (1.0 + ROOM) * total
-        # Where no cells as large as the strongest could make it certain, no more are worked out.
-        while last < first or (not top > rest and last - first + 1 < MOST and rest < MOST * top):
-            q = last + 1
-            if last - best > best - first or (last - best == best - first and last > first and n % 2):
-                q = first - 1
-            first, last = min(first, q), max(last, q)
-            z = _cell(parts, q % count, wave, held, rows)
-            size = z.real * z.real + z.imag * z.imag
-            rest -= size
-            # Of equal cells the lowest counts, as in a transform's maximum.
-            if size > top or (size == top and q % count < best % count):
-                top, best, value[n] = size, q, z
-        near = best % count
+        _, _, best, top, rest = walked(parts, near, n, total, 0.0, wave, held, rows, seen)
+        value[n], near = seen[best % SLOTS], best % count
         cell[n] = near if total > 0.0 else 0
         if total > 0.0 and not top > rest:
             cell[n] = -1
@@ -113,6 +133,13 @@ def found(responses, data, none, wave, start, parts, held, rows, value, cell):
             if 4 * left > symbols + 64:
                 return False
     return True
+
+
+def space(count: int) -> tuple[np.ndarray, ...]:
+    """Return the table and the work space of a search among `count` range cells, as `walked` takes them."""
+    # No cell's phase factors are held yet.
+    held, rows = np.full(SLOTS, -1), np.empty((SLOTS, 2, count))
+    return _wave(count), np.empty((2, count)), held, rows, np.empty(SLOTS, np.complex128)
 
 
 def strongest(responses: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -126,10 +153,7 @@ def strongest(responses: np.ndarray, data: np.ndarray | None = None) -> tuple[np
     given = np.empty((0, count), np.complex128) if data is None else np.ascontiguousarray(data)
     if count >= FEWEST and symbols > 0:
         start = int(abs(_cells(responses[:1], given[:1])).argmax())
-        found(
-            np.ascontiguousarray(responses), given, np.empty(0, np.complex128), _wave(count), start,
-            np.empty((2, count)), np.full(SLOTS, -1), np.empty((SLOTS, 2, count)), value, cell,
-        )  # fmt: skip
+        found(np.ascontiguousarray(responses), given, NONE, start, space(count), value, cell)
     rest = np.flatnonzero(cell < 0)
     if len(rest):
         rows = slice(None) if len(rest) == symbols else rest

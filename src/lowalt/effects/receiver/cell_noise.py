@@ -11,7 +11,8 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver._white import tones_with_noise, with_noise
+from lowalt.effects.range_noise import RangeNoise
+from lowalt.effects.receiver._white import range_noise, tones_with_noise, with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -39,24 +40,26 @@ def check(settings: dict, scene: CheckedScene) -> None:
         )
 
 
-def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise, in each range cell `snr_db` below the target's echo.
+def noise(settings: dict, frame: Frame, rng: np.random.Generator) -> RangeNoise | None:
+    """Return circular white Gaussian noise of all range cells, `snr_db` below the target's echo in each.
 
-    A range cell is the mean of M subcarriers and each of these the sum of M samples, so a cell has a sample's noise.
-    Nothing is added while snr_db is null: `received.Scene.at_snr` gives each of noise.snr_db in turn.
+    None while snr_db is null: `received.Scene.at_snr` gives each of noise.snr_db in turn.
     """
     if settings["snr_db"] is None:
-        return samples
-    return with_noise("cell_noise", samples, _scale(settings, frame), frame, rng)
+        return None
+    return range_noise("cell_noise", math.sqrt(frame.reference * 10 ** (-settings["snr_db"] / 10) / 2), frame, rng)
+
+
+def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) plus those of `noise`.
+
+    A range cell is the mean of M subcarriers and each of these the sum of M samples, so a sample has a cell's noise.
+    """
+    found = noise(settings, frame, rng)
+    return samples if found is None else with_noise(samples, found, frame)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    if settings["snr_db"] is None:
-        return tones
-    return tones_with_noise("cell_noise", tones, _scale(settings, frame), frame, rng)
-
-
-def _scale(settings: dict, frame: Frame) -> float:
-    """Standard deviation of each part of a sample's noise."""
-    return math.sqrt(frame.reference * 10 ** (-settings["snr_db"] / 10) / 2)
+    found = noise(settings, frame, rng)
+    return tones if found is None else tones_with_noise(tones, found, frame)

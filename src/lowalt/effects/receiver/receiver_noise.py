@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from lowalt.effects.receiver._white import tones_with_noise, with_noise
+from lowalt.effects.range_noise import RangeNoise
+from lowalt.effects.receiver._white import range_noise, tones_with_noise, with_noise
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -27,20 +28,21 @@ def variance(settings: dict, spacing_hz: float) -> float:
     return BOLTZMANN * settings["temperature_k"] * spacing_hz * 10 ** (settings["noise_figure_db"] / 10)
 
 
-def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """Return samples (N, M) plus circular white Gaussian noise of k T df F a subcarrier.
+def noise(settings: dict, frame: Frame, rng: np.random.Generator) -> RangeNoise:
+    """Return the noise of all range cells: circular, white and Gaussian, k T df F a subcarrier.
 
-    A subcarrier sums M samples, so each sample carries 1/M of it; unit-norm receive weights leave one antenna's noise.
+    A range cell is the mean of M subcarriers and has 1/M of it; unit-norm receive weights leave one antenna's noise.
     Source: Friis 1944 (noise figure); the link budget's power is the network's `power_w` a subcarrier.
     """
-    return with_noise("receiver_noise", samples, _scale(settings, samples, frame), frame, rng)
+    subcarrier = variance(settings, frame.network.subcarrier_spacing_hz)
+    return range_noise("receiver_noise", math.sqrt(subcarrier / frame.sent.shape[1] / 2), frame, rng)
+
+
+def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) plus those of `noise`, each with 1/M of k T df F."""
+    return with_noise(samples, noise(settings, frame, rng), frame)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    return tones_with_noise("receiver_noise", tones, _scale(settings, tones, frame), frame, rng)
-
-
-def _scale(settings: dict, samples: np.ndarray, frame: Frame) -> float:
-    """Standard deviation of each part of a sample's noise."""
-    return math.sqrt(variance(settings, frame.network.subcarrier_spacing_hz) / samples.shape[1] / 2)
+    return tones_with_noise(tones, noise(settings, frame, rng), frame)
