@@ -29,7 +29,7 @@ PERIOD = 1 << 128
 """Words after which PCG64 repeats itself."""
 _HALF = np.uint64(0xFFFFFFFF)
 COMPILED = 4096
-"""From this many normal numbers on, and once it is loaded, compiled code makes them: the same bits in less time."""
+"""From this many numbers on, and once it is loaded, compiled code makes them: the same bits in less time."""
 
 
 def _count(size: Size) -> int:
@@ -61,6 +61,10 @@ class Draws(np.random.Generator):
 
     def words(self, count: int) -> np.ndarray:
         """Return the next `count` raw words of the bit generator, (count,) uint64."""
+        if count >= COMPILED and "lowalt.common.normals" in sys.modules:
+            from lowalt.common import raw_words
+
+            return raw_words.words(self.bit_generator, count)
         return self.bit_generator.random_raw(count)
 
     def _halves(self, count: int) -> np.ndarray:

@@ -6,7 +6,7 @@ divisor can be zero, and without a check for it these loops become vector instru
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INNER, LEAN
 from lowalt.common.portable import COSINE, LN2, LOGARITHM, SINE
 
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = LOGARITHM
@@ -14,39 +14,43 @@ _S1, _S2, _S3, _S4, _S5, _S6 = SINE
 _C1, _C2, _C3, _C4, _C5, _C6 = COSINE
 _LN2_HIGH, _LN2_LOW = LN2
 _MANTISSA, _ONE = np.int64(0x000FFFFFFFFFFFFF), np.int64(0x3FF0000000000000)
+_WHOLE, _EXPONENT = np.int64(0x4330000000000000), np.int64(52)
+"""Bits of 2^52, whose sum with a small whole number holds that number as its lowest bits."""
+_BIASED = 2.0**52 + 1022.0
+_LOWER = np.uint64(11)
 _STEP = 2.0**-53
 _TURN = 2 * np.pi
+_TWO, _NEXT = np.uint64(2), np.uint64(1)
+BLOCK = 256
+"""Complex numbers made together; all their steps stay in the nearest cache."""
 
 
-@LEAN
-def _minus_log(first, out):
-    """out = -ln((upper 53 bits of first + 1) 2^-53)."""
-    for i in range(first.size):
-        out[i] = (np.float64(np.int64(first[i] >> np.uint64(11))) + 1.0) * _STEP
-    bits = out.view(np.int64)
-    for i in range(first.size):
-        twos = (bits[i] >> 52) - 1022
-        # In [1, 2), and then f in [sqrt(1/2) - 1, sqrt(2) - 1].
+@INNER
+def _block(words, scale, real, imaginary, twos):
+    """Fill real and imaginary (K,) as `fill` does; twos: (K,) work space."""
+    count = np.uint64(len(real))
+    for i in range(count):
+        # A number of 53 bits is exact with or without its sign.
+        real[i] = (np.float64(np.int64(words[_TWO * i] >> _LOWER)) + 1.0) * _STEP
+        imaginary[i] = np.float64(np.int64(words[_TWO * i + _NEXT] >> _LOWER)) * _STEP
+    bits, exponents = real.view(np.int64), twos.view(np.int64)
+    for i in range(count):
+        # No conversion from whole numbers, which would be no vector instruction everywhere.
+        exponents[i] = (bits[i] >> _EXPONENT) | _WHOLE
         bits[i] = (bits[i] & _MANTISSA) | _ONE
-        mantissa = 0.5 * out[i]
+    for i in range(count):
+        # In [1, 2), and then f in [sqrt(1/2) - 1, sqrt(2) - 1].
+        mantissa, k = 0.5 * real[i], twos[i] - _BIASED
         small = mantissa < 0.70710678118654752440
-        f = (out[i] if small else mantissa) - 1.0
-        k = np.float64(twos - 1 if small else twos)
+        f = (real[i] if small else mantissa) - 1.0
+        k = k - 1.0 if small else k
         s = f / (2.0 + f)
         z = s * s
         rest = z * (_L1 + z * (_L2 + z * (_L3 + z * (_L4 + z * (_L5 + z * (_L6 + z * _L7))))))
         half = 0.5 * f * f
-        out[i] = -(k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f))
-
-
-@LEAN
-def fill(words, scale, out):
-    """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64."""
-    count = out.shape[1]
-    real, imaginary = out[0], out[1]
-    _minus_log(words[0::2], real)
+        real[i] = -(k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f))
     for i in range(count):
-        turns = np.float64(np.int64(words[2 * i + 1] >> np.uint64(11))) * _STEP
+        turns = imaginary[i]
         quarter = np.rint(4.0 * turns)
         angle = (turns - 0.25 * quarter) * _TURN
         z = angle * angle
@@ -58,18 +62,41 @@ def fill(words, scale, out):
         one = 1.0 - half
         cosine = one + (((1.0 - one) - half) + z * rest)
         radius = np.sqrt(2.0 * real[i])
-        turned = np.int64(quarter) & 3
-        x = sine if turned & 1 else cosine
-        y = cosine if turned & 1 else sine
-        real[i] = scale * (radius * (-x if turned == 1 or turned == 2 else x))
-        imaginary[i] = scale * (radius * (-y if turned >= 2 else y))
+        # Of the quarters 0 to 4, 1 and 3 swap both; 1 and 2 are left of the origin, 2 and 3 below it.
+        swapped, left, below = abs(quarter - 2.0) == 1.0, abs(quarter - 1.5) < 1.0, abs(quarter - 2.5) < 1.0
+        x = sine if swapped else cosine
+        y = cosine if swapped else sine
+        real[i] = scale * (radius * (-x if left else x))
+        imaginary[i] = scale * (radius * (-y if below else y))
+
+
+@LEAN
+def fill(words, scale, twos, out):
+    """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64.
+
+    twos: (BLOCK,) work space.
+    """
+    for first in range(0, out.shape[1], BLOCK):
+        last = min(first + BLOCK, out.shape[1])
+        _block(words[2 * first :], scale, out[0, first:last], out[1, first:last], twos[: last - first])
+
+
+@LEAN
+def _fill_pairs(words, work, out):
+    """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,); work: (3, BLOCK)."""
+    for first in range(0, len(out), BLOCK):
+        size = min(BLOCK, len(out) - first)
+        real, imaginary, some = work[0, :size], work[1, :size], out[first : first + size]
+        _block(words[2 * first :], 1.0, real, imaginary, work[2, :size])
+        for i in range(np.uint64(size)):
+            some[i, 0], some[i, 1] = real[i], imaginary[i]
 
 
 def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
-    # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
     out = np.empty((len(words) // 2, 2))
-    out[:, 0], out[:, 1] = circular(words)
+    # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
+    _fill_pairs(words, np.empty((3, BLOCK)), out)
     return out.ravel()
 
 
@@ -80,5 +107,5 @@ def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     `Draws.standard_normal` on the same words.
     """
     out = np.empty((2, len(words) // 2))
-    fill(words, scale, out)
+    fill(words, scale, np.empty(BLOCK), out)
     return out

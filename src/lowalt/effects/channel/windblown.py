@@ -5,6 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import next_fast_len
 
+from lowalt.common import raw_words
 from lowalt.common.normals import circular
 from lowalt.effects.channel import clutter_loops
 
@@ -69,7 +70,7 @@ def speckle(
     lines = np.empty((cells, len(shape)), np.complex128)
     # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
     strong = shape > np.sqrt(FAINT)
-    words = rng.bit_generator.random_raw(2 * cells * int(strong.sum()))
+    words = raw_words.words(rng.bit_generator, 2 * cells * int(strong.sum()))
     if slow is not None:
         # A factor of 0 leaves all power at zero frequency.
         shape = _aliased(len(shape), step_s, 0.5 * beta * wavelength_m / np.maximum(slow, 1e-6))
