@@ -7,6 +7,7 @@ divisor can be zero, and without a check for it these loops become vector instru
 import numpy as np
 
 from lowalt.common.jit import INNER, LEAN
+from lowalt.common.memory import aligned
 from lowalt.common.portable import COSINE, LN2, LOGARITHM, SINE
 
 _L1, _L2, _L3, _L4, _L5, _L6, _L7 = LOGARITHM
@@ -96,7 +97,7 @@ def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
     out = np.empty((len(words) // 2, 2))
     # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
-    _fill_pairs(words, np.empty((3, BLOCK)), out)
+    _fill_pairs(words, aligned(3, BLOCK), out)
     return out.ravel()
 
 
@@ -107,5 +108,5 @@ def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     `Draws.standard_normal` on the same words.
     """
     out = np.empty((2, len(words) // 2))
-    fill(words, scale, np.empty(BLOCK), out)
+    fill(words, scale, aligned(BLOCK), out)
     return out

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 
+from lowalt.common.memory import aligned
 from lowalt.effects import transform_loops
 
 LENGTH = transform_loops.LENGTH
@@ -18,7 +19,7 @@ def table() -> np.ndarray:
 
 def work() -> np.ndarray:
     """Return new work space (4, LENGTH) of a compiled transform."""
-    return np.empty((4, LENGTH))
+    return aligned(4, LENGTH)
 
 
 def forward(given: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:

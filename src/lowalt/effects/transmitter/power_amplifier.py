@@ -11,6 +11,7 @@ from functools import cache
 
 import numpy as np
 
+from lowalt.common.memory import aligned
 from lowalt.effects import transforms
 from lowalt.effects.transmitter import _amplifier_loops
 
@@ -43,7 +44,7 @@ def rapp(samples: np.ndarray, saturation: float, smoothness: float) -> np.ndarra
 
 def _compress(samples: np.ndarray, saturation: float, smoothness: float) -> None:
     """Amplify samples (K,) in place."""
-    _amplifier_loops.compress(samples, 1.0 / saturation**2, float(smoothness), np.empty((2, 256)))
+    _amplifier_loops.compress(samples, 1.0 / saturation**2, float(smoothness), aligned(2, 256))
 
 
 @cache
@@ -79,7 +80,7 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
     if count == transforms.LENGTH:
         over, smoothness, tables = 1.0 / saturation**2, float(settings["smoothness"]), (_later(), transforms.table())
         _amplifier_loops.symbols(
-            np.ascontiguousarray(sent), over, smoothness, *tables, np.empty((6, count)), result
+            np.ascontiguousarray(sent), over, smoothness, *tables, aligned(6, count), result
         )  # fmt: skip
         return result
     work = np.empty((min(TOGETHER, symbols), length), np.complex128)
