@@ -171,7 +171,7 @@ def slowly_shuffled(draws, count):
     return order
 
 
-@pytest.mark.parametrize("subcarriers", [32, 9])
+@pytest.mark.parametrize("subcarriers", [32, 9, 256])
 @pytest.mark.parametrize(
     "name, settings",
     [

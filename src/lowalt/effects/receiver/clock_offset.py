@@ -9,9 +9,11 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.jit import LEAN
+from lowalt.common.memory import aligned
 from lowalt.effects import transforms
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
+from lowalt.effects.transform_loops import transformed
 from lowalt.effects.waveform import Frame, turned
 
 SOURCE = (
@@ -79,57 +81,96 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
 
 def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the samples of `receive` from the tones (N, M) of its samples, in the transform's order, as work space."""
-    rates, places = _slipped(settings, tones, frame, rng)
-    samples = transforms.inverse(tones)
-    _stretch(tones, rates, places, samples)
-    return samples
+    return _resampled(settings, tones, frame, rng, False)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    rates, places = _slipped(settings, tones, frame, rng)
-    change = np.zeros(tones.shape, np.complex128)
-    _stretch(tones, rates, places, change)
-    tones += transforms.forward(change, out=change)
-    return tones
+    return _resampled(settings, tones, frame, rng, True)
 
 
-def _slipped(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> tuple:
-    """Turn tones (N, M) as far as each symbol's middle sample is early; return the rest for `_stretch`."""
+def _resampled(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator, back: bool) -> np.ndarray:
+    """The samples of `retimed`, or with `back` the tones of `retoned`; tones are work space.
+
+    Tones are turned as far as each symbol's middle sample is early, and a series over the other samples adds the rest.
+    """
     rate = fast(settings, frame, rng)
     early = -rate / (1 + rate)
     count, baseband = tones.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
     at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
-    _turn(tones, early * frame.network.symbol_interval_s * baseband, at_middle)
-    return 2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle
+    turns = _turns(len(tones), early * frame.network.symbol_interval_s * baseband, at_middle)
+    weights, columns = _series(2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle)
+    if count == transforms.LENGTH:
+        columns /= count
+        _stretched(tones, *turns, weights, columns, back, transforms.table(), aligned(8, count))
+        return tones
+    _stepped(tones, *turns)
+    samples = np.zeros_like(tones) if back else transforms.inverse(tones)
+    for weight, column in zip(weights[1:], columns[1:], strict=True):
+        samples += transforms.inverse(tones * weight) * column
+    return tones + transforms.forward(samples) if back else samples
 
 
-def _stretch(tones: np.ndarray, rates: np.ndarray, places: np.ndarray, samples: np.ndarray) -> None:
-    """Add to samples (N, M) the inverse transform of tones times exp(j rates[m] places[i]) - 1 at sample i, by series.
+def _series(rates: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Real (K, M) and complex (K, M) whose products, summed over K, are exp(j rates[m] places[i]) to rounding.
 
-    The terms left out are below rounding; each term is an inverse transform of its own.
+    The first products are ones; each of the others costs an inverse transform.
     """
     reach = float(abs(rates).max() * abs(places).max())
     order, term = 1, reach
-    column = np.ones(len(places), np.complex128)
-    powers, work = tones, np.empty_like(tones)
+    weights, columns = [np.ones(len(rates))], [np.ones(len(places), np.complex128)]
     while term * math.exp(reach) > ROUNDING:
-        powers = np.multiply(powers, rates, out=None if powers is tones else powers)
-        column = column * (1j * places / order)
-        transforms.inverse(powers, out=work)
-        _grow(work, column, samples)
+        weights.append(weights[-1] * rates)
+        columns.append(columns[-1] * (1j * places / order))
         order += 1
         term *= reach / order
+    return np.array(weights), np.array(columns)
 
 
-def _turn(tones: np.ndarray, turns: np.ndarray, first: np.ndarray) -> None:
-    """Multiply tones (N, M) by first[m] exp(j 2 pi n turns[m]), as products of a coarse and a fine step in n."""
-    count = len(tones)
-    step = math.isqrt(count) + 1
+def _turns(symbols: int, turns: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (K, M) and (S, M) whose products at the quotient and the rest of n over S are first exp(j 2 pi n turns).
+
+    first, turns: (M,), of symbols n from 0 on.
+    """
+    step = math.isqrt(symbols) + 1
     fine = turned(2 * np.pi * np.outer(np.arange(step), turns)) * first
-    coarse = turned(2 * np.pi * np.outer(np.arange(0, count, step), turns))
-    _stepped(tones, coarse, fine)
+    return turned(2 * np.pi * np.outer(np.arange(0, symbols, step), turns)), fine
+
+
+@LEAN
+def _stretched(tones, coarse, fine, weights, columns, back, table, work):
+    """Replace tones (N, 256) by their samples, or with `back` by the tones of those, as `_resampled` does.
+
+    coarse, fine: as in `_stepped`; weights, columns: as in `_series`, the latter divided by 256; table:
+    `transform_loops.turns`; work: (8, 256).
+    """
+    count = np.uint64(256)
+    re, im, new_re, new_im, own_re, own_im = work[0], work[1], work[2], work[3], work[4], work[5]
+    sum_re, sum_im = work[6], work[7]
+    for n in range(len(tones)):
+        row, one, other = tones[n], coarse[n // len(fine)], fine[n % len(fine)]
+        for m in range(count):
+            turned_tone = row[m] * (one[m] * other[m])
+            own_re[m], own_im[m] = turned_tone.real, turned_tone.imag
+            sum_re[m], sum_im[m] = 0.0, 0.0
+        for k in range(1 if back else 0, len(weights)):
+            weight, column = weights[k], columns[k]
+            for m in range(count):
+                re[m], im[m] = own_re[m] * weight[m], own_im[m] * weight[m]
+            # Real and imaginary parts change places: the inverse transform.
+            transformed(im, re, new_im, new_re, table)
+            for i in range(count):
+                c, s = column[i].real, column[i].imag
+                sum_re[i] += new_re[i] * c - new_im[i] * s
+                sum_im[i] += new_re[i] * s + new_im[i] * c
+        if not back:
+            for i in range(count):
+                row[i] = complex(sum_re[i], sum_im[i])
+            continue
+        transformed(sum_re, sum_im, new_re, new_im, table)
+        for m in range(count):
+            row[m] = complex(own_re[m] + new_re[m], own_im[m] + new_im[m])
 
 
 @LEAN
@@ -139,12 +180,3 @@ def _stepped(tones, coarse, fine):
         row, one, other = tones[n], coarse[n // len(fine)], fine[n % len(fine)]
         for m in range(np.uint64(len(row))):
             row[m] *= one[m] * other[m]
-
-
-@LEAN
-def _grow(work, column, samples):
-    """Add work (N, M) times column (M,) to samples (N, M)."""
-    for n in range(len(work)):
-        one, row = work[n], samples[n]
-        for i in range(np.uint64(len(row))):
-            row[i] += one[i] * column[i]
