@@ -5,30 +5,34 @@ import math
 import numpy as np
 
 from lowalt.common.jit import kernel
-from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
+from lowalt.effects.waves import COSINE, SINE, WAVE
 
-LOOPS = kernel(error_model="numpy", fastmath={"contract"})
+LOOPS = kernel(error_model="numpy", _nrt=False, fastmath={"contract"})
+INSIDE = kernel(inner=True, forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract"})
 TURN = 2 * math.pi
 TURN_REST = 2.4492935982947064e-16
 """2 pi less its double, so that rests of whole turns keep their digits."""
-BLOCK = 256
+# Written out one by one, all steps of a polynomial stay in registers.
+_C0, _C1, _C2, _C3, _C4, _C5, _C6, _C7, _C8, _C9, _C10, _C11 = WAVE[COSINE].tolist()
+_S0, _S1, _S2, _S3, _S4, _S5, _S6, _S7, _S8, _S9, _S10, _S11 = WAVE[SINE].tolist()
+
+
+@INSIDE
+def phasor(angle):
+    """Cosine and sine of an angle (rad), at most some thousand turns."""
+    whole = np.rint(angle * (1.0 / TURN))
+    turn = ((angle - whole * TURN) - whole * TURN_REST) * (1.0 / TURN)
+    z = turn * turn
+    c = (((((_C11 * z + _C10) * z + _C9) * z + _C8) * z + _C7) * z + _C6) * z + _C5
+    c = ((((c * z + _C4) * z + _C3) * z + _C2) * z + _C1) * z + _C0
+    s = (((((_S11 * z + _S10) * z + _S9) * z + _S8) * z + _S7) * z + _S6) * z + _S5
+    s = ((((s * z + _S4) * z + _S3) * z + _S2) * z + _S1) * z + _S0
+    return c, s * turn
 
 
 @LOOPS
 def phasors(angle, out):
     """Fill out (K,) complex128 with exp(j angle), angle (K,) rad."""
-    cosine, sine = WAVE[COSINE], WAVE[SINE]
-    turn, square, c, s = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    for first in range(0, len(angle), BLOCK):
-        size = min(BLOCK, len(angle) - first)
-        for i in range(size):
-            whole = np.rint(angle[first + i] * (1.0 / TURN))
-            turn[i] = ((angle[first + i] - whole * TURN) - whole * TURN_REST) * (1.0 / TURN)
-            square[i] = turn[i] * turn[i]
-            c[i], s[i] = cosine[DEGREE], sine[DEGREE]
-        for k in range(DEGREE - 1, -1, -1):
-            for i in range(size):
-                c[i] = c[i] * square[i] + cosine[k]
-                s[i] = s[i] * square[i] + sine[k]
-        for i in range(size):
-            out[first + i] = complex(c[i], s[i] * turn[i])
+    for i in range(np.uint64(len(angle))):
+        c, s = phasor(angle[i])
+        out[i] = complex(c, s)
