@@ -18,7 +18,9 @@ _MANTISSA, _ONE = np.int64(0x000FFFFFFFFFFFFF), np.int64(0x3FF0000000000000)
 _WHOLE, _EXPONENT = np.int64(0x4330000000000000), np.int64(52)
 """Bits of 2^52, whose sum with a small whole number holds that number as its lowest bits."""
 _BIASED = 2.0**52 + 1022.0
-_LOWER = np.uint64(11)
+_LOWER, _UPPER, _HALF = np.uint64(11), np.uint64(43), np.uint64(0xFFFFFFFF)
+_LARGE, _SMALL, _BOTH = np.uint64(0x4530000000000000), np.uint64(0x4330000000000000), 2.0**84 + 2.0**52
+"""Bits of 2^84 and of 2^52, whose sums with 32-bit numbers hold these as their lowest bits; the sum of both."""
 _STEP = 2.0**-53
 _TURN = 2 * np.pi
 _TWO, _NEXT = np.uint64(2), np.uint64(1)
@@ -27,16 +29,21 @@ BLOCK = 256
 
 
 @INNER
-def _block(words, scale, real, imaginary, twos):
-    """Fill real and imaginary (K,) as `fill` does; twos: (K,) work space."""
+def _block(words, scale, real, imaginary, twos, lower):
+    """Fill real and imaginary (K,) as `fill` does; twos, lower: (K,) work space."""
     count = np.uint64(len(real))
+    # A conversion of 64-bit whole numbers is a vector instruction on few processors. So bits are set, and both halves
+    # of a word's upper 53 bits are added as float64, without rounding.
+    x, x_low, y, y_low = real.view(np.uint64), twos.view(np.uint64), imaginary.view(np.uint64), lower.view(np.uint64)
     for i in range(count):
-        # A number of 53 bits is exact with or without its sign.
-        real[i] = (np.float64(np.int64(words[_TWO * i] >> _LOWER)) + 1.0) * _STEP
-        imaginary[i] = np.float64(np.int64(words[_TWO * i + _NEXT] >> _LOWER)) * _STEP
+        one, other = words[_TWO * i], words[_TWO * i + _NEXT]
+        x[i], x_low[i] = (one >> _UPPER) | _LARGE, ((one >> _LOWER) & _HALF) | _SMALL
+        y[i], y_low[i] = (other >> _UPPER) | _LARGE, ((other >> _LOWER) & _HALF) | _SMALL
+    for i in range(count):
+        real[i] = (((real[i] - _BOTH) + twos[i]) + 1.0) * _STEP
+        imaginary[i] = ((imaginary[i] - _BOTH) + lower[i]) * _STEP
     bits, exponents = real.view(np.int64), twos.view(np.int64)
     for i in range(count):
-        # No conversion from whole numbers, which would be no vector instruction everywhere.
         exponents[i] = (bits[i] >> _EXPONENT) | _WHOLE
         bits[i] = (bits[i] & _MANTISSA) | _ONE
     for i in range(count):
@@ -72,23 +79,24 @@ def _block(words, scale, real, imaginary, twos):
 
 
 @LEAN
-def fill(words, scale, twos, out):
+def fill(words, scale, work, out):
     """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64.
 
-    twos: (BLOCK,) work space.
+    work: (2, BLOCK).
     """
     for first in range(0, out.shape[1], BLOCK):
         last = min(first + BLOCK, out.shape[1])
-        _block(words[2 * first :], scale, out[0, first:last], out[1, first:last], twos[: last - first])
+        more, lower = work[0, : last - first], work[1, : last - first]
+        _block(words[2 * first :], scale, out[0, first:last], out[1, first:last], more, lower)
 
 
 @LEAN
 def _fill_pairs(words, work, out):
-    """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,); work: (3, BLOCK)."""
+    """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,); work: (4, BLOCK)."""
     for first in range(0, len(out), BLOCK):
         size = min(BLOCK, len(out) - first)
         real, imaginary, some = work[0, :size], work[1, :size], out[first : first + size]
-        _block(words[2 * first :], 1.0, real, imaginary, work[2, :size])
+        _block(words[2 * first :], 1.0, real, imaginary, work[2, :size], work[3, :size])
         for i in range(np.uint64(size)):
             some[i, 0], some[i, 1] = real[i], imaginary[i]
 
@@ -97,7 +105,7 @@ def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
     out = np.empty((len(words) // 2, 2))
     # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
-    _fill_pairs(words, aligned(3, BLOCK), out)
+    _fill_pairs(words, aligned(4, BLOCK), out)
     return out.ravel()
 
 
@@ -108,5 +116,5 @@ def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
     `Draws.standard_normal` on the same words.
     """
     out = np.empty((2, len(words) // 2))
-    fill(words, scale, aligned(BLOCK), out)
+    fill(words, scale, aligned(2, BLOCK), out)
     return out

@@ -154,12 +154,21 @@ def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | N
     return _toeplitz.root(lags)
 
 
-def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
-    """Return the slow part (N, M) in rad of a drawn phase; `at_key` are the arguments of `grid`."""
+def _even_sines(step: float, count: int) -> np.ndarray:
+    """Return sin(k step), k = 1 .. count, from the sines and cosines of multiples that add up to k."""
+    side = math.isqrt(count) + 1
+    few, many = step * np.arange(side), step * side * np.arange(side)
+    sines = np.outer(np.sin(many), np.cos(few))
+    sines += np.outer(np.cos(many), np.sin(few))
+    return sines.reshape(-1)[1 : count + 1]
+
+
+def _slow_at_nodes(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
+    """Return the slow part (N, Q) in rad of a drawn phase, at the nodes of each symbol."""
     at, symbols = grid(*at_key), at_key[0]
     amplitude = _lines(points, at_key)
     if delay_s is not None:
-        amplitude = amplitude * 2 * np.abs(np.sin(np.pi * at.slow_hz * delay_s))
+        amplitude = amplitude * 2 * np.abs(_even_sines(np.pi * at.slow_hz[0] * delay_s, len(at.slow_hz)))
     drawn = rng.standard_normal((len(amplitude), 2)).view(np.complex128)[:, 0] * amplitude
     # Lines 2 N apart have equal phases at the symbols' starts: add them, then do one short transform a node.
     every, between = _twists(at_key)
@@ -167,8 +176,12 @@ def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.rand
     padded = np.zeros(every.shape[1] * turns, np.complex128)
     padded[1 : len(drawn) + 1] = drawn
     folded = every @ padded.reshape(-1, turns) * between
-    at_nodes = turns * np.fft.ifft(folded, axis=1)[:, :symbols].real
-    return at_nodes.T @ at.blend
+    return turns * np.fft.ifft(folded, axis=1)[:, :symbols].real.T
+
+
+def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
+    """Return the slow part (N, M) in rad of a drawn phase; `at_key` are the arguments of `grid`."""
+    return _slow_at_nodes(points, at_key, delay_s, rng) @ grid(*at_key).blend
 
 
 def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
@@ -176,13 +189,17 @@ def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Ge
 
     delay_s: return phi(t) - phi(t - delay) instead, None for phi itself.
     """
-    slow = slow_phase(points, at_key, delay_s, rng)
-    fast = rng.standard_normal(slow.shape)
+    slow = _slow_at_nodes(points, at_key, delay_s, rng)
+    (symbols, nodes), blend = slow.shape, grid(*at_key).blend
+    fast = rng.standard_normal((symbols, at_key[1]))
     root = _root(points, at_key, delay_s)
     if root is None:
-        return slow
-    # A lower triangle: a block of samples asks only for the draws up to its end.
+        return slow @ blend
+    # Both parts are products of drawn numbers and a matrix, so one product adds them.
+    drawn, weights = np.concatenate([slow, fast], axis=1), np.concatenate([blend, root.T])
+    result = np.empty(fast.shape)
+    # The root is a lower triangle: a block of samples asks only for the draws up to its end.
     for first in range(0, len(root), BLOCK):
         rows = slice(first, min(first + BLOCK, len(root)))
-        slow[:, rows] += fast[:, : rows.stop] @ root[rows, : rows.stop].T
-    return slow
+        np.matmul(drawn[:, : nodes + rows.stop], weights[: nodes + rows.stop, rows], out=result[:, rows])
+    return result
