@@ -95,15 +95,15 @@ def _large(words, limit, first, last, chosen):
 def _strongest(values, chosen, several, words, scale, numbers, best):
     """The strongest of `several` cells that are chosen, in noise, and of the one given: its power, value and number.
 
-    values: what the chosen cells hold besides noise; numbers: words (2 SLOTS,) and numbers (2, SLOTS), work space.
+    values: what the chosen cells hold besides noise; numbers: words (2 SLOTS,) and twice (2, SLOTS), work space.
     """
-    (taken, made), (top, value, cell) = numbers, best
+    (taken, made, work), (top, value, cell) = numbers, best
     for begin in range(0, several, SLOTS):
         some = min(SLOTS, several - begin)
         for k in range(some):
             q = chosen[begin + k]
             taken[2 * k], taken[2 * k + 1] = words[2 * q], words[2 * q + 1]
-        fill(taken, scale, made)
+        fill(taken, scale, work, made)
         for k in range(some):
             q, z = chosen[begin + k], values[begin + k]
             z = complex(z.real + made[0, k], z.imag + made[1, k])
@@ -222,5 +222,5 @@ def _space(count: int, scale: float) -> tuple:
     """Work space of a search in noise among `count` range cells, and a transform's table, empty where there is none."""
     table = transforms.table() if count == transforms.LENGTH else np.empty((0, count))
     chosen, values = np.empty(count, np.int64), np.empty(count, np.complex128)
-    numbers = np.zeros(2 * SLOTS, np.uint64), np.empty((2, SLOTS))
+    numbers = np.zeros(2 * SLOTS, np.uint64), np.empty((2, SLOTS)), np.empty((2, SLOTS))
     return NONE, numbers, chosen, values, np.empty((2, count)), table, scale

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lowalt.common.raw_words import words
 from lowalt.effects import transforms, waveform
 from lowalt.effects.range_noise import RangeNoise
 from lowalt.effects.waveform import Frame
@@ -10,7 +11,7 @@ from lowalt.effects.waveform import Frame
 def range_noise(name: str, scale: float, frame: Frame, rng: np.random.Generator) -> RangeNoise:
     """Return the noise of the effect `name`, of the standard deviation `scale` in each part of a range cell."""
     shape = frame.sent.shape
-    return frame.once(name, lambda: RangeNoise(rng.bit_generator.random_raw(2 * shape[0] * shape[1]), shape, scale))
+    return frame.once(name, lambda: RangeNoise(words(rng.bit_generator, 2 * shape[0] * shape[1]), shape, scale))
 
 
 def tones_with_noise(tones: np.ndarray, noise: RangeNoise, frame: Frame) -> np.ndarray:
