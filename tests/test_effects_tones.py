@@ -177,6 +177,7 @@ def slowly_shuffled(draws, count):
     [
         ("receiver_noise", {"noise_figure_db": 150.0}), ("cell_noise", {"snr_db": 3.0}), ("cell_noise", {}),
         ("timing_offset", {"fixed_s": 1e-7}), ("clock_offset", {"fixed_ppm": 3.0}),
+        ("carrier_offset", {"fixed_ppm": 3.0}), ("phase_noise", {"shared": False}),
         ("iq_imbalance", {"gain_db": 1.0, "phase_deg": 5.0}),
     ],
 )  # fmt: skip

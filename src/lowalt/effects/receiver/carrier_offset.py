@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver import _offsets
+from lowalt.effects.receiver import _offsets, _turns
 from lowalt.effects.waveform import Frame, turned
 
 SOURCE = (
@@ -41,18 +40,16 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     F > 0 if the receiver's oscillator is too low: lines rise by F and fold at half the symbol rate.
     Source: Moose 1994; two draws a sample and station.
     """
+    return _turns.samples(samples, *_phasors(settings, frame, rng))
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    return _turns.tones(tones, *_phasors(settings, frame, rng))
+
+
+def _phasors(settings: dict, frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The turns (N,) at the symbols' starts and (1, M) within a symbol."""
     shift = offset_hz(settings, frame, rng)
     between = turned(2 * np.pi * np.mod(shift * frame.symbol_times_s, 1.0))
-    within = turned(2 * np.pi * shift * frame.sample_times_s)
-    result = np.empty(samples.shape, np.complex128)
-    _turned(np.ascontiguousarray(samples, np.complex128), between, within, result)
-    return result
-
-
-@LEAN
-def _turned(samples, between, within, out):
-    """Fill out (N, M) with samples (N, M) times between (N,) and within (M,)."""
-    for n in range(len(samples)):
-        turn, row, new = between[n], samples[n], out[n]
-        for i in range(np.uint64(len(row))):
-            new[i] = row[i] * (turn * within[i])
+    return between, turned(2 * np.pi * shift * frame.sample_times_s)[None, :]

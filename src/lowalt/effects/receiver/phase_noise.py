@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver import _oscillator
+from lowalt.effects.receiver import _oscillator, _turns
 from lowalt.effects.waveform import Frame, turned
 
 SOURCE = (
@@ -93,4 +93,14 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     the target's reference point; all echoes are taken to have it. Noise beyond half the sample rate is filtered out.
     Source: Petrovic et al. 2007 (within a symbol); Budge and Burt 1993 (range correlation).
     """
-    return frame.once("phase_noise", lambda: turned(phase(settings, frame, rng))) * samples
+    return _turns.samples(samples, np.ones(len(samples), np.complex128), _phasors(settings, frame, rng))
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
+    return _turns.tones(tones, np.ones(len(tones), np.complex128), _phasors(settings, frame, rng))
+
+
+def _phasors(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """The turn (N, M) of every sample."""
+    return frame.once("phase_noise", lambda: turned(phase(settings, frame, rng)))
