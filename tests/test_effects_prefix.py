@@ -54,18 +54,24 @@ def test_the_window_begins_with_the_previous_symbol(tolerance):
     assert abs(received.signal - value).max() <= (tolerance or 1e-10) * abs(value).max()
 
 
-def test_land_is_cut_at_the_delay_of_its_cell():
-    radio = network(subcarriers=64, symbols=5)
+@pytest.mark.parametrize("count", [64, 256])
+@pytest.mark.parametrize("share", [0.0, 144 / 2048, 1.0])
+def test_land_is_cut_at_the_delay_of_its_cell(count, share):
+    radio = network(subcarriers=count, symbols=5)
     rng = np.random.default_rng(1)
-    cells = rng.normal(size=(5, 64)) + 1j * rng.normal(size=(5, 64))
-    now, before = rng.normal(size=(2, 5, 64)) + 1j * rng.normal(size=(2, 5, 64))
-    prefix = round(144 / 2048 * 64)
-    given = {"prefix_s": prefix / (64 * 120e3)}
+    cells = rng.normal(size=(5, count)) + 1j * rng.normal(size=(5, count))
+    now, before = rng.normal(size=(2, 5, count)) + 1j * rng.normal(size=(2, 5, count))
+    prefix = round(share * count)
+    given = {"prefix_s": prefix / (count * 120e3)}
+    kept = cells.copy(), now.copy(), before.copy()
     ours = cyclic_prefix.convolved(given, radio, cells, (now, before))
-    for i in range(64):
-        late = np.arange(64) > i + prefix
-        sent = np.where(late, before[:, (i - np.arange(64) + prefix) % 64], now[:, (i - np.arange(64)) % 64])
-        assert ours[:, i] == pytest.approx((cells * sent).sum(axis=1), rel=1e-12)
+    np.testing.assert_array_equal(kept, (cells, now, before))
+    for i in range(count):
+        late = np.arange(count) > i + prefix
+        sent = np.where(
+            late, before[:, (i - np.arange(count) + prefix) % count], now[:, (i - np.arange(count)) % count]
+        )
+        np.testing.assert_allclose(ours[:, i], (cells * sent).sum(axis=1), rtol=0, atol=1e-14 * abs(ours).max() * 8)
 
 
 def test_land_and_a_target_in_one_cell_are_cut_alike():

@@ -7,13 +7,17 @@ point is cut at its direct delay, on the reflected paths too; other echoes are c
 """
 
 import math
+from functools import cache
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INNER, LEAN
+from lowalt.common.memory import aligned
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.effects import transforms
 from lowalt.effects.prefix import length_s as length_s
 from lowalt.effects.prefix import turn as turn
+from lowalt.effects.transform_loops import transformed
 from lowalt.effects.view import View
 
 SOURCE = (
@@ -83,7 +87,70 @@ def convolved(
     now, before = symbols
     count = now.shape[1]
     prefix = min(round(length_s(settings, network) * count * network.subcarrier_spacing_hz), count)
+    if count == transforms.LENGTH:
+        cells, now, before = (np.ascontiguousarray(one, np.complex128) for one in (cells, now, before))
+        result = np.empty(cells.shape, np.complex128)
+        _convolved(cells, now, before, prefix, _half_turn(count), transforms.table(), aligned(8, count), result)
+        return result
     # From one symbol length before the window: the previous symbol's end, the prefix, and the symbol itself.
     stream = np.concatenate([before[:, prefix:], now[:, count - prefix :], now], axis=1)
     spectrum = np.fft.fft(stream, axis=1) * np.fft.fft(cells, 2 * count, axis=1)
     return np.fft.ifft(spectrum, axis=1)[:, count:]
+
+
+@cache
+def _half_turn(count: int) -> np.ndarray:
+    """Cosine and sine (2, M) of -pi i / M."""
+    turned = np.exp(-1j * np.pi * np.arange(count) / count)
+    return np.stack([turned.real, turned.imag])
+
+
+@INNER
+def _circular(re, im, c_re, c_im, table, work):
+    """Fill work[0] and work[1] with 256 times the circular convolution of re + j im and c_re + j c_im, all (256,).
+
+    The given numbers are overwritten; work: (4, 256).
+    """
+    one_re, one_im, other_re, other_im = work[0], work[1], work[2], work[3]
+    count = np.uint64(256)
+    transformed(re, im, one_re, one_im, table)
+    transformed(c_re, c_im, other_re, other_im, table)
+    for m in range(count):
+        a, b, c, d = one_re[m], one_im[m], other_re[m], other_im[m]
+        re[m], im[m] = a * c - b * d, a * d + b * c
+    # Real and imaginary parts change places: the inverse transform.
+    transformed(im, re, one_im, one_re, table)
+
+
+@LEAN
+def _convolved(cells, now, before, prefix, half_turn, table, work, out):
+    """Fill out (N, 256) as `convolved` does: one circular and one negacyclic convolution take no transform of 512.
+
+    With the window's symbol B and A as long before it, the circular convolution of (B + A) / 2 plus the negacyclic one
+    of (B - A) / 2 takes B up to each sample and A from there on. half_turn: (2, 256), as of `_half_turn`, makes a
+    circular convolution negacyclic; table: `transform_loops.turns`; work: (8, 256).
+    """
+    count, scale = np.uint64(256), 1.0 / 256
+    c, s = half_turn[0], half_turn[1]
+    re, im, cell_re, cell_im, ways = work[0], work[1], work[2], work[3], work[4:]
+    for n in range(len(out)):
+        row, own, last, result = cells[n], now[n], before[n, prefix:], out[n]
+        for i in range(count):
+            re[i], im[i] = own[i].real, own[i].imag
+            cell_re[i], cell_im[i] = row[i].real, row[i].imag
+        for i in range(np.uint64(len(last))):
+            re[i], im[i] = 0.5 * (own[i].real + last[i].real), 0.5 * (own[i].imag + last[i].imag)
+        _circular(re, im, cell_re, cell_im, table, ways)
+        for i in range(count):
+            result[i] = complex(ways[0, i], ways[1, i])
+            a, b = row[i].real, row[i].imag
+            cell_re[i], cell_im[i] = a * c[i] - b * s[i], a * s[i] + b * c[i]
+            re[i], im[i] = 0.0, 0.0
+        for i in range(np.uint64(len(last))):
+            a, b = 0.5 * (own[i].real - last[i].real), 0.5 * (own[i].imag - last[i].imag)
+            re[i], im[i] = a * c[i] - b * s[i], a * s[i] + b * c[i]
+        _circular(re, im, cell_re, cell_im, table, ways)
+        for i in range(count):
+            a, b = ways[0, i], ways[1, i]
+            x, y = result[i].real + (a * c[i] + b * s[i]), result[i].imag + (b * c[i] - a * s[i])
+            result[i] = complex(scale * x, scale * y)
