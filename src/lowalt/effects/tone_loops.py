@@ -5,7 +5,7 @@ Tones stand in the transform's order: the oscillator's subcarrier and those abov
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INNER, LEAN
 
 
 @LEAN
@@ -52,6 +52,15 @@ def divided(tones, data, fresh, response):
             below[m] += last[m] * complex(low[m].real, -low[m].imag)
 
 
+@INNER
+def _replaced(own, turns, old, new, out):
+    """Fill out (K,) with own times (turns old - new), all (K,)."""
+    for m in range(np.uint64(len(out))):
+        a, b, c, d = turns[m].real, turns[m].imag, old[m].real, old[m].imag
+        x, y = (a * c - b * d) - new[m].real, (a * d + b * c) - new[m].imag
+        out[m] = complex(own[m].real * x - own[m].imag * y, own[m].real * y + own[m].imag * x)
+
+
 @LEAN
 def carried_before(response, turns, before, now, rows, tones):
     """Fill tones (K, M), in the transform's order, with the rows (K,) of response, (N, M), times (turns before - now).
@@ -62,10 +71,8 @@ def carried_before(response, turns, before, now, rows, tones):
     rest = response.shape[1] - half
     for k in range(len(rows)):
         own, old, new, out = response[rows[k]], before[rows[k]], now[rows[k]], tones[k]
-        for m in range(rest):
-            out[m] = own[m + half] * (turns[m + half] * old[m + half] - new[m + half])
-        for m in range(half):
-            out[m + rest] = own[m] * (turns[m] * old[m] - new[m])
+        _replaced(own[half:], turns[half:], old[half:], new[half:], out[:rest])
+        _replaced(own[:half], turns[:half], old[:half], new[:half], out[rest:])
 
 
 @LEAN

@@ -29,7 +29,9 @@ def _turned(given, between, within, out):
     for n in range(len(given)):
         turn, factor, row, new = between[n], within[n % len(within)], given[n], out[n]
         for i in range(np.uint64(len(row))):
-            new[i] = row[i] * (turn * factor[i])
+            a, b, x, y = factor[i].real, factor[i].imag, row[i].real, row[i].imag
+            c, s = turn.real * a - turn.imag * b, turn.real * b + turn.imag * a
+            new[i] = complex(x * c - y * s, x * s + y * c)
 
 
 @LEAN

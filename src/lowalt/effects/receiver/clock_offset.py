@@ -151,8 +151,9 @@ def _stretched(tones, coarse, fine, weights, columns, back, table, work):
     for n in range(len(tones)):
         row, one, other = tones[n], coarse[n // len(fine)], fine[n % len(fine)]
         for m in range(count):
-            turned_tone = row[m] * (one[m] * other[m])
-            own_re[m], own_im[m] = turned_tone.real, turned_tone.imag
+            a, b, x, y = one[m].real, one[m].imag, other[m].real, other[m].imag
+            c, s, x, y = a * x - b * y, a * y + b * x, row[m].real, row[m].imag
+            own_re[m], own_im[m] = x * c - y * s, x * s + y * c
             sum_re[m], sum_im[m] = 0.0, 0.0
         for k in range(1 if back else 0, len(weights)):
             weight, column = weights[k], columns[k]
