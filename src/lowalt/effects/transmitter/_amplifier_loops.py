@@ -46,31 +46,30 @@ def symbols(sent, over_square, smoothness, later, table, work, result):
     """Fill result (N, 256) with the subcarriers on the air of symbols of the data sent (N, 256).
 
     later: (R, 2, 256) cosine and sine of the phases, in the transform's order, by which each subcarrier turns in r of R
-    shares of a sample; so R transforms give samples R times as dense; table: `transform_loops.turns`; work: (6, 256).
+    shares of a sample; so R transforms give samples R times as dense; table: `transform_loops.turns`; work: (8, 256).
     """
     re, im, out_re, out_im, sum_re, sum_im = work[0], work[1], work[2], work[3], work[4], work[5]
+    own_re, own_im, count = work[6], work[7], np.uint64(256)
     half, scale = np.uint64(128), 1.0 / (len(later) * result.shape[1])
     for n in range(len(sent)):
-        row, out = sent[n], result[n]
-        for m in range(np.uint64(256)):
+        above, below, to_above, to_below = sent[n, 128:], sent[n, :128], result[n, 128:], result[n, :128]
+        for m in range(half):
+            own_re[m], own_im[m] = above[m].real, above[m].imag
+        for m in range(half):
+            own_re[m + half], own_im[m + half] = below[m].real, below[m].imag
+        for m in range(count):
             sum_re[m], sum_im[m] = 0.0, 0.0
         for r in range(len(later)):
             c, s = later[r, 0], later[r, 1]
-            for m in range(half):
-                a, b = row[m + half].real, row[m + half].imag
-                re[m], im[m] = a * c[m] - b * s[m], a * s[m] + b * c[m]
-            for m in range(half):
-                a, b, i = row[m].real, row[m].imag, m + half
-                re[i], im[i] = a * c[i] - b * s[i], a * s[i] + b * c[i]
+            for m in range(count):
+                re[m], im[m] = own_re[m] * c[m] - own_im[m] * s[m], own_re[m] * s[m] + own_im[m] * c[m]
             transformed(im, re, out_im, out_re, table)
             compressed(out_re, out_im, over_square, smoothness)
             transformed(out_re, out_im, re, im, table)
-            for m in range(np.uint64(256)):
+            for m in range(count):
                 sum_re[m] += re[m] * c[m] + im[m] * s[m]
-            for m in range(np.uint64(256)):
                 sum_im[m] += im[m] * c[m] - re[m] * s[m]
         for m in range(half):
-            out[m + half] = complex(sum_re[m] * scale, sum_im[m] * scale)
+            to_above[m] = complex(sum_re[m] * scale, sum_im[m] * scale)
         for m in range(half):
-            i = m + half
-            out[m] = complex(sum_re[i] * scale, sum_im[i] * scale)
+            to_below[m] = complex(sum_re[m + half] * scale, sum_im[m + half] * scale)

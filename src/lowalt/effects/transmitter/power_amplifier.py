@@ -53,7 +53,7 @@ def _later() -> np.ndarray:
     count = transforms.LENGTH
     turns = np.outer(np.arange(OVERSAMPLING), np.fft.fftfreq(count) / OVERSAMPLING)
     phase = np.exp(2j * np.pi * turns)
-    return np.stack([phase.real, phase.imag], axis=1)
+    return np.stack([phase.real, phase.imag], axis=1, out=aligned(OVERSAMPLING, 2, count))
 
 
 def soft_limit(backoff_db: float) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def aired(settings: dict, sent: np.ndarray) -> np.ndarray:
     if count == transforms.LENGTH:
         over, smoothness, tables = 1.0 / saturation**2, float(settings["smoothness"]), (_later(), transforms.table())
         _amplifier_loops.symbols(
-            np.ascontiguousarray(sent), over, smoothness, *tables, aligned(6, count), result
+            np.ascontiguousarray(sent), over, smoothness, *tables, aligned(8, count), result
         )  # fmt: skip
         return result
     work = np.empty((min(TOGETHER, symbols), length), np.complex128)
