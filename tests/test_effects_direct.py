@@ -7,7 +7,7 @@ import pytest
 
 import reference_effects
 from lowalt.common.errors import InputError
-from lowalt.effects import direct_loops, response_tables
+from lowalt.effects import moment_loops, response_tables
 from lowalt.effects.response import OneWayFactors, response
 from test_effects import network
 
@@ -92,5 +92,5 @@ def test_a_point_in_the_station_is_refused(point):
 
 
 def test_rows_are_filled_to_whole_vectors():
-    assert [direct_loops.padded(count) for count in (1, 16, 17)] == [16, 16, 32]
+    assert [moment_loops.padded(count) for count in (1, 16, 17)] == [16, 16, 32]
     assert response_tables.round_up(1.0) >= 1.0

@@ -9,17 +9,17 @@ from lowalt.effects.received import Scene, observe
 from test_effects import network, target
 
 RADIO = network(transmit=(16, 4), receive=(8, 2), symbols=40)
-POINTS = 24
+POINTS = 48
 
 
 @pytest.mark.parametrize("routes", [(), (3,), (2, 2)])
 def test_every_point_with_any_strength_is_listed_once_and_first(routes):
     rng = np.random.default_rng(1)
     factor = rng.random((*routes, 40, POINTS)) * (rng.random((*routes, 40, POINTS)) < 0.2)
-    numbers = lit_points.lit(factor[..., :15])
-    wanted = (factor[..., :15] != 0).reshape(-1, 40, 15).any(axis=0)
+    numbers = lit_points.lit(factor)
+    wanted = (factor != 0).reshape(-1, 40, POINTS).any(axis=0)
     if numbers is None:
-        assert 4 * -(-wanted.sum(axis=1).max() // 4) > 0.85 * 15
+        assert 16 * -(-wanted.sum(axis=1).max() // 16) > 0.85 * POINTS
         return
     for row, mine in zip(numbers, wanted, strict=True):
         assert len(set(row)) == len(row)
@@ -33,9 +33,9 @@ def test_nothing_is_gathered_where_all_points_echo(factor):
 
 def test_one_symbol_of_a_look_decides_how_many_points_are_kept():
     factor = np.zeros((40, POINTS))
-    assert lit_points.lit(factor).shape == (40, 4)
-    factor[17, :9] = 1.0
-    assert lit_points.lit(factor).shape == (40, 12)
+    assert lit_points.lit(factor).shape == (40, 16)
+    factor[17, :17] = 1.0
+    assert lit_points.lit(factor).shape == (40, 32)
     factor[3] = 1.0
     assert lit_points.lit(factor) is None
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import arrivals, interpolation, moment_loops, response, time_series, waveform
+from lowalt.effects import arrivals, interpolation, moment_loops, response, spread_loops, time_series, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
@@ -13,28 +13,28 @@ from lowalt.effects.received import Scene, observe
 from test_effects_bounds import network, target
 
 
-@pytest.mark.parametrize("count", [1, 2, 63, 64])
-def test_moments_become_subcarriers_as_in_the_plain_sum(count):
+@pytest.mark.parametrize(("count", "reach"), [(1, 0.7), (2, 0.7), (63, 0.7), (64, 0.2), (64, 3.0)])
+def test_moments_become_subcarriers_as_in_the_plain_sum(count, reach):
     rng = np.random.default_rng(count)
-    table = tables.table(0.7, count, 1e-14)
+    table = tables.table(reach, count, 1e-14)
     planes, own = rng.normal(size=(3, 2, len(table))), np.exp(1j * rng.normal(size=3))
     whole, cells = np.array([0, 7, 1000]), rng.normal(size=3)
     found = np.full((3, count), 1.0 + 0j)
     half = (count + 1) // 2
     work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
     none = np.empty((0, count), complex)
-    moment_loops.spread(planes, table, own, whole, cells, *work, False, none, found)
+    spread_loops.spread(planes, table, own, whole, cells, *work, False, none, found)
     off = np.arange(count) - 0.5 * (count - 1)
     delay = np.exp(-2j * np.pi * (whole + cells)[:, None] * off / count)
     truth = own[:, None] * ((planes[:, 0] + 1j * planes[:, 1]) @ table) * delay
     assert abs(found - 1.0 - truth).max() < 1e-11
     # A result that holds nothing yet is filled, with zeros where all moments are zero.
     planes[1], empty = 0.0, np.full((3, count), np.nan + 0j)
-    moment_loops.spread(planes, table, own, whole, cells, *work, True, none, empty)
+    spread_loops.spread(planes, table, own, whole, cells, *work, True, none, empty)
     assert abs(empty[::2] - truth[::2]).max() < 1e-11 and (empty[1] == 0.0).all()
     # With data, the result is the tones of symbols that carry them.
     data, tones = np.exp(2j * np.pi * rng.random((3, count))), np.full((3, count), np.nan + 0j)
-    moment_loops.spread(planes, table, own, whole, cells, *work, True, data, tones)
+    spread_loops.spread(planes, table, own, whole, cells, *work, True, data, tones)
     assert abs(tones - waveform.tones_of(empty, data)).max() < 1e-11
 
 
@@ -147,7 +147,7 @@ def test_moments_are_the_plain_sums_over_points_with_and_without_strength(lit):
     strength[:, lit] = rng.choice([-1e-9, 2e-9, 3.0], (3, len(lit)))
     middle, found = rng.uniform(-0.1, 0.1, 3), np.empty((3, 2, 2, 8))
     planes = [np.stack([one.real, one.imag]) for one in (out, back)]
-    work = np.empty((5, 5)), np.empty(5, np.int64)
+    work = np.empty((moment_loops.SUM_ROWS + 8, 16)), np.empty(5, np.int64)
     moment_loops.moments(strength, *planes, 2.0, ahead, home, middle, 0.5, 1.5, *work, found)
     place = (0.5 * (ahead + home) - middle[:, None]) / 1.5
     terms = (-1j) ** np.arange(8)[:, None, None] * np.cos(np.arange(8)[:, None, None] * np.arccos(place))

@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, ORDERED, VECTOR
+from lowalt.common.jit import ORDERED, VECTOR
 from lowalt.echo.fast.vector_loops import horner
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
-from lowalt.effects.moment_loops import sums
+from lowalt.effects.moment_loops import filled, polynomials, sums, sums_of
 from lowalt.effects.plane_loops import plane_sums
 from lowalt.effects.response_loops import beyond_middle, geometry
 from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
@@ -47,23 +47,7 @@ def spans(places, refs, origin, half_m, low, high, turn):
 
 
 ROWS = 20
-"""Rows of work space of `moments`."""
-LANES = 16
-"""Points whose loops the compiler joins; those left over would pass one by one, so rows are filled up."""
-
-
-def padded(count: int) -> int:
-    """Return the length of rows that hold `count` points in whole vectors."""
-    return -(-count // LANES) * LANES
-
-
-@INNER_VECTOR
-def filled(values, size, out):
-    """Fill out (size,) with values (L,) and the first of them again and again."""
-    for i in range(np.uint64(len(values))):
-        out[i] = values[i]
-    for i in range(len(values), size):
-        out[i] = values[0]
+"""Rows of work space of `moments` at one frequency."""
 
 
 @VECTOR
@@ -73,14 +57,15 @@ def moments(
 ):  # fmt: skip
     """Fill result (N, 2, Q, P) with the moments (`moment_loops.moments`) of points on the direct path, plane waves.
 
-    strength: (N or 1, L) two-way; middle (N,), reach: as there; work (ROWS, `padded`), wide and high (Q, `padded`):
-    work space; the others as in `response_loops.one_way`, whose array sends and receives. Returns 0, or n L + l + 1
-    where r = 0.
+    strength: (N or 1, L) two-way; middle (N,), reach: as there; work (ROWS, S), with P more rows for several
+    frequencies, wide and high (Q, S): work space, S being `moment_loops.padded` of L; the others as in
+    `response_loops.one_way`, whose array sends and receives. Returns 0, or n L + l + 1 where r = 0.
     """
     count, orders, nodes, size = places.shape[2], result.shape[3], len(kappas), work.shape[1]
     side, up, r, weight, ahead = work[0], work[1], work[2], work[3], work[4]
     turn, square, ct, st, more, real, imag = work[5], work[6], work[7], work[8], work[9], work[10], work[11]
     cosine, u, a, b, c, own, spare = work[12], work[13], work[14], work[15], work[16], work[17], work[4:9]
+    table = work[ROWS:]
     middle_h, middle_v = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
     fixed = beam * (middle_h * aims[0] + middle_v * aims[1])
     wave = 2.0 * half_turns if squint else kappas[0] / spacing
@@ -109,11 +94,16 @@ def moments(
             real[i], imag[i] = whole * ct[i], whole * (st[i] * turn[i])
         plane_sums(side, weight, centre, steps, 0.5 * beam * aims[0], shape[0], rows, spare, cosine, more, wide)
         plane_sums(up, weight, centre, steps, 0.5 * beam * aims[1], shape[1], rows, spare, cosine, more, high)
+        if nodes > 1:
+            polynomials(u, table)
         for q in range(nodes):
             one, other = wide[q], high[q]
             for i in range(np.uint64(size)):
                 gain = one[i] * other[i]
                 gain *= gain
                 a[i], b[i] = gain * real[i], gain * imag[i]
-            sums(u, a, b, c, more, size, orders, result[n, :, q])
+            if nodes > 1:
+                sums_of(table, a, b, size, result[n, :, q])
+            else:
+                sums(u, a, b, c, more, size, orders, result[n, :, q])
     return 0

@@ -9,7 +9,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from lowalt.common.jit import LEAN
-from lowalt.effects.moment_loops import BLOCK
+from lowalt.effects.moment_loops import padded
 from lowalt.effects.one_way import ImagePath
 from lowalt.effects.view import View
 
@@ -69,7 +69,7 @@ def lit(factor: np.ndarray | float) -> np.ndarray | None:
         return None
     numbers = np.empty(factor.shape[-2:], np.int64)
     most = _sorted(np.ascontiguousarray(factor, np.float64).reshape(-1, *numbers.shape), numbers)
-    width = max(-(-most // BLOCK) * BLOCK, BLOCK)
+    width = max(padded(most), padded(1))
     return np.ascontiguousarray(numbers[:, :width]) if width <= MOST * numbers.shape[1] else None
 
 

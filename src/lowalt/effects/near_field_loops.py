@@ -1,9 +1,14 @@
 """The compiled loops of array sums of spherical waves: a box's polynomials at the directions of one symbol's points."""
 
+import math
+
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, ORDERED, VECTOR
-from lowalt.effects.moment_loops import BLOCK
+from lowalt.common.jit import INNER_VECTOR, LEAN, ORDERED, VECTOR
+from lowalt.effects.moment_loops import filled
+
+TOGETHER = 4
+"""Terms that share a pass over the points."""
 
 
 @ORDERED
@@ -28,75 +33,111 @@ def directions(places, station, axes, low, high, out):
             low[k, n], high[k, n] = least, most
 
 
+@LEAN
+def nodes(across, up, near, station, axes, out):
+    """Fill out (A, B, C, 3) m with places at direction cosines across (A,) and up (B,), inverse ranges near (C,) (1/m).
+
+    Returns whether all are directions. The sums depend on the direction along the array alone, so its front stands for
+    its back.
+    """
+    sine, cosine = axes
+    for k in range(len(near)):
+        if not near[k] > 0.0:
+            return False
+    for i in range(len(across)):
+        for j in range(len(up)):
+            ahead = 1.0 - across[i] * across[i] - up[j] * up[j]
+            if not ahead > 0.0:
+                return False
+            front = math.sqrt(ahead)
+            x, y = front * cosine - across[i] * sine, front * sine + across[i] * cosine
+            for k in range(len(near)):
+                out[i, j, k, 0] = x / near[k] + station[0]
+                out[i, j, k, 1] = y / near[k] + station[1]
+                out[i, j, k, 2] = up[j] / near[k] + station[2]
+    return True
+
+
 @INNER_VECTOR
 def chebyshev(at, middle, half, table):
     """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,)."""
-    scale = 1.0 / half
+    scale, own = 1.0 / half, table[0]
     for i in range(np.uint64(len(at))):
-        table[0, i] = 1.0
-    for k in range(1, len(table)):
+        own[i] = 1.0
+    if len(table) > 1:
+        own = table[1]
         for i in range(np.uint64(len(at))):
-            x = (at[i] - middle) * scale
-            table[k, i] = 2.0 * x * table[k - 1, i] - table[k - 2, i] if k > 1 else x
+            own[i] = (at[i] - middle) * scale
+    for k in range(2, len(table)):
+        x, older, old, own = table[1], table[k - 2], table[k - 1], table[k]
+        for i in range(np.uint64(len(at))):
+            own[i] = 2.0 * x[i] * old[i] - older[i]
 
 
 @INNER_VECTOR
-def added(real, imag, first, across, weight, total):
-    """Add to total weight (L,) times the sums of real and imag (A,) from `first`, BLOCK each, times rows of `across`.
+def added(terms, names, first, across, rest, re, im):
+    """Add to re and im (L,) the TOGETHER terms (T, 2) from `first`: each times its rows of across and rest.
 
-    across: (A, L); total: (2, L), real and imaginary.
+    names: (T, 2), numbers of rows of across (A, L) and of rest (P, L).
     """
-    t, u, v, w = real[first], real[first + 1], real[first + 2], real[first + 3]
-    a, b, c, d = imag[first], imag[first + 1], imag[first + 2], imag[first + 3]
-    one, two, three, four = across[first], across[first + 1], across[first + 2], across[first + 3]
-    re, im = total[0], total[1]
-    for i in range(np.uint64(len(weight))):
-        e, f, g, h, own = one[i], two[i], three[i], four[i], weight[i]
-        re[i] += own * ((t * e + u * f) + (v * g + w * h))
-        im[i] += own * ((a * e + b * f) + (c * g + d * h))
+    k, l, m, n = first, first + 1, first + 2, first + 3  # noqa: E741
+    t, u, v, w = terms[k, 0], terms[l, 0], terms[m, 0], terms[n, 0]
+    a, b, c, d = terms[k, 1], terms[l, 1], terms[m, 1], terms[n, 1]
+    one, two, three, four = across[names[k, 0]], across[names[l, 0]], across[names[m, 0]], across[names[n, 0]]
+    five, six, seven, eight = rest[names[k, 1]], rest[names[l, 1]], rest[names[m, 1]], rest[names[n, 1]]
+    for i in range(np.uint64(len(re))):
+        e, f, g, h = one[i] * five[i], two[i] * six[i], three[i] * seven[i], four[i] * eight[i]
+        re[i] += (t * e + u * f) + (v * g + w * h)
+        im[i] += (a * e + b * f) + (c * g + d * h)
 
 
 @INNER_VECTOR
-def added_twice(real, imag, first, across, weight, total):
-    """As `added`, of two times BLOCK: the totals then pass through the processor half as often."""
-    t, u, v, w, a, b, c, d = first, first + 1, first + 2, first + 3, first + 4, first + 5, first + 6, first + 7
-    s0, s1, s2, s3, s4, s5, s6, s7 = real[t], real[u], real[v], real[w], real[a], real[b], real[c], real[d]
-    r0, r1, r2, r3, r4, r5, r6, r7 = imag[t], imag[u], imag[v], imag[w], imag[a], imag[b], imag[c], imag[d]
-    x0, x1, x2, x3 = across[t], across[u], across[v], across[w]
-    x4, x5, x6, x7 = across[a], across[b], across[c], across[d]
-    re, im = total[0], total[1]
-    for i in range(np.uint64(len(weight))):
-        e, f, g, h, j, k, m, n, own = x0[i], x1[i], x2[i], x3[i], x4[i], x5[i], x6[i], x7[i], weight[i]
-        re[i] += own * (((s0 * e + s1 * f) + (s2 * g + s3 * h)) + ((s4 * j + s5 * k) + (s6 * m + s7 * n)))
-        im[i] += own * (((r0 * e + r1 * f) + (r2 * g + r3 * h)) + ((r4 * j + r5 * k) + (r6 * m + r7 * n)))
+def joined(mix, orders, re, im):
+    """Fill re and im (L,) with the sum over orders (D, 2, L) of mix (D,) times each."""
+    last = np.uint64(len(mix) - 1)
+    for d in range(np.uint64(0), np.uint64(len(mix)), np.uint64(2)):
+        # Two orders a pass; the last one may be alone.
+        e = min(d + np.uint64(1), last)
+        a, b = mix[d], mix[e] if e > d else 0.0
+        one, two, three, four = orders[d, 0], orders[d, 1], orders[e, 0], orders[e, 1]
+        if d == 0:
+            for i in range(np.uint64(len(re))):
+                re[i], im[i] = a * one[i] + b * three[i], a * two[i] + b * four[i]
+            continue
+        for i in range(np.uint64(len(re))):
+            re[i] += a * one[i] + b * three[i]
+            im[i] += a * two[i] + b * four[i]
 
 
 @VECTOR
-def evaluated(at, middle, half, terms, lengths, across, up, near, weight, total, out):
-    """Fill out (Q, N, L) with the polynomials `terms` (2, Q, B, C, A), real and imaginary, of directions at (3, N, L).
+def evaluated(at, start, stop, middle, half, pairs, terms, names, ends, mix, spot, across, up, near, rest, orders, out):
+    """Fill out (Q, K) from start to stop with a box's polynomials at directions (3, K), of all its points.
 
-    Chebyshev polynomials of (at - middle) / half: A across, B up, C inverse range; of each (B, C) the first
-    lengths[b, c] count, which are multiples of BLOCK. across (A, L), up (B, L), near (C, L), weight (L,) and total
-    (Q, 2, L): work space.
+    Chebyshev polynomials of (at - middle) / half: A across, B up, C inverse range. pairs: (P, 2), numbers of the
+    polynomials up and in inverse range whose products the terms have; terms, names: as in `added`, those of the d-th
+    order in frequency from ends[d] to ends[d + 1]; mix: (Q, D), values of these orders at the frequencies. Work space
+    for S points at a time: spot (2, S), across (A, S), up (B, S), near (C, S), rest (P, S), orders (D, 2, S).
     """
-    count = np.uint64(at.shape[2])
-    for n in range(at.shape[1]):
-        chebyshev(at[0, n], middle[0], half[0], across)
-        chebyshev(at[1, n], middle[1], half[1], up)
-        chebyshev(at[2, n], middle[2], half[2], near)
-        for q in range(terms.shape[1]):
-            for i in range(count):
-                total[q, 0, i], total[q, 1, i] = 0.0, 0.0
-        for b in range(terms.shape[2]):
-            for c in range(terms.shape[3]):
-                for i in range(count):
-                    weight[i] = up[b, i] * near[c, i]
-                for q in range(terms.shape[1]):
-                    real, imag, own = terms[0, q, b, c], terms[1, q, b, c], total[q]
-                    for a in range(0, lengths[b, c] - BLOCK, 2 * BLOCK):
-                        added_twice(real, imag, a, across, weight, own)
-                    if lengths[b, c] % (2 * BLOCK):
-                        added(real, imag, lengths[b, c] - BLOCK, across, weight, own)
-        for q in range(terms.shape[1]):
-            for i in range(count):
-                out[q, n, i] = complex(total[q, 0, i], total[q, 1, i])
+    size = across.shape[1]
+    for first in range(start, stop, size):
+        width = min(size, stop - first)
+        for k in range(3):
+            filled(at[k, first : first + width], size, spot[0])
+            chebyshev(spot[0], middle[k], half[k], across if k == 0 else up if k == 1 else near)
+        for k in range(len(pairs)):
+            one, two, own = up[pairs[k, 0]], near[pairs[k, 1]], rest[k]
+            for i in range(np.uint64(size)):
+                own[i] = one[i] * two[i]
+        for d in range(len(orders)):
+            re, im = orders[d, 0], orders[d, 1]
+            for i in range(np.uint64(size)):
+                re[i], im[i] = 0.0, 0.0
+            for k in range(ends[d], ends[d + 1], TOGETHER):
+                added(terms, names, k, across, rest, re, im)
+        for q in range(len(mix)):
+            own, re, im = out[q, first : first + width], orders[0, 0], orders[0, 1]
+            if len(mix) > 1:
+                re, im = spot[0], spot[1]
+                joined(mix[q], orders, re, im)
+            for i in range(np.uint64(width)):
+                own[i] = complex(re[i], im[i])

@@ -14,6 +14,7 @@ from lowalt.echo.radar import Radar, radar
 from lowalt.effects import direct_loops, near_field, response_loops, waves
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import ONE, Instant, Kept
+from lowalt.effects.moment_loops import padded
 
 
 class ImagePath(NamedTuple):
@@ -151,11 +152,12 @@ class PathFactors:
         strength: (N or 1, L); middle, half_cells, reach: as in `moment_loops.moments`; the others as in `one_way`.
         Raises: InputError for a point in the station.
         """
-        radio, size = self.radio, direct_loops.padded(self.places.shape[1])
+        radio, size = self.radio, padded(self.places.shape[1])
+        rows = direct_loops.ROWS + (result.shape[3] if len(kappas) > 1 else 0)
         fault = direct_loops.moments(
             self._planes, *self._axes, self.refs, self.origin, 0.5 * radio.turns,
             SPEED_OF_LIGHT / (2 * self.network.carrier_hz), self.aims, radio.kappa, kappas, *_stepped(kappas), squint,
-            shape, strength, middle, half_cells, reach, np.empty((direct_loops.ROWS, size)),
+            shape, strength, middle, half_cells, reach, np.empty((rows, size)),
             *np.empty((2, len(kappas), size)), result,
         )  # fmt: skip
         self._check(fault)

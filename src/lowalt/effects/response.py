@@ -12,7 +12,7 @@ import numpy as np
 from lowalt.common.network import Network, Station
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.radar import radar
-from lowalt.effects import moment_loops, waveform
+from lowalt.effects import moment_loops, spread_loops, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import Instant, Kept
 from lowalt.effects.one_way import ImagePath as ImagePath
@@ -137,20 +137,21 @@ class OneWayFactors:
 
         paired: the amplitudes that `paired` gives.
         """
-        half_cells, result = 0.5 * self.radio.cells, []
+        half_cells, result, nodes = 0.5 * self.radio.cells, [], len(self.nodes)
         for (a, b, times), (middle, reach), own in zip(self.pairs, self.frames, paired, strict=True):
             orders = len(tables.table(reach, self.radio.subcarriers, self.rest))
-            found = np.empty((len(self.refs), 2, len(self.nodes), orders))
+            found = np.empty((len(self.refs), 2, nodes, orders))
             if self.direct is not None:
                 self.direct.moments(*self.asked, own, middle, half_cells, reach, found)
             else:
-                there, home = self.out[a], self.back[b]
+                there, home, count = self.out[a], self.back[b], self.out[a].excess.shape[1]
+                rows = moment_loops.SUM_ROWS + (orders if nodes > 1 else 0)
                 moment_loops.moments(
                     own, there.factors, home.factors, times, there.excess, home.excess, middle, half_cells, reach,
-                    np.empty((5, there.excess.shape[1])), np.empty(there.excess.shape[1], np.int64), found,
+                    np.empty((rows, moment_loops.padded(count))), np.empty(count, np.int64), found,
                 )  # fmt: skip
             planes = found.reshape(2 * len(self.refs), -1)
-            if len(self.nodes) > 1:
+            if nodes > 1:
                 planes = planes @ self._joined(reach)[0]
             result.append(planes.reshape(len(self.refs), 2, -1))
         return result
@@ -175,7 +176,7 @@ class OneWayFactors:
         result = np.empty((len(refs), count), np.complex128)
         for number, (planes, (middle, reach)) in enumerate(zip(moments, self.frames, strict=True)):
             cells = refs[:, REST] + middle
-            moment_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, data, result)
+            spread_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, data, result)
         return result
 
     def largest(self, moments: list[np.ndarray]) -> float:
