@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import arrivals, interpolation, moment_loops, response, spread_loops, time_series, waveform
+from lowalt.effects import (
+    arrivals,
+    interpolation,
+    moment_loops,
+    response,
+    spread_loops,
+    time_series,
+    time_series_loops,
+    waveform,
+)
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
@@ -170,3 +179,39 @@ def test_the_number_of_instants_counts_a_part_by_its_share_of_the_amplitudes(mon
     # A part's share is that of its largest amplitude in the look.
     assert (given[0] * strengths.sum(axis=1).max() >= (1 - 1e-12) * strengths).all()
     assert given[0].sum() < 2
+
+
+@pytest.mark.parametrize("physics", [{}, {"squint": {}}])
+@pytest.mark.parametrize("error", [1e-13, 1e-6])
+def test_an_echo_on_the_direct_path_alone_is_the_sum_over_its_instants(physics, error):
+    radio = network(symbols=40, transmit=(8, 4), receive=(8, 4))
+    points = np.random.default_rng(2).uniform(-0.4, 0.4, (21, 3))
+    cloud, row = target(points, rotor=True, x_m=90.0, y_m=-30.0, vx_mps=20.0, rate_hz=90.0)
+    scene = Scene(radio, 3, None, tuple(called({"symbol_motion": {}} | physics)))
+    view = observe(scene, radio.stations[0], cloud, row)
+    chain, on = Chain(list(scene.effects), view, lambda name: scene.stream(name, row, "A"), 1.0), frozenset(physics)
+    chain.error = error
+    factor, on = np.random.default_rng(3).uniform(0.2, 1.0, (40, 21)), on | {"symbol_motion"}
+    given = chain.target, view, on, factor, slice(None)
+    assert time_series.alone(view, None, on)
+    still, samples = arrivals.arriving(*given)
+    whole = arrivals.waveform.transmit(still, chain.sending.aired) + samples
+    truth = arrivals._at_instants(*given, symbol_motion.every_sample(view))
+    assert abs(samples).max() > 1e-3 * abs(truth).max()
+    assert abs(whole - truth).max() < max(1e-10 * abs(truth).max(), error * chain.peaks.sum(axis=1).max())
+
+
+@pytest.mark.parametrize("allowed", [0.0, 1e-9, 2e-3, 1e9])
+def test_moments_left_out_sum_to_no_more_than_is_allowed_and_few_are_kept(allowed):
+    sizes = 0.03 ** np.arange(6)[:, None] * 0.1 ** np.arange(12)
+    used = time_series.numbers(sizes, allowed)
+    left = sizes.sum() - sum(sizes[order, :count].sum() for order, count in enumerate(used))
+    assert used[0] == 12 and left <= allowed + 1e-15
+    assert len(used) == {0.0: 6, 1e-9: 6, 2e-3: 2, 1e9: 1}[allowed]
+    assert allowed == 0.0 or used.sum() < 0.6 * sizes.size
+
+
+def test_the_largest_moment_of_each_order_is_that_of_any_symbol():
+    planes, found = np.random.default_rng(8).normal(size=(3, 7, 2, 8)), np.empty((3, 8))
+    time_series_loops.largest(planes, found)
+    assert found == pytest.approx(np.hypot(planes[:, :, 0], planes[:, :, 1]).max(axis=1), rel=1e-15)

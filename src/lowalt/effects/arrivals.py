@@ -42,7 +42,18 @@ def arriving(
     allowed = 0.5 * max(echo.error, moving.rounding(view))
     strengths = echo.strengths
     count = moving.count(view, allowed, strengths.max(axis=0) / max(float(strengths.sum(axis=1).max()), 1e-300))
-    if count < view.network.subcarriers and np.isfinite(moving.farther_m(view)):
+    farther_m, lit = moving.farther_m(view), lit_points.lit(factor)
+    if (
+        1 < count < view.network.subcarriers
+        and np.isfinite(farther_m)
+        and not held
+        and time_series.alone(view, lit, on)
+    ):
+        still, samples = time_series.arrived(
+            view, moving.nodes_s(view, count), np.ascontiguousarray(echo.sending.aired[rows]), factor,
+            allowed * float(strengths.sum(axis=1).max()), farther_m, squint="squint" in on, error=echo.error,
+        )  # fmt: skip
+    elif count < view.network.subcarriers and np.isfinite(farther_m):
         within = _within(echo, view, on, count)
         numbers, found = np.arange(len(echo.view.times_s))[rows], []
         together = SYMBOLS * max(1, TOGETHER // (SYMBOLS * view.places.shape[1]))

@@ -1,5 +1,7 @@
 """Distances of an array's elements from its corner, where ranges are measured to; half-wavelength spacing."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT, Network
@@ -13,9 +15,16 @@ def distances_m(network: Network, shape: tuple[int, int]) -> np.ndarray:
 
 def mean_distance_m(network: Network, shape: tuple[int, int]) -> float:
     """Return the mean distance of an array's elements from its corner (m)."""
-    return float(distances_m(network, shape).mean())
+    return _extents(network, tuple(shape))[0]
 
 
 def farthest_m(network: Network) -> float:
     """Return the largest distance of any element of both arrays from its corner (m)."""
-    return max(float(distances_m(network, shape).max()) for shape in (network.transmit, network.receive))
+    return max(_extents(network, tuple(shape))[1] for shape in (network.transmit, network.receive))
+
+
+@lru_cache(maxsize=64)
+def _extents(network: Network, shape: tuple[int, int]) -> tuple[float, float]:
+    """Mean and largest distance of an array's elements from its corner (m), which many bounds ask for."""
+    distances = distances_m(network, shape)
+    return float(distances.mean()), float(distances.max())

@@ -8,6 +8,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.echo import Rigid
 from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN, reference
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import Radar, radar
@@ -152,15 +153,42 @@ class PathFactors:
         strength: (N or 1, L); middle, half_cells, reach: as in `moment_loops.moments`; the others as in `one_way`.
         Raises: InputError for a point in the station.
         """
-        radio, size = self.radio, padded(self.places.shape[1])
-        rows = direct_loops.ROWS + (result.shape[3] if len(kappas) > 1 else 0)
-        fault = direct_loops.moments(
-            self._planes, *self._axes, self.refs, self.origin, 0.5 * radio.turns,
-            SPEED_OF_LIGHT / (2 * self.network.carrier_hz), self.aims, radio.kappa, kappas, *_stepped(kappas), squint,
-            shape, strength, middle, half_cells, reach, np.empty((rows, size)),
-            *np.empty((2, len(kappas), size)), result,
+        given, work = self._plane_waves(kappas, squint, shape, result.shape[3])
+        fault = direct_loops.moments(self._planes, *given, strength, middle, half_cells, reach, *work, result)
+        self._check(fault)
+
+    def moments_in_time(
+        self, motion: Rigid, matrix: np.ndarray, asked: tuple, strength: np.ndarray, frame: tuple[np.ndarray, float],
+        half_cells: float, result: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Fill result (K, N, 2, Q, P) with matrix (K, T) times the moments at T instants of the symbols.
+
+        motion: poses at all instants, (T N, ...), the first instant of all symbols first; asked: shape, kappas and
+        squint, frame: middle and reach of `moments`, as the others.
+        Raises: InputError for a point in the station.
+        """
+        (shape, kappas, squint), (middle, reach) = asked, frame
+        given, work = self._plane_waves(kappas, squint, shape, result.shape[4])
+        rotation, translation = motion.rotation, np.ascontiguousarray(motion.translation)
+        # Nodes of a recording have places alone.
+        rotation = np.ascontiguousarray(rotation) if rotation.strides[0] else np.empty((0, *rotation.shape[1:]))
+        fault = direct_loops.moments_in_time(
+            rotation, translation, np.ascontiguousarray(motion.points.T), np.asarray(motion.part, np.int64), matrix,
+            *given, strength, middle, half_cells, reach, *work, np.empty((matrix.shape[1], *result.shape[2:])), result,
         )  # fmt: skip
         self._check(fault)
+
+    def _plane_waves(
+        self, kappas: np.ndarray, squint: bool, shape: tuple[int, int], orders: int
+    ) -> tuple[tuple, tuple]:
+        """What `direct_loops.moments` asks for besides places and strengths, and its work space for so many orders."""
+        radio, size = self.radio, padded(self.places.shape[1])
+        rows = direct_loops.ROWS + (orders if len(kappas) > 1 else 0)
+        given = (
+            *self._axes, self.refs, self.origin, 0.5 * radio.turns, SPEED_OF_LIGHT / (2 * self.network.carrier_hz),
+            self.aims, radio.kappa, kappas, *_stepped(kappas), squint, shape,
+        )  # fmt: skip
+        return given, (np.empty((rows, size)), *np.empty((2, len(kappas), size)))
 
     @property
     def _axes(self) -> tuple[np.ndarray, tuple[float, float]]:

@@ -152,7 +152,7 @@ class OneWayFactors:
                 )  # fmt: skip
             planes = found.reshape(2 * len(self.refs), -1)
             if nodes > 1:
-                planes = planes @ self._joined(reach)[0]
+                planes = planes @ self.joined(reach)[0]
             result.append(planes.reshape(len(self.refs), 2, -1))
         return result
 
@@ -168,32 +168,35 @@ class OneWayFactors:
 
     def _spread(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
         """The subcarriers (N, M) of moments, or with data (N, M) the tones of those of one pair."""
-        refs = self.refs
-        own, whole = np.exp(-2j * np.pi * refs[:, TURN]), refs[:, CELL].astype(np.int64)
         count = self.radio.subcarriers
         half = (count + 1) // 2
         work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
-        result = np.empty((len(refs), count), np.complex128)
-        for number, (planes, (middle, reach)) in enumerate(zip(moments, self.frames, strict=True)):
-            cells = refs[:, REST] + middle
-            spread_loops.spread(planes, self._functions(reach), own, whole, cells, *work, number == 0, data, result)
+        result = np.empty((len(self.refs), count), np.complex128)
+        for number, (planes, (_, reach)) in enumerate(zip(moments, self.frames, strict=True)):
+            given = planes, self.functions(reach), *self.delays(number)
+            spread_loops.spread(*given, *work, number == 0, data, result)
         return result
+
+    def delays(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return a pair's own phase factors (N,), whole range cells (N,) and the rest of the delay in cells (N,)."""
+        own, whole = np.exp(-2j * np.pi * self.refs[:, TURN]), self.refs[:, CELL].astype(np.int64)
+        return own, whole, self.refs[:, REST] + self.frames[number][0]
 
     def largest(self, moments: list[np.ndarray]) -> float:
         """Return a bound of the largest subcarrier of `moments`: each order's function counts by its largest value."""
         return sum(
-            float((np.hypot(planes[:, 0], planes[:, 1]) @ abs(self._functions(reach)).max(axis=1)).max(initial=0.0))
+            float((np.hypot(planes[:, 0], planes[:, 1]) @ abs(self.functions(reach)).max(axis=1)).max(initial=0.0))
             for planes, (_, reach) in zip(moments, self.frames, strict=True)
         )
 
-    def _functions(self, reach: float) -> np.ndarray:
-        """The values (P, M) at the subcarriers of the functions that moments over `reach` multiply."""
+    def functions(self, reach: float) -> np.ndarray:
+        """Return the values (P, M) at the subcarriers of the functions that moments over `reach` multiply."""
         if len(self.nodes) > 1:
-            return self._joined(reach)[1]
+            return self.joined(reach)[1]
         return tables.table(reach, self.radio.subcarriers, self.rest)
 
-    def _joined(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
-        """Tables that join the moments at several frequencies (`response_tables.joined`)."""
+    def joined(self, reach: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return tables that join the moments at several frequencies (`response_tables.joined`)."""
         return tables.joined(reach, len(self.nodes), self.radio.subcarriers, self.rest)
 
     def _frame(self, low: np.ndarray, high: np.ndarray) -> list[tuple[np.ndarray, float]]:

@@ -8,26 +8,31 @@ LOOPS = kernel(error_model="numpy")
 
 
 @LOOPS
-def carried(rotation, translation, planes, part, out):
-    """Fill out (N, 3, L) with rotation[n, part[l]] @ planes[:, l] + translation[n, part[l]].
+def placed(rotation, translation, planes, part, out):
+    """Fill out (3, L) with rotation[part[l]] @ planes[:, l] + translation[part[l]].
 
-    rotation: (N, P, 3, 3); translation: (N, P, 3); planes: (3, L) coordinates; part: (L,). Points of a part that follow
-    each other pass through one loop, whose operations are done as written.
+    rotation: (P, 3, 3); translation: (P, 3); planes: (3, L) coordinates; part: (L,). Points of a part that follow each
+    other pass through one loop, whose operations are done as written.
     """
-    count = len(part)
+    count, first = len(part), 0
     x, y, z = planes[0], planes[1], planes[2]
+    while first < count:
+        p, last = part[first], first
+        while last < count and part[last] == p:
+            last += 1
+        for i in range(3):
+            a, b, c, t = rotation[p, i, 0], rotation[p, i, 1], rotation[p, i, 2], translation[p, i]
+            row = out[i]
+            for l in range(np.uint64(first), np.uint64(last)):  # noqa: E741
+                row[l] = a * x[l] + b * y[l] + c * z[l] + t
+        first = last
+
+
+@LOOPS
+def carried(rotation, translation, planes, part, out):
+    """Fill out (N, 3, L) with what `placed` gives under rotation (N, P, 3, 3) and translation (N, P, 3)."""
     for n in range(rotation.shape[0]):
-        first = 0
-        while first < count:
-            p, last = part[first], first
-            while last < count and part[last] == p:
-                last += 1
-            for i in range(3):
-                a, b, c, t = rotation[n, p, i, 0], rotation[n, p, i, 1], rotation[n, p, i, 2], translation[n, p, i]
-                row = out[n, i]
-                for l in range(np.uint64(first), np.uint64(last)):  # noqa: E741
-                    row[l] = a * x[l] + b * y[l] + c * z[l] + t
-            first = last
+        placed(rotation[n], translation[n], planes, part, out[n])
 
 
 def carry(rotation: np.ndarray, translation: np.ndarray | None, vectors: np.ndarray, part: np.ndarray) -> np.ndarray:

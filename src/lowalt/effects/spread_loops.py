@@ -102,14 +102,14 @@ def spread(planes, table, own, whole, cells, work, turn, sums, fresh, data, resu
         step = turned(whole[n], cells[n], 2, total), turned(whole[n], cells[n], 2 * STRIDE, total)
         ramp(turned(whole[n], cells[n], 1 - total, total), step, total, turn[0], turn[1])
         re, im, x, y = turn[0], turn[1], own[n].real, own[n].imag
-        low_re, low_im, high_re, high_im = sums[0], sums[1], sums[0, ::-1], sums[1, ::-1]
+        low_re, low_im, last = sums[0], sums[1], np.uint64(total - 1)
         for m in range(np.uint64(half)):
             a, b, c, d = even_re[m] + odd_re[m], even_im[m] + odd_im[m], x * re[m] - y * im[m], x * im[m] + y * re[m]
             low_re[m], low_im[m] = a * c - b * d, a * d + b * c
         # Above the middle the odd orders and the delay's phase change their signs.
         for m in range(np.uint64(total - half)):
             a, b, c, d = even_re[m] - odd_re[m], even_im[m] - odd_im[m], x * re[m] + y * im[m], y * re[m] - x * im[m]
-            high_re[m], high_im[m] = a * c - b * d, a * d + b * c
+            low_re[last - m], low_im[last - m] = a * c - b * d, a * d + b * c
         if fresh and len(data) > 0:
             carried(sums, data[n], row)
         elif fresh:
