@@ -1,5 +1,7 @@
 """Sums of spherical waves from a box's nodes, held against the sum over every element at every point."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -152,3 +154,21 @@ def test_a_box_shares_the_bounds_of_one_that_is_nearer_and_farther_from_the_beam
         assert (np.array(found[:2]) < abs(middle[:2]) + 1 / 64).all() and found[2] <= middle[2] * 2 ** (1 / 8) * (
             1 + 1e-12
         )
+
+
+@pytest.mark.parametrize("allowed", [0.0, 1e-6, 1e-2, 1e9])
+def test_terms_that_are_left_out_sum_to_no_more_than_is_allowed(allowed):
+    rng = np.random.default_rng(4)
+    decay = 0.1 ** np.add.outer(np.add.outer(np.arange(3), np.arange(5)), np.add.outer(np.arange(4), np.arange(3)))
+    found = decay * np.exp(2j * np.pi * rng.random(decay.shape))
+    matters = decay[0] > 1e-7
+    pairs, terms, names, ends = near_field_terms.chosen(found, matters, allowed)
+    kept = np.zeros_like(found)
+    for order, (first, last) in enumerate(pairwise(ends)):
+        for (real, imag), (across, pair) in zip(terms[first:last], names[first:last], strict=True):
+            kept[order, across, *pairs[pair]] += complex(real, imag)
+    wanted = found * matters
+    assert ((kept == 0) | (kept == wanted)).all() and abs(wanted - kept).sum() <= allowed
+    # A quarter of what is allowed would not do for many fewer.
+    assert (kept != 0).sum() <= (abs(wanted) > 0.01 * allowed).sum() or allowed == 0.0
+    assert allowed > 0.0 or (kept == wanted).all()

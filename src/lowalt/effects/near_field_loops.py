@@ -58,6 +58,54 @@ def nodes(across, up, near, station, axes, out):
     return True
 
 
+@LEAN
+def listed(found, matters, allowed, size, place, pairs, terms, names, ends):
+    """Fill pairs, terms, names and ends as `evaluated` takes them; return how many pairs and orders there are.
+
+    found: (D, A, B, C) complex terms, of which at most matters (A, B, C) are used; smaller ones that sum to at most
+    `allowed` are left out. size (D, A, B, C), place (B, C) int64: work space. Those of an order fill whole passes.
+    """
+    orders, wide, high, deep = found.shape
+    count, most, least = 0, 0.0, 0.0
+    for d in range(orders):
+        for a in range(wide):
+            for b in range(high):
+                for c in range(deep):
+                    one = found[d, a, b, c]
+                    own = math.sqrt(one.real * one.real + one.imag * one.imag) if matters[a, b, c] else 0.0
+                    size[d, a, b, c] = own
+                    most = max(most, own)
+                    count += 1
+    # The least size that counts: as many times twice the mean share of what is allowed as this holds.
+    flat, higher, total = size.reshape(size.size), allowed / count, 0.0
+    while allowed > 0.0 and total <= allowed and least <= most:
+        least, higher, total = higher, 2.0 * higher, 0.0
+        for i in range(count):
+            total += flat[i] if flat[i] < higher else 0.0
+    place[:] = -1
+    used, at, last = 0, 0, 0
+    ends[0] = 0
+    for d in range(orders):
+        first = at
+        for a in range(wide):
+            for b in range(high):
+                for c in range(deep):
+                    if size[d, a, b, c] < least or size[d, a, b, c] == 0.0:
+                        continue
+                    if place[b, c] < 0:
+                        place[b, c], pairs[used, 0], pairs[used, 1] = used, b, c
+                        used += 1
+                    terms[at, 0], terms[at, 1] = found[d, a, b, c].real, found[d, a, b, c].imag
+                    names[at, 0], names[at, 1] = a, place[b, c]
+                    at += 1
+        last = d if at > first else last
+        while at % TOGETHER:
+            terms[at, 0], terms[at, 1], names[at, 0], names[at, 1] = 0.0, 0.0, 0, 0
+            at += 1
+        ends[d + 1] = at
+    return used, last + 1
+
+
 @INNER_VECTOR
 def chebyshev(at, middle, half, table):
     """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,)."""

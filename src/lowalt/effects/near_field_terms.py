@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from lowalt.effects.near_field_loops import TOGETHER
+from lowalt.effects.near_field_loops import TOGETHER, listed
 
 if TYPE_CHECKING:
     from lowalt.effects.near_field import Arrays
@@ -101,19 +101,9 @@ def chosen(
 
     No Chebyshev polynomial exceeds 1, so terms that sum to at most `allowed` are left out.
     """
-    size = abs(found) * matters
-    ordered = np.sort(size, axis=None)
-    dropped = min(int(np.searchsorted(np.cumsum(ordered), allowed)), ordered.size - 1)
-    order, across, up, near = kept = np.nonzero(size >= max(ordered[dropped], 1e-300))
-    names = up * found.shape[3] + near
-    used = np.zeros(found.shape[2] * found.shape[3], np.bool_)
-    used[names] = True
-    pairs = np.stack(np.divmod(np.flatnonzero(used), found.shape[3]), axis=1)
-    # Those of an order fill whole passes, with zeros behind them.
-    count = np.bincount(order, minlength=1)
-    ends = np.append(0, np.cumsum(-(-count // TOGETHER) * TOGETHER))
-    place = np.arange(len(order)) + (ends[:-1] - np.cumsum(count) + count)[order]
-    terms, both, values = np.zeros((ends[-1], 2)), np.zeros((ends[-1], 2), np.int64), found[kept]
-    terms[place, 0], terms[place, 1] = values.real, values.imag
-    both[place, 0], both[place, 1] = across, (np.cumsum(used) - 1)[names]
-    return pairs, terms, both, ends
+    orders, *_, high, deep = found.shape
+    pairs, ends = np.empty((high * deep, 2), np.int64), np.empty(orders + 1, np.int64)
+    most = orders * (matters.size + TOGETHER)
+    terms, names, place = np.empty((most, 2)), np.empty((most, 2), np.int64), np.empty((high, deep), np.int64)
+    used, last = listed(found, matters, allowed, np.empty(found.shape), place, pairs, terms, names, ends)
+    return pairs[:used], terms, names, ends[: last + 1]
