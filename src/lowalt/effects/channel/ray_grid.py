@@ -21,7 +21,7 @@ SYMBOLS = 64
 """Symbols whose rays share a grid, at least."""
 SIDES = 16, 64
 """Fewest and most cells along each side."""
-ROOM = 12
+ROOM = 24
 """Entries of a grid for each triangle; where that is too few, rays are asked by the tree."""
 NEAREST = 4.0
 """Least distance of the station for a grid, in the part's radius and the station's way together."""

@@ -100,4 +100,4 @@ def kept(vertices, tree, lists, p, point, cells, x, y, z, u, v, w):
     if lists.key[slot] == -1:
         slot = _listed(vertices, tree, lists, p, key, slot, x, y, z, a, b, c, 1.4143 / cells)
     first = lists.begin[slot]
-    return first_hit(vertices, tree, lists.pool, first, first + lists.size[slot], x, y, z, u, v, w)
+    return first_hit(tree, lists.pool, first, first + lists.size[slot], x, y, z, u, v, w)

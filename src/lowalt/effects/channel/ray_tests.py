@@ -33,12 +33,11 @@ def crosses(tree, node, x, y, z, u, v, w):
 
 
 @INLINED
-def hit(vertices, tree, f, x, y, z, u, v, w):
+def hit(tree, f, x, y, z, u, v, w):
     """Whether the ray from x, y, z along u, v, w meets triangle f before its end; Moeller & Trumbore 1997."""
-    i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
-    a0, a1, a2 = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-    d0, d1, d2 = vertices[j, 0] - a0, vertices[j, 1] - a1, vertices[j, 2] - a2
-    e0, e1, e2 = vertices[k, 0] - a0, vertices[k, 1] - a1, vertices[k, 2] - a2
+    a0, a1, a2 = tree.edges[f, 0], tree.edges[f, 1], tree.edges[f, 2]
+    d0, d1, d2 = tree.edges[f, 3], tree.edges[f, 4], tree.edges[f, 5]
+    e0, e1, e2 = tree.edges[f, 6], tree.edges[f, 7], tree.edges[f, 8]
     h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
     size = d0 * h0 + d1 * h1 + d2 * h2
     # The side of the outward normal is turned to the station where `size` is negative.
@@ -55,10 +54,10 @@ def hit(vertices, tree, f, x, y, z, u, v, w):
 
 
 @INLINED
-def first_hit(vertices, tree, pool, first, past, x, y, z, u, v, w):
+def first_hit(tree, pool, first, past, x, y, z, u, v, w):
     """The first of the triangles pool[first] to pool[past - 1] that the ray of `hit` meets, -1 without one."""
     for at in range(first, past):
-        if hit(vertices, tree, pool[at], x, y, z, u, v, w):
+        if hit(tree, pool[at], x, y, z, u, v, w):
             return pool[at]
     return -1
 

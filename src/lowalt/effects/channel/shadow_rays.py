@@ -27,7 +27,7 @@ SLOW = 8e-3
 
 
 @INLINED
-def _through(vertices, tree, p, x, y, z, u, v, w):
+def _through(tree, p, x, y, z, u, v, w):
     """A triangle of part p that the ray from x, y, z along u, v, w meets, -1 without one."""
     node, end = tree.root[p], tree.skip[tree.root[p]]
     while node < end:
@@ -35,7 +35,7 @@ def _through(vertices, tree, p, x, y, z, u, v, w):
             node = tree.skip[node]
             continue
         f = tree.face[node]
-        if f >= 0 and hit(vertices, tree, f, x, y, z, u, v, w):
+        if f >= 0 and hit(tree, f, x, y, z, u, v, w):
             return f
         node += 1
     return -1
@@ -120,7 +120,7 @@ def cast(
                     i, j, k = _in_part(rotation[n, p], translation[n, p], g0, g1, g2)
                 u, v, w = station[n, p, 0] - i, station[n, p, 1] - j, station[n, p, 2] - k
                 if turn < 0:
-                    if hit(vertices, tree, last, i, j, k, u, v, w):
+                    if hit(tree, last, i, j, k, u, v, w):
                         found[n, l] = True
                         break
                     continue
@@ -130,11 +130,11 @@ def cast(
                     continue
                 if cell >= 0:
                     first, past = grid.start[m, cell], grid.start[m, cell + 1]
-                    f = first_hit(vertices, tree, grid.pool[m], first, past, i, j, k, u, v, w)
+                    f = first_hit(tree, grid.pool[m], first, past, i, j, k, u, v, w)
                 elif p == own and listed[p]:
                     f = kept(vertices, tree, lists, p, l, cells[p], i, j, k, u, v, w)
                 else:
-                    f = _through(vertices, tree, p, i, j, k, u, v, w)
+                    f = _through(tree, p, i, j, k, u, v, w)
                 if f >= 0:
                     found[n, l] = True
                     work[l] = f

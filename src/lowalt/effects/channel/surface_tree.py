@@ -25,7 +25,8 @@ class Tree(NamedTuple):
     faces (F, 3): corners, in the tree's order; closed (F,): whether each is of a closed surface; centre (K, 3) m and
     radius_m (K,) of the balls, in their parts' frames; skip (K,): next node after a node's contents; face (K,): a
     leaf's triangle, -1 for other nodes; root (P,): each part's first node, -1 without triangles; owner (F,): parts;
-    half (K, 3) m: half the sides of boxes about the same centres; first, count (P,): each part's triangles.
+    half (K, 3) m: half the sides of boxes about the same centres; first, count (P,): each part's triangles; edges
+    (F, 9) m: a triangle's first corner, then the ways to its other two, together in memory.
     """
 
     faces: np.ndarray
@@ -39,6 +40,7 @@ class Tree(NamedTuple):
     half: np.ndarray
     first: np.ndarray
     count: np.ndarray
+    edges: np.ndarray
 
 
 def curve(place: np.ndarray) -> np.ndarray:
@@ -103,6 +105,7 @@ def tree(surfaces: dict, faces: np.ndarray) -> Tree:
     closed, owner = surfaces["closed"], np.asarray(surfaces["vertex_part"], np.int64)[faces[:, 0]]
     corners = np.asarray(surfaces["vertices"], np.float64)[faces]
     low, high = corners.min(axis=1), corners.max(axis=1)
+    edges = np.concatenate([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
     place = np.zeros(low.shape)
     for part in np.unique(owner):
         mine = owner == part
@@ -122,5 +125,6 @@ def tree(surfaces: dict, faces: np.ndarray) -> Tree:
     first = np.searchsorted(owner, np.arange(len(closed)))
     count = np.bincount(owner, minlength=len(closed))
     return Tree(
-        faces, sides, centre[:node], radius_m[:node], skip[:node], face[:node], root, owner, half[:node], first, count
+        faces, sides, centre[:node], radius_m[:node], skip[:node], face[:node], root, owner, half[:node], first, count,
+        np.ascontiguousarray(edges[order]),
     )  # fmt: skip

@@ -151,7 +151,7 @@ def _cast(station, axes, p, points, part, toward, vertices, tree, start, pool, e
             u, v, w = station[n, 0] - x, station[n, 1] - y, station[n, 2] - z
             across, up, _ = _across(axes, u, v, w)
             slot = min(int(_around(across, up) * (0.25 * BINS)), BINS - 1)
-            if first_hit(vertices, tree, pool, start[slot], start[slot + 1], x, y, z, u, v, w) >= 0:
+            if first_hit(tree, pool, start[slot], start[slot + 1], x, y, z, u, v, w) >= 0:
                 found[n, l] = True
 
 
