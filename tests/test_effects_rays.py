@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.effects.channel import occlusion, shadow_rays, still_rays, surface_tree
+from lowalt.effects.channel import occlusion, ray_grid, shadow_rays, still_rays, surface_tree
 from lowalt.effects.channel.ray_tests import cross
 from lowalt.targets.surfaces import Surface
 from test_effects_occlusion import NETWORK, scene
@@ -57,17 +57,43 @@ def test_azimuths_lose_no_triangle_of_a_part_that_turns(kind, z_m, closed, monke
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_points_that_are_judged_for_many_symbols_are_hidden_in_all_or_none_of_them(closed, monkeypatch):
-    view = loose(200, ("body",), closed, x_m=40.0, y_m=30.0, z_m=45.0, vx_mps=6.0)
+def test_points_that_are_judged_for_many_symbols_are_hidden_as_ray_by_ray(closed, monkeypatch):
+    view = loose(200, ("body",), closed, x_m=40.0, y_m=30.0, z_m=45.0, vx_mps=-9.0, vy_mps=28.0)
     view = replace(view, times_s=NETWORK.times_s[:150])
-    given, judged = [], shadow_rays.judged
-    monkeypatch.setattr(shadow_rays, "judged", lambda *values: (given.append(judged(*values)), given[0])[1])
+    asked, hidden, judged = [], [], shadow_rays.judged
+
+    def kept(*values):
+        asked.append(judged(*values))
+        hidden.append(values[-1].copy())
+        return asked[0]
+
+    monkeypatch.setattr(shadow_rays, "judged", kept)
     found = occlusion.hidden(view)
-    shares = [(given[0] == verdict).mean() for verdict in (still_rays.FREE, still_rays.HIDDEN, still_rays.OPEN)]
-    assert min(shares[:2]) > 0.03
-    assert 0.0 < shares[2] < 0.8
-    monkeypatch.setattr(shadow_rays, "judged", lambda *values: np.full(given[0].shape, still_rays.OPEN, np.int8))
+    assert asked[0].all() and asked[0].shape == (3, 40)
+    assert (hidden[0] == found).all()
+    # Some points are free of all triangles, some hidden for good, and some come and go.
+    assert min(found.all(axis=0).mean(), (~found).all(axis=0).mean()) > 0.03
+    assert len(np.unique(found, axis=0)) > 5
+    monkeypatch.setattr(shadow_rays, "judged", lambda *values: np.zeros_like(asked[0]))
     assert (found == occlusion.hidden(view)).all()
+
+
+def test_a_point_without_a_grid_toward_the_station_is_not_judged():
+    view = loose(200, ("body",), True, x_m=40.0, y_m=30.0, z_m=45.0, vx_mps=6.0)
+    surfaces = view.occluders
+    tree = surface_tree.whole_tree(surfaces)
+    station = np.array([[40.0, 30.0, 45.0]]) + np.linspace(0.0, 0.5, 70)[:, None] * [1.0, -1.0, 0.0]
+    grid = ray_grid.grids(station, surfaces["vertices"], tree, 0)
+    points, part, toward = np.zeros((2, 3)), np.zeros(2, np.int64), np.array([0.0, 0.1])
+    given = surfaces["vertices"], tree, 0, grid
+    # A point that is moved toward the station does not stand still in its part's frame.
+    asked = [
+        still_rays.judged(*given, seen, points, part, toward, np.zeros((70, 2), np.bool_)).tolist()
+        for seen in (station, station * [1, 1, -1])
+    ]
+    assert asked == [[[True, False]] * 2, [[False, False]] * 2]
+    grid.way[:] = -1.0
+    assert not still_rays.judged(*given, station, points, part, toward, np.zeros((70, 2), np.bool_)).any()
 
 
 def test_cross_products_are_numpys_to_the_last_bit():

@@ -14,11 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.jit import INLINED, INNER, LEAN
-from lowalt.effects.channel.ray_tests import cross
+from lowalt.effects.channel.ray_tests import cross, hit
 from lowalt.effects.channel.surface_tree import Tree
 
 SYMBOLS = 64
-"""Symbols whose rays share a grid, at least."""
+"""Symbols whose rays are asked together; a grid serves a multiple of them."""
 SIDES = 16, 64
 """Fewest and most cells along each side."""
 ROOM = 24
@@ -28,11 +28,12 @@ NEAREST = 4.0
 
 
 class RayGrid(NamedTuple):
-    """Grids of a part, one for every `symbols` symbols.
+    """Grids of a part, one for every `symbols` symbols, a multiple of SYMBOLS.
 
     axes (K, 3, 3): to the station, and two across; middle (3,) and radius_m of the part; far (K,) m: the station's
     distance; way (K,) m: how far it moves, negative where the tree is to be asked; low (K, 2) m, wide (K, 2) 1/m: edges
-    and cells a metre; cells: along each side; start (K, cells^2 + 1): where each begins in pool (K, ...), of triangles.
+    and cells a metre; cells: along each side; start (K, cells^2 + 1): where each begins in pool (K, ...), of
+    triangles; top (K, F) m: how far each of the part's triangles reaches from the plane toward the station.
     """
 
     axes: np.ndarray
@@ -46,18 +47,22 @@ class RayGrid(NamedTuple):
     symbols: int
     start: np.ndarray
     pool: np.ndarray
+    top: np.ndarray
 
 
 NONE = RayGrid(
     np.zeros((1, 3, 3)), np.zeros(3), 0.0, np.zeros(1), np.full(1, -1.0), np.zeros((1, 2)), np.zeros((1, 2)), 0, 1,
-    np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int64),
+    np.zeros((1, 1), np.int64), np.zeros((1, 1), np.int64), np.zeros((1, 1)),
 )  # fmt: skip
 """No grid at all."""
 
 
 @LEAN
 def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
-    """Fill out (4,) with the edges of triangle f's widened image, low and high; return whether any ray can meet it."""
+    """Fill out (5,) with the edges of triangle f's widened image, low and high, and how far it reaches to the station.
+
+    Return whether any ray can meet it.
+    """
     i, j, k = tree.faces[f, 0], tree.faces[f, 1], tree.faces[f, 2]
     if tree.closed[f]:
         d0, d1, d2 = vertices[j, 0] - vertices[i, 0], vertices[j, 1] - vertices[i, 1], vertices[j, 2] - vertices[i, 2]
@@ -69,12 +74,12 @@ def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
         if facing < 0.0 and facing * facing > (u * u + v * v + w * w) * (way + 1e-9 * far) ** 2:
             return False
     off = 0.0
-    out[0], out[1], out[2], out[3] = np.inf, np.inf, -np.inf, -np.inf
+    out[0], out[1], out[2], out[3], out[4] = np.inf, np.inf, -np.inf, -np.inf, -np.inf
     for corner in range(3):
         at = tree.faces[f, corner]
         x, y, z = vertices[at, 0] - middle[0], vertices[at, 1] - middle[1], vertices[at, 2] - middle[2]
         height = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
-        off = max(off, abs(height))
+        off, out[4] = max(off, abs(height)), max(out[4], height)
         larger = far / (far - height)
         for side in range(2):
             place = (x * axes[1 + side, 0] + y * axes[1 + side, 1] + z * axes[1 + side, 2]) * larger
@@ -85,13 +90,14 @@ def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
 
 
 @INNER
-def _filled(vertices, tree, p, axes, middle, radius_m, far, way, images, shown, low, wide, cells, start, pool):
-    """Fill one grid of part p; images (F, 4) and shown (F,) are work. Return whether there is room for it."""
+def _filled(vertices, tree, p, axes, middle, radius_m, far, way, images, shown, low, wide, cells, start, pool, top):
+    """Fill one grid of part p; images (F, 5) and shown (F,) are work. Return whether there is room for it."""
     first, count = tree.first[p], tree.count[p]
     low[:] = np.inf
     wide[:] = -np.inf
     for f in range(count):
         shown[f] = _image(vertices, tree, first + f, axes, middle, radius_m, far, way, images[f])
+        top[first + f] = images[f, 4]
         if shown[f]:
             for side in range(2):
                 low[side], wide[side] = min(low[side], images[f, side]), max(wide[side], images[f, 2 + side])
@@ -131,8 +137,28 @@ def _fill(vertices, tree, p, grid, images, shown):
         if grid.way[k] >= 0.0 and not _filled(
             vertices, tree, p, grid.axes[k], grid.middle, grid.radius_m, grid.far[k], grid.way[k], images, shown,
             grid.low[k], grid.wide[k], grid.cells, grid.start[k], grid.pool[k],
+            grid.top[k],
         ):  # fmt: skip
             grid.way[k] = -1.0
+
+
+@INLINED
+def height_of(grid, k, x, y, z):
+    """How far a place stands from the plane of grid k toward the station (m)."""
+    axes, middle = grid.axes[k], grid.middle
+    return (x - middle[0]) * axes[0, 0] + (y - middle[1]) * axes[0, 1] + (z - middle[2]) * axes[0, 2]
+
+
+@INLINED
+def in_cell(tree, grid, k, cell, x, y, z, u, v, w):
+    """A triangle in a cell of grid k that the ray from x, y, z along u, v, w meets, -1 without one."""
+    # Rays go toward the station. What reaches less far than their start is behind them; the room is for rounding.
+    height = height_of(grid, k, x, y, z) - 1e-9
+    for at in range(grid.start[k, cell], grid.start[k, cell + 1]):
+        f = grid.pool[k, at]
+        if grid.top[k, f] >= height and hit(tree, f, x, y, z, u, v, w):
+            return f
+    return -1
 
 
 @INLINED
@@ -162,7 +188,7 @@ def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> R
     away = station - middle
     # As few grids as widen images by about half a cell at most.
     moved = np.linalg.norm(away - away[len(away) // 2], axis=1).max() / np.linalg.norm(away[len(away) // 2])
-    symbols = max(SYMBOLS, math.ceil(len(away) / max(1.0, math.ceil(moved * cells))))
+    symbols = SYMBOLS * math.ceil(len(away) / max(1.0, math.ceil(moved * cells)) / SYMBOLS)
     count = -(-len(station) // symbols)
     axes, far, way = np.empty((count, 3, 3)), np.empty(count), np.empty(count)
     for k in range(count):
@@ -177,6 +203,7 @@ def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> R
     grid = RayGrid(
         axes, middle, radius_m, far, way, np.empty((count, 2)), np.empty((count, 2)), cells, symbols,
         np.empty((count, cells * cells + 1), np.int64), np.empty((count, ROOM * faces + cells * cells), np.int64),
+        np.empty((count, len(tree.owner))),
     )  # fmt: skip
-    _fill(vertices, tree, part, grid, np.empty((faces, 4)), np.empty(faces, np.bool_))
+    _fill(vertices, tree, part, grid, np.empty((faces, 5)), np.empty(faces, np.bool_))
     return grid

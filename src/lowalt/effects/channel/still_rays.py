@@ -1,21 +1,22 @@
 """Points of a part that turns slowly, and what its own triangles do to all their rays of some symbols at once.
 
 In the part's frame such a point stands still and the rays to the station fill a narrow cone. Either no triangle of the
-part can meet any ray of the cone, or one of them meets all, or the rays are asked one by one.
+part can meet any ray of the cone, or one of them meets all, or the few that can meet some are held against each ray.
 """
 
 import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
-from lowalt.effects.channel.ray_grid import RayGrid
+from lowalt.common.jit import INLINED, INNER, LEAN
+from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid
 from lowalt.effects.channel.ray_tests import sides
+from lowalt.effects.channel.surface_tree import Tree
 
-SYMBOLS = 64
-"""Symbols whose rays are judged together."""
 FREE, HIDDEN, OPEN = 0, 1, 2
-"""No ray is hidden by the part's own triangles; all rays are hidden by them; rays are asked one by one."""
+"""A triangle meets no ray of a cone; it meets all of them; it may meet some."""
+UNKNOWN = -1
+"""No answer: the part has no grid there, or the cone is too wide."""
 LEAST = 1e-9
 """Least angle between a cone's middle ray and its rim (rad), far above rounding."""
 
@@ -45,16 +46,21 @@ def _met(vertices, tree, f, x, y, z, a, b, c, spread):
     return HIDDEN if (least > 0 or most < 0) and ahead > room else OPEN
 
 
-@INLINED
-def _judged(vertices, tree, grid, k, x, y, z, s0, s1, s2, way):
-    """What the part of grid k does to the rays from x, y, z to within `way` (m) of the place s0, s1, s2."""
+@INNER
+def _judged(vertices, tree, grid, k, start, aim, way, stamp, stamps, some):
+    """Fill `some` with the triangles of grid k that may meet some rays from `start` (3,) to within `way` (m) of `aim`.
+
+    Return their number and FREE; or HIDDEN where one triangle meets all rays, UNKNOWN without an answer. stamps (F,):
+    work, less than `stamp` at first; a triangle of several cells is asked once.
+    """
     axes, cells = grid.axes[k], grid.cells
-    a, b, c = s0 - x, s1 - y, s2 - z
+    x, y, z = start[0], start[1], start[2]
+    a, b, c = aim[0] - x, aim[1] - y, aim[2] - z
     far = math.sqrt(a * a + b * b + c * c)
     a, b, c = a / far, b / far, c / far
     ahead = a * axes[0, 0] + b * axes[0, 1] + c * axes[0, 2]
     if grid.way[k] < 0.0 or ahead < 0.9 or way > 0.1 * far:
-        return OPEN
+        return 0, UNKNOWN
     spread = 1.1 * way / far + LEAST
     i, j, h = x - grid.middle[0], y - grid.middle[1], z - grid.middle[2]
     height = i * axes[0, 0] + j * axes[0, 1] + h * axes[0, 2]
@@ -66,41 +72,113 @@ def _judged(vertices, tree, grid, k, x, y, z, s0, s1, s2, way):
     low, wide = grid.low[k], grid.wide[k]
     i0, i1 = math.floor((right - room - low[0]) * wide[0]), math.floor((right + room - low[0]) * wide[0])
     j0, j1 = math.floor((up - room - low[1]) * wide[1]), math.floor((up + room - low[1]) * wide[1])
-    found = FREE
+    count = 0
     for m in range(max(int(i0), 0), min(int(i1), cells - 1) + 1):
         for n in range(max(int(j0), 0), min(int(j1), cells - 1) + 1):
             for at in range(grid.start[k, m * cells + n], grid.start[k, m * cells + n + 1]):
-                one = _met(vertices, tree, grid.pool[k, at], x, y, z, a, b, c, spread)
+                f = grid.pool[k, at]
+                # All rays go toward the station, and what reaches less far than their start is behind them.
+                if stamps[f] == stamp or grid.top[k, f] < height - 1e-9:
+                    continue
+                stamps[f] = stamp
+                one = _met(vertices, tree, f, x, y, z, a, b, c, spread)
                 if one == HIDDEN:
-                    return HIDDEN
-                found = max(found, one)
-    return found
+                    return 0, HIDDEN
+                if one == OPEN:
+                    some[count] = f
+                    count += 1
+    return count, FREE
+
+
+@INNER
+def _ask(tree, f, start, ways, size, free):
+    """Set free (SYMBOLS,) to 0 where the ray from `start` along ways (3, SYMBOLS) meets triangle f, as `ray_tests.hit`.
+
+    Comparisons in place of branches, so that symbols pass in vector instructions.
+    """
+    edge = tree.edges[f]
+    d0, d1, d2, e0, e1, e2 = edge[3], edge[4], edge[5], edge[6], edge[7], edge[8]
+    o0, o1, o2 = start[0] - edge[0], start[1] - edge[1], start[2] - edge[2]
+    q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
+    height = e0 * q0 + e1 * q1 + e2 * q2
+    largest = 0.0 if tree.closed[f] else np.inf
+    us, vs, ws = ways[0], ways[1], ways[2]
+    for n in range(np.uint64(size)):
+        u, v, w = us[n], vs[n], ws[n]
+        h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
+        turned = d0 * h0 + d1 * h1 + d2 * h2
+        sign = 1.0 if turned > 0.0 else -1.0
+        whole = sign * turned
+        one = sign * (o0 * h0 + o1 * h1 + o2 * h2)
+        other = sign * (u * q0 + v * q1 + w * q2)
+        way = sign * height
+        # `turned` is 0 where the ray lies in the plane, and then `way` is not between 0 and it.
+        met = (
+            (turned <= largest) & (one >= 0.0) & (other >= 0.0) & (one + other <= whole) & (way > 0.0) & (way < whole)
+        )  # fmt: skip
+        free[n] = 0.0 if met else free[n]
+
+
+@INNER
+def _block(tree, some, count, start, station, ways, free, found):
+    """Set found (n,) of one point where one of the triangles some[:count] hides it; station (n, 3) m."""
+    size = len(station)
+    for n in range(size):
+        for i in range(3):
+            ways[i, n] = station[n, i] - start[i]
+        free[n] = 1.0
+    for at in range(count):
+        _ask(tree, some[at], start, ways, size, free)
+    for n in range(size):
+        if free[n] == 0.0:
+            found[n] = True
 
 
 @LEAN
-def _judge(vertices, tree, p, grid, station, ways, points, part, toward, result):
-    """Fill result (B, L) with what part p does to the rays of its own points; station (B, 3) m and ways (B,) m."""
-    for m in range(len(ways)):
+def _judge(vertices, tree, p, grid, station, middle, way, points, part, toward, stamps, some, ways, free, asked, found):
+    """Do the work of `judged`; middle (B, 3) m and way (B,) m: place and radius of each block's rays' ends."""
+    for m in range(len(way)):
         k = m * SYMBOLS // grid.symbols
+        first, past = m * SYMBOLS, min((m + 1) * SYMBOLS, len(station))
         for l in range(len(points)):  # noqa: E741
-            result[m, l] = OPEN
-            if part[l] == p and toward[l] == 0.0:
-                result[m, l] = _judged(
-                    vertices, tree, grid, k, points[l, 0], points[l, 1], points[l, 2], station[m, 0], station[m, 1],
-                    station[m, 2], ways[m],
-                )  # fmt: skip
+            if part[l] != p or toward[l] != 0.0:
+                continue
+            rest = False
+            for n in range(first, past):
+                rest = rest or not found[n, l]
+            asked[m, l] = True
+            if not rest:
+                continue
+            stamp = m * len(points) + l
+            count, verdict = _judged(
+                vertices, tree, grid, k, points[l], middle[m], way[m], stamp, stamps, some
+            )  # fmt: skip
+            asked[m, l] = verdict != UNKNOWN
+            if verdict == HIDDEN:
+                found[first:past, l] = True
+            elif count > 0:
+                _block(tree, some, count, points[l], station[first:past], ways, free, found[first:past, l])
 
 
-def judged(vertices, tree, p: int, grid: RayGrid, station: np.ndarray, points, part, toward) -> np.ndarray:
-    """Return FREE, HIDDEN or OPEN (B, L) int8 for every SYMBOLS symbols and point, OPEN for points of other parts.
+def judged(
+    vertices: np.ndarray, tree: Tree, p: int, grid: RayGrid, station: np.ndarray, points: np.ndarray, part: np.ndarray,
+    toward: np.ndarray, found: np.ndarray,
+) -> np.ndarray:  # fmt: skip
+    """Set found (N, L) where part p hides a point of its own; return who was asked, (B, L) bool by SYMBOLS symbols.
 
     p: the grid's part, -1 for none; station (N, 3) m: the station in its frame; others: as in `shadow_rays.cast`.
     """
     blocks = -(-len(station) // SYMBOLS)
-    result = np.full((blocks, len(points)), OPEN, np.int8)
+    asked = np.zeros((blocks, len(points)), np.bool_)
     if p >= 0:
         some = [station[m * SYMBOLS : (m + 1) * SYMBOLS] for m in range(blocks)]
         middle = np.array([one[len(one) // 2] for one in some])
-        ways = np.array([np.linalg.norm(one - at, axis=1).max() for one, at in zip(some, middle, strict=True)])
-        _judge(vertices, tree, p, grid, middle, ways, points, part, toward, result)
-    return result
+        way = np.array([np.linalg.norm(one - at, axis=1).max() for one, at in zip(some, middle, strict=True)])
+        work = (
+            np.full(len(tree.owner), -1),
+            np.empty(tree.count[p], np.int64),
+            np.empty((3, SYMBOLS)),
+            np.empty(SYMBOLS),
+        )
+        _judge(vertices, tree, p, grid, station, middle, way, points, part, toward, *work, asked, found)
+    return asked
