@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.effects.channel import occlusion, ray_grid, shadow_rays, still_rays, surface_tree
+from interpreted import interpreted
+from lowalt.effects.channel import occlusion, ray_grid, ray_tests, shadow_rays, still_rays, surface_tree, turning_rays
 from lowalt.effects.channel.ray_tests import cross
 from lowalt.targets.surfaces import Surface
 from test_effects_occlusion import NETWORK, scene
@@ -94,6 +95,87 @@ def test_a_point_without_a_grid_toward_the_station_is_not_judged():
     assert asked == [[[True, False]] * 2, [[False, False]] * 2]
     grid.way[:] = -1.0
     assert not still_rays.judged(*given, station, points, part, toward, np.zeros((70, 2), np.bool_)).any()
+
+
+def small_triangles(closed: bool):
+    """A tree of triangles that rays along z from around the origin meet now and then."""
+    rng = np.random.default_rng(8)
+    vertices = (rng.uniform(-1.0, 1.0, (40, 1, 3)) * [1, 1, 4] + rng.normal(0, 1.0, (40, 3, 3))).reshape(-1, 3)
+    surfaces = {"vertices": vertices, "vertex_part": np.zeros(120, int), "closed": np.array([closed])}
+    return surface_tree.tree(surfaces, np.arange(120).reshape(-1, 3))
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_rays_that_are_held_against_a_triangle_together_meet_it_as_alone(closed):
+    tree, rng = small_triangles(closed), np.random.default_rng(9)
+    each, alone, away = (interpreted(one) for one in (ray_tests.hit_each, ray_tests.hit, ray_tests.turned_away))
+    met = left_out = 0
+    for f in range(40):
+        start, ways = rng.uniform(-1.0, 1.0, 3), rng.normal([[0.0], [0.0], [4.0]], 1.0, (3, 30))
+        # One ray begins at a corner, and one lies in the plane.
+        ways[:, 0], ways[:, 1] = tree.edges[f, 3:6], tree.edges[f, :3] - start
+        free = np.ones(30)
+        each(tree.edges[f], tree.closed[f], start, ways, 29, free)
+        found = [alone(tree, f, *start, *ways[:, n]) for n in range(29)]
+        assert (free == 0.0).tolist() == [*found, False]
+        met += sum(found)
+        if away(tree, f, *start):
+            assert closed and not any(found)
+            left_out += 1
+    assert met > 20
+    assert (left_out > 8) == closed
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.4, 2.9])
+def test_symbols_are_sorted_by_the_azimuth_of_the_station(turn):
+    angle = turn + 0.7 * np.arange(100)
+    middle = np.array([1.0, 2.0, 3.0])
+    station = middle + np.stack([30.0 * np.cos(angle), 30.0 * np.sin(angle), np.linspace(3.0, 6.0, 100)], axis=1)
+    seen = turning_rays._seen(station, np.array([0.0, 0.0, 2.0]), middle)
+    assert sorted(seen.order) == list(range(100))
+    np.testing.assert_array_equal(seen.ends, station[seen.order].T)
+    assert seen.begin[0] == 0 and seen.begin[-1] == 100 and (np.diff(seen.begin) >= 0).all()
+    np.testing.assert_allclose(seen.limits, [0.1, 0.2, 30.0], rtol=1e-12)
+    # The number that stands for an angle is y / (|x| + |y|) in the first quarter, and so on.
+    away = seen.axes[1:] @ (station - middle).T
+    tangent = np.arctan2(away[1], away[0]) % (2 * np.pi)
+    quarter, rest = np.divmod(tangent, np.pi / 2)
+    number = quarter + np.sin(rest) / (np.sin(rest) + np.cos(rest))
+    slots = np.floor(number * turning_rays.BINS / 4).astype(int)
+    for slot in range(turning_rays.BINS):
+        assert set(seen.order[seen.begin[slot] : seen.begin[slot + 1]]) == set(np.flatnonzero(slots == slot))
+
+
+def test_a_triangle_is_asked_of_the_bins_that_it_names_also_across_the_last_one():
+    begin = np.arange(turning_rays.BINS + 1)
+    edge, start = np.array([-9.0, -9.0, 1.0, 30.0, 0.0, 0.0, 0.0, 30.0, 0.0]), np.zeros(3)
+    ways = np.zeros((3, turning_rays.BINS))
+    ways[2] = 2.0
+    last = turning_rays.BINS - 1
+    for first, final, bins in (
+        (3, 5, [3, 4, 5]), (-2, 1, [last - 1, last, 0, 1]), (last - 1, last + 2, [last - 1, last, 0, 1]),
+        (last, last, [last]), (-1, -1, [last]), (last + 1, last + 2, [0, 1]),
+    ):  # fmt: skip
+        free = np.ones(turning_rays.BINS)
+        interpreted(turning_rays._ask)(edge, False, begin, first, final, start, ways, free)
+        assert np.flatnonzero(free == 0.0).tolist() == sorted(bins)
+    free = np.ones(turning_rays.BINS)
+    interpreted(turning_rays._ask)(edge, False, begin, -4, last, start, ways, free)
+    assert not free.any()
+
+
+def test_triangles_at_some_slopes_are_marked():
+    """A triangle 10 away across and 2 to 3 up, seen from the axis at the origin: slopes 0.2 to 0.3 and little more."""
+    corners = np.array([[2.0, 10.0, 0.0], [3.0, 10.0, 0.0], [2.5, 10.0, 0.4]]).reshape(9, 1)
+    for low, high, wanted in (
+        (0.0, 0.19, 0), (0.0, 0.21, 1), (0.31, 1.0, 0), (0.29, 1.0, 1), (-1.0, -0.1, 0), (-1.0, 0.25, 1),
+    ):  # fmt: skip
+        marks = np.full(1, 7.0)
+        interpreted(turning_rays._at_slopes)(corners, 0.0, 0.0, 0.0, low, high, 1, marks)
+        assert marks[0] == wanted
+        # The same from 5 higher up: slopes -0.3 to -0.2.
+        interpreted(turning_rays._at_slopes)(corners, 5.0, 0.0, 0.0, -high, -low, 1, marks)
+        assert marks[0] == wanted
 
 
 def test_cross_products_are_numpys_to_the_last_bit():

@@ -51,7 +51,7 @@ def cast_rays(
     gridded, grid = _grid(ahead, station, vertices, tree, order[listed[order]])
     found = np.zeros((len(rotation), len(points)), np.bool_) if known is None else known.copy()
     turning = [int(p) for p in order if p != gridded and axes is not None and np.isfinite(axes[p]).all()]
-    done = turning_rays.cast(station, axes, turning, points, part, toward, vertices, tree, found)
+    done = turning_rays.cast(station, axes, turning, points, part, toward, tree, found)
     own = np.ascontiguousarray(station[:, gridded])
     settled = judged(vertices, tree, gridded, grid, own, points, part, toward, found) | done
     parts = len(listed)

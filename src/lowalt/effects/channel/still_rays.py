@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid
-from lowalt.effects.channel.ray_tests import sides
+from lowalt.effects.channel.ray_tests import hit_each, sides
 from lowalt.effects.channel.surface_tree import Tree
 
 FREE, HIDDEN, OPEN = 0, 1, 2
@@ -91,35 +91,6 @@ def _judged(vertices, tree, grid, k, start, aim, way, stamp, stamps, some):
 
 
 @INNER
-def _ask(tree, f, start, ways, size, free):
-    """Set free (SYMBOLS,) to 0 where the ray from `start` along ways (3, SYMBOLS) meets triangle f, as `ray_tests.hit`.
-
-    Comparisons in place of branches, so that symbols pass in vector instructions.
-    """
-    edge = tree.edges[f]
-    d0, d1, d2, e0, e1, e2 = edge[3], edge[4], edge[5], edge[6], edge[7], edge[8]
-    o0, o1, o2 = start[0] - edge[0], start[1] - edge[1], start[2] - edge[2]
-    q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
-    height = e0 * q0 + e1 * q1 + e2 * q2
-    largest = 0.0 if tree.closed[f] else np.inf
-    us, vs, ws = ways[0], ways[1], ways[2]
-    for n in range(np.uint64(size)):
-        u, v, w = us[n], vs[n], ws[n]
-        h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
-        turned = d0 * h0 + d1 * h1 + d2 * h2
-        sign = 1.0 if turned > 0.0 else -1.0
-        whole = sign * turned
-        one = sign * (o0 * h0 + o1 * h1 + o2 * h2)
-        other = sign * (u * q0 + v * q1 + w * q2)
-        way = sign * height
-        # `turned` is 0 where the ray lies in the plane, and then `way` is not between 0 and it.
-        met = (
-            (turned <= largest) & (one >= 0.0) & (other >= 0.0) & (one + other <= whole) & (way > 0.0) & (way < whole)
-        )  # fmt: skip
-        free[n] = 0.0 if met else free[n]
-
-
-@INNER
 def _block(tree, some, count, start, station, ways, free, found):
     """Set found (n,) of one point where one of the triangles some[:count] hides it; station (n, 3) m."""
     size = len(station)
@@ -128,7 +99,7 @@ def _block(tree, some, count, start, station, ways, free, found):
             ways[i, n] = station[n, i] - start[i]
         free[n] = 1.0
     for at in range(count):
-        _ask(tree, some[at], start, ways, size, free)
+        hit_each(tree.edges[some[at]], tree.closed[some[at]], start, ways, size, free)
     for n in range(size):
         if free[n] == 0.0:
             found[n] = True

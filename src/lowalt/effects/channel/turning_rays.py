@@ -1,24 +1,42 @@
 """Rays from the points of a rotor, wheel or wing against its own triangles, which turn about an axis.
 
 In the part's frame the station runs around the axis at a slope that hardly changes. So for each point the triangles
-that lie at such slopes are sorted by azimuth, and a ray is compared with those of its azimuth. Azimuths are measured by
-a number that grows with the angle, by 2 from a direction to the opposite one.
+that lie at such slopes are found, and each is compared with the rays that leave within its azimuths: rays are sorted by
+the azimuth at which the part's middle sees the station, which is nearly that of every point. Azimuths are measured by a
+number that grows with the angle, by 2 from a direction to the opposite one and by no more than the angle in radians.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.common.jit import INLINED, INNER, LEAN
-from lowalt.effects.channel.ray_tests import cross, first_hit
+from lowalt.effects.channel.ray_tests import cross, hit_each, turned_away
 from lowalt.effects.channel.surface_tree import Tree
 
-BINS = 96
+BINS = 512
 """Bins of azimuth."""
-ROOM = 16
-"""Places in a point's lists for each triangle; a point that needs more is asked by the tree."""
 STEEPEST = 4.0
 """Largest slope of rays against the plane across the axis; points with steeper rays are asked by the tree."""
+NEAREST = 2.0
+"""Least distance of the station from the axis, in a point's distance across it from the part's middle."""
+
+
+class Around(NamedTuple):
+    """How the station runs around a part's axis, as the part's middle sees it.
+
+    axes (3, 3): along the axis and twice across; middle (3,) m along and across; order (N,): symbols by azimuth; ends
+    (3, N) m: the station then, in the part's frame; begin (BINS + 1,): where each bin's symbols begin in `order`;
+    limits (3,): least and largest slope, and least distance across (m).
+    """
+
+    axes: np.ndarray
+    middle: np.ndarray
+    order: np.ndarray
+    ends: np.ndarray
+    begin: np.ndarray
+    limits: np.ndarray
 
 
 @INLINED
@@ -29,48 +47,105 @@ def _around(x, y):
 
 
 @INLINED
-def _across(axes, i, j, k):
-    """Coordinates of a vector across the axis and along it."""
+def _in_axes(axes, x, y, z):
+    """Coordinates of a vector along the axis and twice across it."""
     return (
-        axes[1, 0] * i + axes[1, 1] * j + axes[1, 2] * k, axes[2, 0] * i + axes[2, 1] * j + axes[2, 2] * k,
-        axes[0, 0] * i + axes[0, 1] * j + axes[0, 2] * k,
+        axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z, axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z,
+        axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z,
     )  # fmt: skip
 
 
-@INLINED
-def _at_slope(corners, low, high):
-    """Whether a triangle reaches slopes from low to high; corners (3, 3) from the ray's start, across twice and along.
+@LEAN
+def _run_around(station, seen, bins):
+    """Fill order, ends, begin and limits of `seen` for the station (N, 3) m in the part's frame; bins (N,): work."""
+    begin, limits = seen.begin, seen.limits
+    begin[:] = 0
+    limits[0], limits[1], limits[2] = np.inf, -np.inf, np.inf
+    for n in range(len(station)):
+        along, across, up = _in_axes(seen.axes, station[n, 0], station[n, 1], station[n, 2])
+        along, across, up = along - seen.middle[0], across - seen.middle[1], up - seen.middle[2]
+        far = math.sqrt(across * across + up * up)
+        slope = along / max(far, 1e-300)
+        limits[0], limits[1], limits[2] = min(limits[0], slope), max(limits[1], slope), min(limits[2], far)
+        bins[n] = min(int(_around(across, up) * (0.25 * BINS)), BINS - 1)
+        begin[bins[n] + 1] += 1
+    for slot in range(BINS):
+        begin[slot + 1] += begin[slot]
+    for n in range(len(station)):
+        at = begin[bins[n]]
+        begin[bins[n]] += 1
+        seen.order[at] = n
+        for i in range(3):
+            seen.ends[i, at] = station[n, i]
+    for slot in range(BINS, 0, -1):
+        begin[slot] = begin[slot - 1]
+    begin[0] = 0
 
-    Its least and largest distance from the axis's parallel through the start are bounded by a box and by its corners.
+
+@INNER
+def _placed(tree, p, axes, corners):
+    """Fill corners (9, F) with the corners of part p's triangles, each along the axis and twice across."""
+    for f in range(tree.count[p]):
+        edge = tree.edges[tree.first[p] + f]
+        for corner in range(3):
+            x, y, z = edge[0], edge[1], edge[2]
+            if corner > 0:
+                x, y, z = x + edge[3 * corner], y + edge[3 * corner + 1], z + edge[3 * corner + 2]
+            at = 3 * corner
+            corners[at, f], corners[at + 1, f], corners[at + 2, f] = _in_axes(axes, x, y, z)
+
+
+@INLINED
+def _least(a, b, c):
+    """The least of three numbers, by selections that become vector instructions."""
+    a = a if a < b else b
+    return a if a < c else c
+
+
+@INLINED
+def _most(a, b, c):
+    """The largest of three numbers."""
+    a = a if a > b else b
+    return a if a > c else c
+
+
+@INNER
+def _at_slopes(corners, along, across, up, low, high, count, marks):
+    """Fill marks (F,) with 1 where a triangle reaches slopes from low to high as seen from a place, else with 0.
+
+    Its least and largest distance from the axis's parallel through the place are bounded by a box and by its corners.
     """
-    least, most, reach = min(corners[0, 2], min(corners[1, 2], corners[2, 2])), -np.inf, 0.0
-    square = 0.0
-    for axis in range(2):
-        a, b, c = corners[0, axis], corners[1, axis], corners[2, axis]
-        gap = max(min(a, min(b, c)), -max(a, max(b, c)))
-        square += max(gap, 0.0) ** 2
-    for corner in range(3):
-        most = max(most, corners[corner, 2])
-        reach = max(reach, math.sqrt(corners[corner, 0] ** 2 + corners[corner, 1] ** 2))
-    near = math.sqrt(square)
+    a0, a1, a2, b0, b1, b2 = corners[0], corners[1], corners[2], corners[3], corners[4], corners[5]
+    c0, c1, c2 = corners[6], corners[7], corners[8]
     # z <= slope x distance for some distance in [near, reach], and z >= slope x distance for some.
-    above = high * (reach if high > 0.0 else near)
-    below = low * (near if low > 0.0 else reach)
-    return least <= above + 1e-12 and most >= below - 1e-12
+    rising, falling = 1.0 if high > 0.0 else 0.0, 1.0 if low > 0.0 else 0.0
+    for f in range(np.uint64(count)):
+        p1, q1, r1, p2, q2, r2 = a1[f] - across, b1[f] - across, c1[f] - across, a2[f] - up, b2[f] - up, c2[f] - up
+        gap, other = (
+            _most(_least(p1, q1, r1), -_most(p1, q1, r1), 0.0),
+            _most(_least(p2, q2, r2), -_most(p2, q2, r2), 0.0),
+        )
+        near = math.sqrt(gap * gap + other * other)
+        reach = math.sqrt(_most(p1 * p1 + p2 * p2, q1 * q1 + q2 * q2, r1 * r1 + r2 * r2))
+        above = high * (rising * reach + (1.0 - rising) * near)
+        below = low * (falling * near + (1.0 - falling) * reach)
+        least, most = _least(a0[f], b0[f], c0[f]) - along, _most(a0[f], b0[f], c0[f]) - along
+        marks[f] = 1.0 if (least <= above + 1e-12) & (most >= below - 1e-12) else 0.0
 
 
 @INLINED
-def _bins_of(corners, ends):
-    """Fill ends (2,) with the first and last bin of a triangle's azimuths; all bins where they span half a turn."""
-    ends[0], ends[1] = 0, BINS - 1
-    for corner in range(3):
-        # A corner on the axis's parallel has no azimuth.
-        if abs(corners[corner, 0]) + abs(corners[corner, 1]) < 1e-6:
-            return
-    p, q, r = (
-        _around(corners[0, 0], corners[0, 1]), _around(corners[1, 0], corners[1, 1]),
-        _around(corners[2, 0], corners[2, 1]),
-    )  # fmt: skip
+def _bins_of(corners, f, across, up, room):
+    """The first and last bin of triangle f's azimuths and `room` more; all bins where they span half a turn.
+
+    The first may be below 0, and the last beyond the last bin.
+    """
+    p1, p2 = corners[1, f] - across, corners[2, f] - up
+    q1, q2 = corners[4, f] - across, corners[5, f] - up
+    r1, r2 = corners[7, f] - across, corners[8, f] - up
+    # A corner on the axis's parallel has no azimuth.
+    if min(abs(p1) + abs(p2), min(abs(q1) + abs(q2), abs(r1) + abs(r2))) < 1e-6:
+        return 0, BINS - 1
+    p, q, r = _around(p1, p2), _around(q1, q2), _around(r1, r2)
     a, c = min(p, min(q, r)), max(p, max(q, r))
     b = p + q + r - a - c
     one, two, three = b - a, c - b, 4.0 + a - c
@@ -80,84 +155,86 @@ def _bins_of(corners, ends):
     elif two >= three:
         low, high = c, b + 4.0
     if high - low > 2.0 - 1e-6:
-        return
-    ends[0], ends[1] = math.floor((low - 1e-9) * (0.25 * BINS)), math.floor((high + 1e-9) * (0.25 * BINS))
-
-
-@INLINED
-def _band(station, axes, x, y, z, found, l):  # noqa: E741
-    """Least and largest slope of the rays from x, y, z that are not found yet; an empty band where all are."""
-    low, high = np.inf, -np.inf
-    for n in range(len(station)):
-        if not found[n, l]:
-            across, up, along = _across(axes, station[n, 0] - x, station[n, 1] - y, station[n, 2] - z)
-            slope = along / math.sqrt(across * across + up * up + 1e-300)
-            low, high = min(low, slope), max(high, slope)
-    return low, high
+        return 0, BINS - 1
+    return math.floor((low - room) * (0.25 * BINS)), math.floor((high + room) * (0.25 * BINS))
 
 
 @INNER
-def _sorted(vertices, tree, p, axes, x, y, z, low, high, start, pool, ends, corners):
-    """Fill start (BINS + 1,) and pool with the triangles of part p by azimuth; return whether there is room."""
-    first, count = tree.first[p], tree.count[p]
-    start[:] = 0
-    for f in range(count):
-        for corner in range(3):
-            at = tree.faces[first + f, corner]
-            corners[corner, 0], corners[corner, 1], corners[corner, 2] = _across(
-                axes, vertices[at, 0] - x, vertices[at, 1] - y, vertices[at, 2] - z
-            )
-        ends[f, 1] = -1
-        ends[f, 0] = 0
-        if _at_slope(corners, low, high):
-            _bins_of(corners, ends[f])
-        for slot in range(ends[f, 0], ends[f, 1] + 1):
-            start[(slot + BINS) % BINS + 1] += 1
-    for slot in range(BINS):
-        start[slot + 1] += start[slot]
-    if start[BINS] > len(pool):
-        return False
-    for f in range(count):
-        for slot in range(ends[f, 0], ends[f, 1] + 1):
-            at = (slot + BINS) % BINS
-            pool[start[at]] = first + f
-            start[at] += 1
-    for slot in range(BINS, 0, -1):
-        start[slot] = start[slot - 1]
-    start[0] = 0
-    return True
+def _ask(edge, closed, begin, first, last, start, ways, free):
+    """Set free (N,) to 0 where the rays of the bins from first to last meet a triangle."""
+    if last - first >= BINS - 1:
+        hit_each(edge, closed, start, ways, len(free), free)
+        return
+    if first < 0:
+        first, last = first + BINS, last + BINS
+    # Bins beyond the last one are the first again.
+    i, j = begin[first], begin[min(last, BINS - 1) + 1]
+    hit_each(edge, closed, start, ways[:, i:j], j - i, free[i:j])
+    if last >= BINS:
+        j = begin[last - BINS + 1]
+        hit_each(edge, closed, start, ways[:, :j], j, free[:j])
+
+
+@INLINED
+def _is_open(found, l):  # noqa: E741
+    """Whether any of a point's rays is not hidden yet."""
+    n = 0
+    while n < len(found) and found[n, l]:
+        n += 1
+    return n < len(found)
 
 
 @LEAN
-def _cast(station, axes, p, points, part, toward, vertices, tree, start, pool, ends, corners, done, found):
-    """Do part p's work of `cast`; station (N, 3) m in its frame, axes (3, 3): along its axis and across."""
+def _cast(seen, p, points, part, toward, tree, corners, marks, ways, free, done, found):
+    """Do part p's work of `cast`; corners (9, F), marks (F,), ways (3, N) and free (N,) are work."""
+    _placed(tree, p, seen.axes, corners)
+    low, high, far = seen.limits[0], seen.limits[1], seen.limits[2]
     for l in range(len(points)):  # noqa: E741
         if part[l] != p or toward[l] != 0.0:
             continue
         x, y, z = points[l, 0], points[l, 1], points[l, 2]
-        low, high = _band(station, axes, x, y, z, found, l)
-        if low > high:
-            done[l] = True
+        along, across, up = _in_axes(seen.axes, x, y, z)
+        off = math.sqrt((across - seen.middle[1]) ** 2 + (up - seen.middle[2]) ** 2)
+        # By how much slopes differ from those that the part's middle sees, at most.
+        steepest = max(abs(low), abs(high))
+        room = (abs(along - seen.middle[0]) + steepest * off) / max(far - off, 1e-9) + 1e-9
+        if far < NEAREST * off or low - room < -STEEPEST or high + room > STEEPEST:
             continue
-        if low < -STEEPEST or high > STEEPEST:
+        done[l] = True
+        if not _is_open(found, l):
             continue
-        room = 1e-9
-        done[l] = _sorted(vertices, tree, p, axes, x, y, z, low - room, high + room, start, pool, ends, corners)
-        if not done[l]:
-            continue
-        for n in range(len(station)):
-            if found[n, l]:
-                continue
-            u, v, w = station[n, 0] - x, station[n, 1] - y, station[n, 2] - z
-            across, up, _ = _across(axes, u, v, w)
-            slot = min(int(_around(across, up) * (0.25 * BINS)), BINS - 1)
-            if first_hit(tree, pool, start[slot], start[slot + 1], x, y, z, u, v, w) >= 0:
-                found[n, l] = True
+        _at_slopes(corners, along, across, up, low - room, high + room, tree.count[p], marks)
+        for i in range(3):
+            for n in range(np.uint64(len(free))):
+                ways[i, n] = seen.ends[i, n] - points[l, i]
+        free[:] = 1.0
+        for f in range(tree.count[p]):
+            g = tree.first[p] + f
+            if marks[f] > 0.0 and not turned_away(tree, g, x, y, z):
+                # Azimuths differ by at most the angle between the ways from the point and from the part's middle.
+                first, last = _bins_of(corners, f, across, up, 1.58 * off / far + 1e-9)
+                _ask(tree.edges[g], tree.closed[g], seen.begin, first, last, points[l], ways, free)
+        for n in range(len(free)):
+            if free[n] == 0.0:
+                found[seen.order[n], l] = True
+
+
+def _seen(station: np.ndarray, axis: np.ndarray, middle: np.ndarray) -> Around:
+    """How the station (N, 3) m runs around a part's axis (3,) through its middle (3,) m, all in the part's frame."""
+    along = axis / np.sqrt((axis * axis).sum())
+    right = cross(along, np.eye(3)[abs(along).argmin()])
+    right /= np.sqrt((right * right).sum())
+    axes, count = np.array([along, right, cross(along, right)]), len(station)
+    middle = (axes * middle).sum(axis=1)
+    order, begin = np.empty(count, np.int64), np.empty(BINS + 1, np.int64)
+    seen = Around(axes, middle, order, np.empty((3, count)), begin, np.empty(3))
+    _run_around(station, seen, np.empty(count, np.int64))
+    return seen
 
 
 def cast(
     station: np.ndarray, axes: np.ndarray, parts: list[int], points: np.ndarray, part: np.ndarray, toward: np.ndarray,
-    vertices: np.ndarray, tree: Tree, found: np.ndarray,
+    tree: Tree, found: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Set found (N, L) where one of `parts` hides a point of its own; return the points (L,) that were asked.
 
@@ -165,13 +242,8 @@ def cast(
     """
     done = np.zeros(len(points), np.bool_)
     for p in parts:
-        along = axes[p] / np.linalg.norm(axes[p])
-        right = cross(along, np.eye(3)[abs(along).argmin()])
-        right /= np.linalg.norm(right)
-        count = int(tree.count[p])
-        _cast(
-            np.ascontiguousarray(station[:, p]), np.stack([along, right, cross(along, right)]), p, points, part,
-            toward, vertices, tree, np.empty(BINS + 1, np.int64), np.empty(ROOM * count + BINS, np.int64),
-            np.empty((count, 2), np.int64), np.empty((3, 3)), done, found,
-        )  # fmt: skip
+        seen = _seen(station[:, p], axes[p], tree.centre[tree.root[p]])
+        count, symbols = int(tree.count[p]), len(station)
+        work = np.empty((9, count)), np.empty(count), np.empty((3, symbols)), np.empty(symbols)
+        _cast(seen, p, points, part, toward, tree, *work, done, found)
     return done
