@@ -131,7 +131,7 @@ def test_symbols_are_sorted_by_the_azimuth_of_the_station(turn):
     angle = turn + 0.7 * np.arange(100)
     middle = np.array([1.0, 2.0, 3.0])
     station = middle + np.stack([30.0 * np.cos(angle), 30.0 * np.sin(angle), np.linspace(3.0, 6.0, 100)], axis=1)
-    seen = turning_rays._seen(station, np.array([0.0, 0.0, 2.0]), middle)
+    seen = turning_rays._seen(np.ascontiguousarray(station.T), np.array([0.0, 0.0, 2.0]), middle)
     assert sorted(seen.order) == list(range(100))
     np.testing.assert_array_equal(seen.ends, station[seen.order].T)
     assert seen.begin[0] == 0 and seen.begin[-1] == 100 and (np.diff(seen.begin) >= 0).all()

@@ -180,24 +180,35 @@ def cell_of(grid, k, x, y, z, u, v, w):
     return int(i) * cells + int(j)
 
 
+@LEAN
+def farthest(places, middles, symbols, out):
+    """Fill out (B,) with the largest distance (m) of places (N, 3) m from middles (B, 3), `symbols` places a middle."""
+    for m in range(len(out)):
+        out[m] = 0.0
+        for n in range(m * symbols, min((m + 1) * symbols, len(places))):
+            x, y, z = places[n, 0] - middles[m, 0], places[n, 1] - middles[m, 1], places[n, 2] - middles[m, 2]
+            out[m] = max(out[m], math.sqrt(x * x + y * y + z * z))
+
+
 def grids(station: np.ndarray, vertices: np.ndarray, tree: Tree, part: int) -> RayGrid:
     """Return the grids of a part; station (N, 3) m, in the part's frame; vertices (V, 3) m."""
     faces = int(tree.count[part])
     cells = int(np.clip(math.isqrt(faces), *SIDES))
     middle, radius_m = tree.centre[tree.root[part]].copy(), float(tree.radius_m[tree.root[part]])
-    away = station - middle
+    away, whole, reach = station - middle, len(station), np.empty(1)
     # As few grids as widen images by about half a cell at most.
-    moved = np.linalg.norm(away - away[len(away) // 2], axis=1).max() / np.linalg.norm(away[len(away) // 2])
-    symbols = SYMBOLS * math.ceil(len(away) / max(1.0, math.ceil(moved * cells)) / SYMBOLS)
-    count = -(-len(station) // symbols)
-    axes, far, way = np.empty((count, 3, 3)), np.empty(count), np.empty(count)
-    for k in range(count):
-        some = away[k * symbols : (k + 1) * symbols]
-        ahead = some[len(some) // 2]
-        far[k] = np.linalg.norm(ahead)
-        way[k] = np.linalg.norm(some - ahead, axis=1).max()
+    central = away[whole // 2]
+    farthest(away, central[None], whole, reach)
+    moved = reach[0] / math.sqrt((central * central).sum())
+    symbols = SYMBOLS * math.ceil(whole / max(1.0, math.ceil(moved * cells)) / SYMBOLS)
+    starts = range(0, whole, symbols)
+    ends = np.array([away[(first + min(first + symbols, whole)) // 2] for first in starts])
+    count, way, far = len(ends), np.empty(len(ends)), np.sqrt((ends * ends).sum(axis=1))
+    farthest(away, ends, symbols, way)
+    axes = np.empty((count, 3, 3))
+    for k, ahead in enumerate(ends):
         right = cross(ahead, np.eye(3)[abs(ahead).argmin()])
-        right /= np.linalg.norm(right)
+        right /= math.sqrt((right * right).sum())
         axes[k] = ahead / far[k], right, cross(ahead / far[k], right)
     way[far < NEAREST * (radius_m + way)] = -1.0
     grid = RayGrid(

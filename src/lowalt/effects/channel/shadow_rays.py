@@ -9,11 +9,15 @@ point, by a tree of balls (`surface_tree`), and kept. Rotors turn too far from s
 triangles are found by the tree ray by ray. A point is compared first with the triangle that hid it a symbol ago.
 """
 
+import math
+from collections.abc import Collection
+
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.echo import Rigid
 from lowalt.effects.channel import moving_rays, ray_grid, turning_rays
-from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid
+from lowalt.effects.channel.ray_grid import SYMBOLS
 from lowalt.effects.channel.ray_lists import Lists
 from lowalt.effects.channel.still_rays import judged
 from lowalt.effects.channel.surface_tree import Tree
@@ -24,9 +28,42 @@ SLOW = 8e-3
 """Largest mean turn of the direction to the station, from symbol to symbol (rad), at which a part gets a grid."""
 
 
+@LEAN
+def _seen_by_parts(place, rotation, translation, poses, turned, steps):
+    """Fill poses (P, 15, N) of `moving_rays.cast`, and how the direction to the station turns in each part's frame.
+
+    turned (P,): the diagonal of the box that holds all its unit vectors; steps (P,): their mean way to the next symbol.
+    """
+    symbols = len(rotation)
+    for p in range(len(poses)):
+        least0, least1, least2, most0, most1, most2 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
+        last0, last1, last2, total = 0.0, 0.0, 0.0, 0.0
+        for n in range(symbols):
+            turn, shift = rotation[n, p], translation[n, p]
+            a, b, c = place[0] - shift[0], place[1] - shift[1], place[2] - shift[2]
+            # The poses' matrices are rotations: their inverses are their transposes.
+            x = turn[0, 0] * a + turn[1, 0] * b + turn[2, 0] * c
+            y = turn[0, 1] * a + turn[1, 1] * b + turn[2, 1] * c
+            z = turn[0, 2] * a + turn[1, 2] * b + turn[2, 2] * c
+            for i in range(3):
+                for j in range(3):
+                    poses[p, 3 * i + j, n] = turn[i, j]
+                poses[p, 9 + i, n] = shift[i]
+            poses[p, 12, n], poses[p, 13, n], poses[p, 14, n] = x, y, z
+            far = math.sqrt(x * x + y * y + z * z)
+            x, y, z = x / far, y / far, z / far
+            least0, least1, least2 = min(least0, x), min(least1, y), min(least2, z)
+            most0, most1, most2 = max(most0, x), max(most1, y), max(most2, z)
+            if n > 0:
+                total += math.sqrt((x - last0) ** 2 + (y - last1) ** 2 + (z - last2) ** 2)
+            last0, last1, last2 = x, y, z
+        turned[p] = math.sqrt((most0 - least0) ** 2 + (most1 - least1) ** 2 + (most2 - least2) ** 2)
+        steps[p] = total / max(symbols - 1, 1)
+
+
 def cast_rays(
     place_m: np.ndarray, motion: Rigid, toward: np.ndarray, vertices: np.ndarray, tree: Tree, rotors: list[int],
-    asked: np.ndarray | None = None, known: np.ndarray | None = None, axes: np.ndarray | None = None,
+    asked: Collection[int] | None = None, known: np.ndarray | None = None, axes: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     """Return whether a triangle hides each point from the station at `place_m` (3,), (N, L) bool.
 
@@ -39,43 +76,26 @@ def cast_rays(
     rotation, translation, points, part = motion
     rotation, translation = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
     points, vertices, part = np.ascontiguousarray(points), np.ascontiguousarray(vertices), np.asarray(part, np.int64)
-    away = place_m - translation
-    # The poses' matrices are rotations: their inverses are their transposes.
-    station = sum((rotation[:, :, row, :] * away[:, :, row, None] for row in range(3)), np.zeros(away.shape))
-    ahead = station / np.sqrt((station * station).sum(axis=2))[..., None]
-    turned = np.sqrt((np.ptp(ahead, axis=0) ** 2).sum(axis=1))
+    place, parts = np.asarray(place_m, np.float64), len(tree.root)
+    poses, turned, steps = np.empty((parts, 15, len(rotation))), np.empty(parts), np.empty(parts)
+    _seen_by_parts(place, rotation, translation, poses, turned, steps)
     cells = np.ceil(2.0 / np.clip(turned / STEPS, FINEST, COARSEST)).astype(np.int64)
-    order = np.flatnonzero(tree.root >= 0)
-    order = order if asked is None else order[np.isin(order, asked)]
-    listed = ~np.isin(np.arange(len(tree.root)), rotors)
-    gridded, grid = _grid(ahead, station, vertices, tree, order[listed[order]])
+    order = [p for p in range(parts) if tree.root[p] >= 0 and (asked is None or p in asked)]
+    slow = [p for p in order if p not in rotors and len(rotation) > 1 and steps[p] <= SLOW]
+    # The part of most triangles that turns slowly gets a grid.
+    gridded = max(slow, key=lambda one: int(tree.count[one]), default=-1)
+    own = np.ascontiguousarray(poses[gridded, 12:].T)
+    grid = ray_grid.grids(own, vertices, tree, gridded) if gridded >= 0 else ray_grid.NONE
     found = np.zeros((len(rotation), len(points)), np.bool_) if known is None else known.copy()
-    turning = [int(p) for p in order if p != gridded and axes is not None and np.isfinite(axes[p]).all()]
-    done = turning_rays.cast(station, axes, turning, points, part, toward, tree, found)
-    own = np.ascontiguousarray(station[:, gridded])
+    turns = np.zeros(parts, np.bool_) if axes is None else np.isfinite(axes).all(axis=1)
+    turning = [p for p in order if p != gridded and turns[p]]
+    done = turning_rays.cast(poses[:, 12:], axes, turning, points, part, toward, tree, found)
     settled = judged(vertices, tree, gridded, grid, own, points, part, toward, found) | done
-    parts = len(listed)
-    poses = np.empty((parts, 15, len(rotation)))
-    poses[:, :9] = rotation.reshape(-1, parts, 9).transpose(1, 2, 0)
-    poses[:, 9:12], poses[:, 12:] = translation.transpose(1, 2, 0), station.transpose(1, 2, 0)
+    listed = np.ones(parts, np.bool_)
+    listed[rotors] = False
     work = [np.empty(shape) for shape in ((parts, 3, SYMBOLS), (7, SYMBOLS), (6, SYMBOLS), SYMBOLS, SYMBOLS)]
     moving_rays.cast(
-        np.asarray(place_m, np.float64), poses, part, points, toward, vertices, tree, order, gridded, grid, listed,
-        cells, Lists.empty(len(tree.skip)), np.full((len(points), parts), -1), *work, settled, found,
+        place, poses, part, points, toward, vertices, tree, np.array(order, np.int64), gridded, grid, listed, cells,
+        Lists.empty(len(tree.skip)), np.full((len(points), parts), -1), *work, settled, found,
     )  # fmt: skip
     return found
-
-
-def _grid(
-    ahead: np.ndarray, station: np.ndarray, vertices: np.ndarray, tree: Tree, parts: np.ndarray
-) -> tuple[int, RayGrid]:
-    """The part of `parts` that gets a grid, and the grid: the one of most triangles that turns slowly; -1 for none.
-
-    ahead (N, P, 3): directions to the station in each part's frame.
-    """
-    steps = np.sqrt((np.diff(ahead, axis=0) ** 2).sum(axis=2))
-    slow = [int(p) for p in parts if len(steps) and steps[:, p].mean() <= SLOW]
-    if not slow:
-        return -1, ray_grid.NONE
-    p = max(slow, key=lambda one: int(tree.count[one]))
-    return p, ray_grid.grids(np.ascontiguousarray(station[:, p]), vertices, tree, p)

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from lowalt.common.jit import INLINED, INNER, LEAN
-from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid
+from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid, farthest
 from lowalt.effects.channel.ray_tests import hit_each, sides
 from lowalt.effects.channel.surface_tree import Tree
 
@@ -137,14 +137,14 @@ def judged(
 ) -> np.ndarray:  # fmt: skip
     """Set found (N, L) where part p hides a point of its own; return who was asked, (B, L) bool by SYMBOLS symbols.
 
-    p: the grid's part, -1 for none; station (N, 3) m: the station in its frame; others: as in `shadow_rays.cast`.
+    p: the grid's part, -1 for none; station (N, 3) m: the station in its frame; others: as in `moving_rays.cast`.
     """
-    blocks = -(-len(station) // SYMBOLS)
-    asked = np.zeros((blocks, len(points)), np.bool_)
+    starts = range(0, len(station), SYMBOLS)
+    asked = np.zeros((len(starts), len(points)), np.bool_)
     if p >= 0:
-        some = [station[m * SYMBOLS : (m + 1) * SYMBOLS] for m in range(blocks)]
-        middle = np.array([one[len(one) // 2] for one in some])
-        way = np.array([np.linalg.norm(one - at, axis=1).max() for one, at in zip(some, middle, strict=True)])
+        middle = np.array([station[(first + min(first + SYMBOLS, len(station))) // 2] for first in starts])
+        way = np.empty(len(middle))
+        farthest(station, middle, SYMBOLS, way)
         work = (
             np.full(len(tree.owner), -1),
             np.empty(tree.count[p], np.int64),

@@ -57,12 +57,12 @@ def _in_axes(axes, x, y, z):
 
 @LEAN
 def _run_around(station, seen, bins):
-    """Fill order, ends, begin and limits of `seen` for the station (N, 3) m in the part's frame; bins (N,): work."""
+    """Fill order, ends, begin and limits of `seen` for the station (3, N) m in the part's frame; bins (N,): work."""
     begin, limits = seen.begin, seen.limits
     begin[:] = 0
     limits[0], limits[1], limits[2] = np.inf, -np.inf, np.inf
-    for n in range(len(station)):
-        along, across, up = _in_axes(seen.axes, station[n, 0], station[n, 1], station[n, 2])
+    for n in range(len(bins)):
+        along, across, up = _in_axes(seen.axes, station[0, n], station[1, n], station[2, n])
         along, across, up = along - seen.middle[0], across - seen.middle[1], up - seen.middle[2]
         far = math.sqrt(across * across + up * up)
         slope = along / max(far, 1e-300)
@@ -71,12 +71,12 @@ def _run_around(station, seen, bins):
         begin[bins[n] + 1] += 1
     for slot in range(BINS):
         begin[slot + 1] += begin[slot]
-    for n in range(len(station)):
+    for n in range(len(bins)):
         at = begin[bins[n]]
         begin[bins[n]] += 1
         seen.order[at] = n
         for i in range(3):
-            seen.ends[i, at] = station[n, i]
+            seen.ends[i, at] = station[i, n]
     for slot in range(BINS, 0, -1):
         begin[slot] = begin[slot - 1]
     begin[0] = 0
@@ -220,11 +220,11 @@ def _cast(seen, p, points, part, toward, tree, corners, marks, ways, free, done,
 
 
 def _seen(station: np.ndarray, axis: np.ndarray, middle: np.ndarray) -> Around:
-    """How the station (N, 3) m runs around a part's axis (3,) through its middle (3,) m, all in the part's frame."""
+    """How the station (3, N) m runs around a part's axis (3,) through its middle (3,) m, all in the part's frame."""
     along = axis / np.sqrt((axis * axis).sum())
     right = cross(along, np.eye(3)[abs(along).argmin()])
     right /= np.sqrt((right * right).sum())
-    axes, count = np.array([along, right, cross(along, right)]), len(station)
+    axes, count = np.array([along, right, cross(along, right)]), station.shape[1]
     middle = (axes * middle).sum(axis=1)
     order, begin = np.empty(count, np.int64), np.empty(BINS + 1, np.int64)
     seen = Around(axes, middle, order, np.empty((3, count)), begin, np.empty(3))
@@ -233,17 +233,18 @@ def _seen(station: np.ndarray, axis: np.ndarray, middle: np.ndarray) -> Around:
 
 
 def cast(
-    station: np.ndarray, axes: np.ndarray, parts: list[int], points: np.ndarray, part: np.ndarray, toward: np.ndarray,
-    tree: Tree, found: np.ndarray,
+    station: np.ndarray, axes: np.ndarray | None, parts: list[int], points: np.ndarray, part: np.ndarray,
+    toward: np.ndarray, tree: Tree, found: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """Set found (N, L) where one of `parts` hides a point of its own; return the points (L,) that were asked.
 
-    axes (P, 3): unit vectors in the parts' frames; others: as in `shadow_rays.cast`.
+    station (P, 3, N) m: in each part's frame; axes (P, 3): unit vectors there, None where no part is asked; others: as
+    in `moving_rays.cast`.
     """
     done = np.zeros(len(points), np.bool_)
     for p in parts:
-        seen = _seen(station[:, p], axes[p], tree.centre[tree.root[p]])
-        count, symbols = int(tree.count[p]), len(station)
+        seen = _seen(station[p], axes[p], tree.centre[tree.root[p]])
+        count, symbols = int(tree.count[p]), len(found)
         work = np.empty((9, count)), np.empty(count), np.empty((3, symbols)), np.empty(symbols)
         _cast(seen, p, points, part, toward, tree, *work, done, found)
     return done
