@@ -115,7 +115,7 @@ def test_rays_that_are_held_against_a_triangle_together_meet_it_as_alone(closed)
         # One ray begins at a corner, and one lies in the plane.
         ways[:, 0], ways[:, 1] = tree.edges[f, 3:6], tree.edges[f, :3] - start
         free = np.ones(30)
-        each(tree.edges[f], tree.closed[f], start, ways, 29, free)
+        each(tree.edges[f], tree.closed[f], start, ways, 0, 29, free)
         found = [alone(tree, f, *start, *ways[:, n]) for n in range(29)]
         assert (free == 0.0).tolist() == [*found, False]
         met += sum(found)

@@ -155,15 +155,15 @@ def cast(
 ):  # fmt: skip
     """Set found (N, L) where one of the parts `order` hides the point; points found already are not asked.
 
-    place (3,) m: the station; poses (P, 15, N): each part's rotation, translation (m) and the station in its frame (m);
-    points (L, 3) m, in their part's frame; toward (L,): share of the way to the station by which a point is moved;
-    gridded: the part of `grid`; listed (P,): whether a part's lists are kept for its own points; cells (P,): cells of
-    direction along a cube's side; work: (L, P) int64, filled with -1; balls (P, 3, SYMBOLS), ray (7, SYMBOLS), own
-    (6, SYMBOLS), free and near (SYMBOLS,): work; settled (B, L): points whose own part has been asked, by SYMBOLS.
+    place (3,) m: the station; poses (B, P, 15, SYMBOLS): each part's rotation and translation (m), and the station in
+    its frame (m); points (L, 3) m, in their part's frame; toward (L,): share of the way to the station by which a point
+    is moved; gridded: the part of `grid`; listed (P,): whether a part's lists are kept for its own points; cells (P,):
+    cells of direction along a cube's side; settled (B, L): points whose own part has been asked, by SYMBOLS. Work:
+    work (L, P) int64, filled with -1, balls (P, 3, SYMBOLS), ray (7, SYMBOLS), own (6, SYMBOLS), free, near (SYMBOLS,).
     """
     for m in range(len(settled)):
         first, past = m * SYMBOLS, min((m + 1) * SYMBOLS, len(found))
-        size, at = past - first, poses[:, :, first:past]
+        size, at = past - first, poses[m]
         _balls(at, tree, order, size, balls)
         for l in range(len(points)):  # noqa: E741
             left = 0

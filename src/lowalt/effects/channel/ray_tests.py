@@ -54,8 +54,8 @@ def hit(tree, f, x, y, z, u, v, w):
 
 
 @INNER
-def hit_each(edge, closed, start, ways, size, free):
-    """Set free (size,) to 0 where the ray from `start` (3,) along ways (3, size) meets a triangle, as `hit` says.
+def hit_each(edge, closed, start, ways, first, past, free):
+    """Set free (N,) to 0 where rays from `start` (3,) along ways (3, N), first to past - 1, meet a triangle, as `hit`.
 
     edge (9,) and closed: of `Tree`. Comparisons in place of branches, so that symbols pass in vector instructions.
     """
@@ -64,8 +64,8 @@ def hit_each(edge, closed, start, ways, size, free):
     q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
     height = e0 * q0 + e1 * q1 + e2 * q2
     largest = 0.0 if closed else np.inf
-    us, vs, ws = ways[0], ways[1], ways[2]
-    for n in range(np.uint64(size)):
+    us, vs, ws, left = ways[0, first:past], ways[1, first:past], ways[2, first:past], free[first:past]
+    for n in range(np.uint64(past - first)):
         u, v, w = us[n], vs[n], ws[n]
         h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
         turned = d0 * h0 + d1 * h1 + d2 * h2
@@ -78,7 +78,7 @@ def hit_each(edge, closed, start, ways, size, free):
         met = (
             (turned <= largest) & (one >= 0.0) & (other >= 0.0) & (one + other <= whole) & (way > 0.0) & (way < whole)
         )  # fmt: skip
-        free[n] = 0.0 if met else free[n]
+        left[n] = 0.0 if met else left[n]
 
 
 @INLINED

@@ -29,17 +29,18 @@ SLOW = 8e-3
 
 
 @LEAN
-def _seen_by_parts(place, rotation, translation, poses, turned, steps):
-    """Fill poses (P, 15, N) of `moving_rays.cast`, and how the direction to the station turns in each part's frame.
+def _seen_by_parts(place, rotation, translation, poses, station, turned, steps):
+    """Fill poses (B, P, 15, SYMBOLS) of `moving_rays.cast`, and where the station is in each part's frame.
 
-    turned (P,): the diagonal of the box that holds all its unit vectors; steps (P,): their mean way to the next symbol.
+    station (P, 3, N) m: its place there; turned (P,): the diagonal of the box that holds all directions to it, as unit
+    vectors; steps (P,): their mean way to the next symbol.
     """
     symbols = len(rotation)
-    for p in range(len(poses)):
+    for p in range(len(turned)):
         least0, least1, least2, most0, most1, most2 = np.inf, np.inf, np.inf, -np.inf, -np.inf, -np.inf
         last0, last1, last2, total = 0.0, 0.0, 0.0, 0.0
         for n in range(symbols):
-            turn, shift = rotation[n, p], translation[n, p]
+            turn, shift, pose, k = rotation[n, p], translation[n, p], poses[n // SYMBOLS, p], n % SYMBOLS
             a, b, c = place[0] - shift[0], place[1] - shift[1], place[2] - shift[2]
             # The poses' matrices are rotations: their inverses are their transposes.
             x = turn[0, 0] * a + turn[1, 0] * b + turn[2, 0] * c
@@ -47,9 +48,10 @@ def _seen_by_parts(place, rotation, translation, poses, turned, steps):
             z = turn[0, 2] * a + turn[1, 2] * b + turn[2, 2] * c
             for i in range(3):
                 for j in range(3):
-                    poses[p, 3 * i + j, n] = turn[i, j]
-                poses[p, 9 + i, n] = shift[i]
-            poses[p, 12, n], poses[p, 13, n], poses[p, 14, n] = x, y, z
+                    pose[3 * i + j, k] = turn[i, j]
+                pose[9 + i, k] = shift[i]
+            pose[12, k], pose[13, k], pose[14, k] = x, y, z
+            station[p, 0, n], station[p, 1, n], station[p, 2, n] = x, y, z
             far = math.sqrt(x * x + y * y + z * z)
             x, y, z = x / far, y / far, z / far
             least0, least1, least2 = min(least0, x), min(least1, y), min(least2, z)
@@ -77,19 +79,20 @@ def cast_rays(
     rotation, translation = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
     points, vertices, part = np.ascontiguousarray(points), np.ascontiguousarray(vertices), np.asarray(part, np.int64)
     place, parts = np.asarray(place_m, np.float64), len(tree.root)
-    poses, turned, steps = np.empty((parts, 15, len(rotation))), np.empty(parts), np.empty(parts)
-    _seen_by_parts(place, rotation, translation, poses, turned, steps)
+    blocks, station = -(-len(rotation) // SYMBOLS), np.empty((parts, 3, len(rotation)))
+    poses, turned, steps = np.empty((blocks, parts, 15, SYMBOLS)), np.empty(parts), np.empty(parts)
+    _seen_by_parts(place, rotation, translation, poses, station, turned, steps)
     cells = np.ceil(2.0 / np.clip(turned / STEPS, FINEST, COARSEST)).astype(np.int64)
     order = [p for p in range(parts) if tree.root[p] >= 0 and (asked is None or p in asked)]
     slow = [p for p in order if p not in rotors and len(rotation) > 1 and steps[p] <= SLOW]
     # The part of most triangles that turns slowly gets a grid.
     gridded = max(slow, key=lambda one: int(tree.count[one]), default=-1)
-    own = np.ascontiguousarray(poses[gridded, 12:].T)
+    own = np.ascontiguousarray(station[gridded].T)
     grid = ray_grid.grids(own, vertices, tree, gridded) if gridded >= 0 else ray_grid.NONE
     found = np.zeros((len(rotation), len(points)), np.bool_) if known is None else known.copy()
     turns = np.zeros(parts, np.bool_) if axes is None else np.isfinite(axes).all(axis=1)
     turning = [p for p in order if p != gridded and turns[p]]
-    done = turning_rays.cast(poses[:, 12:], axes, turning, points, part, toward, tree, found)
+    done = turning_rays.cast(station, axes, turning, points, part, toward, tree, found)
     settled = judged(vertices, tree, gridded, grid, own, points, part, toward, found) | done
     listed = np.ones(parts, np.bool_)
     listed[rotors] = False

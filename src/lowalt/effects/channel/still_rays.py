@@ -99,7 +99,7 @@ def _block(tree, some, count, start, station, ways, free, found):
             ways[i, n] = station[n, i] - start[i]
         free[n] = 1.0
     for at in range(count):
-        hit_each(tree.edges[some[at]], tree.closed[some[at]], start, ways, size, free)
+        hit_each(tree.edges[some[at]], tree.closed[some[at]], start, ways, 0, size, free)
     for n in range(size):
         if free[n] == 0.0:
             found[n] = True

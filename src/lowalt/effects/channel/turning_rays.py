@@ -163,16 +163,14 @@ def _bins_of(corners, f, across, up, room):
 def _ask(edge, closed, begin, first, last, start, ways, free):
     """Set free (N,) to 0 where the rays of the bins from first to last meet a triangle."""
     if last - first >= BINS - 1:
-        hit_each(edge, closed, start, ways, len(free), free)
+        hit_each(edge, closed, start, ways, 0, len(free), free)
         return
     if first < 0:
         first, last = first + BINS, last + BINS
     # Bins beyond the last one are the first again.
-    i, j = begin[first], begin[min(last, BINS - 1) + 1]
-    hit_each(edge, closed, start, ways[:, i:j], j - i, free[i:j])
+    hit_each(edge, closed, start, ways, begin[first], begin[min(last, BINS - 1) + 1], free)
     if last >= BINS:
-        j = begin[last - BINS + 1]
-        hit_each(edge, closed, start, ways[:, :j], j, free[:j])
+        hit_each(edge, closed, start, ways, 0, begin[last - BINS + 1], free)
 
 
 @INLINED
