@@ -143,6 +143,16 @@ def test_impossible_scenes_are_refused_by_name(effect, change, place, words):
     effect.check(effect.DEFAULTS, SimpleNamespace(network=NETWORK))
 
 
+@pytest.mark.parametrize("strength", [1.0, 0.3])
+def test_factors_of_diffuse_points_in_one_pass_are_roots_of_their_lobes_to_the_last_bit(strength):
+    cosine = np.random.default_rng(4).uniform(-1.0, 1.0, (5, 11))
+    cosine[:, 3], cosine[2, 4], known = np.nan, 0.0, np.arange(11) != 3
+    found = np.full(cosine.shape, 7.0)
+    cross_sections._lambert(cosine, known, strength, found)
+    wanted = np.where(known, np.sqrt(1.0 - strength + strength * cross_sections.diffuse(cosine, 1.0)), 1.0)
+    np.testing.assert_array_equal(found, wanted)
+
+
 def test_lobes_keep_the_mean_cross_section():
     angle = np.linspace(0, np.pi, 400_001)
     cosine, weight = np.cos(angle), np.sin(angle) * (angle[1] - angle[0])

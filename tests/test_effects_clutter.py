@@ -9,7 +9,7 @@ from scipy.special import gamma, kv
 
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
-from lowalt.effects.channel import clutter
+from lowalt.effects.channel import clutter, windblown
 from lowalt.effects.response import response
 from test_effects_channel import NETWORK, body, seen
 
@@ -67,7 +67,7 @@ def test_land_under_both_beams_matches_a_sum_over_patches():
 def test_cells_have_the_amplitude_law_they_were_given(law, shape, distribution):
     rng = np.random.default_rng(8)
     texture = clutter.texture(law, shape, 1.0 - rng.random((2, 20_000)))
-    amplitude = np.sqrt(texture) * abs(clutter.speckle(rng, 20_000, 1, 2.5e-3, 3.0, 6.0, 0.06)[:, 0])
+    amplitude = np.sqrt(texture) * abs(windblown.speckle(rng, 20_000, 1, 2.5e-3, 3.0, 6.0, 0.06)[:, 0])
     if law != "k":
         assert stats.kstest(amplitude, distribution.cdf).pvalue > 0.01
     else:
@@ -86,14 +86,14 @@ def test_windblown_land_has_billingsleys_spectrum_and_ratio():
     ten = clutter.windblown(4.4704, 4.9e9)
     assert ten[0] == pytest.approx(489.8 / 10**1.55 / 4.9**1.21)
     assert 1 / ten[1] == pytest.approx(0.1048 * 1.4147)
-    waves = clutter.speckle(np.random.default_rng(9), 5000, 400, step, still, beta, wavelength)
+    waves = windblown.speckle(np.random.default_rng(9), 5000, 400, step, still, beta, wavelength)
     assert (abs(waves) ** 2).mean() == pytest.approx(1, rel=0.05)
     lags = np.arange(0, 200, 7)
     found = [(waves[:, lag:] * waves[:, : 400 - lag].conj()).mean().real for lag in lags]
     # The exponential spectrum's autocorrelation is a Lorentzian; the still part adds its share at all lags.
     moving = 1 / (1 + (4 * np.pi * lags * step / (beta * wavelength)) ** 2)
     np.testing.assert_allclose(found, (still + moving) / (1 + still), atol=0.05)
-    loose = clutter.speckle(np.random.default_rng(1), 2000, 400, step, 0.0, beta, wavelength)
+    loose = windblown.speckle(np.random.default_rng(1), 2000, 400, step, 0.0, beta, wavelength)
     taper = np.hanning(400)
     power = (abs(np.fft.fft(loose * taper, axis=1)) ** 2).mean(axis=0)
     speed = np.fft.fftfreq(400, step) * wavelength / 2

@@ -11,7 +11,7 @@ from lowalt.effects import waveform
 from lowalt.effects.antenna import Element, gain
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import Chain
-from lowalt.effects.channel import clutter, land_between, patches
+from lowalt.effects.channel import clutter, land_between, patches, windblown
 from lowalt.effects.levels import levels
 from lowalt.effects.received import Scene, observe
 from lowalt.effects.response import response
@@ -107,14 +107,14 @@ def test_land_is_the_same_in_both_directions_of_a_link():
 def test_wind_moves_land_by_the_bisectors_share_of_its_speed():
     rng, given = np.random.default_rng(3), (400, 2.5e-3, 0.0, 6.0, 0.06)
     slow = np.repeat([1.0, 0.5, 0.0], 1500)
-    waves = clutter.speckle(rng, len(slow), *given, slow)
+    waves = windblown.speckle(rng, len(slow), *given, slow)
     for share, some in zip((1.0, 0.5, 0.0), np.split(waves, 3), strict=True):
         lags = np.arange(0, 60, 6)
         found = [(some[:, lag:] * some[:, : 400 - lag].conj()).mean().real for lag in lags]
         # The spectrum exp(-beta lambda |f| / 2) narrowed by the share has a Lorentzian that is as much wider.
         np.testing.assert_allclose(found, 1 / (1 + (4 * np.pi * share * lags * 2.5e-3 / 0.36) ** 2), atol=0.06)
-    plain = clutter.speckle(np.random.default_rng(3), 20, *given)
-    assert (plain == clutter.speckle(np.random.default_rng(3), 20, *given, None)).all()
+    plain = windblown.speckle(np.random.default_rng(3), 20, *given)
+    assert (plain == windblown.speckle(np.random.default_rng(3), 20, *given, None)).all()
 
 
 def test_the_prefix_cuts_land_and_direct_path_each_at_its_own_delay():

@@ -18,7 +18,7 @@ from lowalt.echo.radar import radar
 from lowalt.effects import transforms
 from lowalt.effects.antenna import Element, gain, local_gain
 from lowalt.effects.channel import clutter_loops, land_between, patches
-from lowalt.effects.channel.windblown import speckle, windblown
+from lowalt.effects.channel.windblown import parts, windblown
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
 
@@ -187,12 +187,12 @@ def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
     uniform = patches.alike(1.0 - rng.random((2, len(power))), correlation)
     lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
     still, beta = windblown(settings["wind_mps"], frequency)
-    waves = speckle(
+    constant, waves = parts(
         rng, len(power), len(view.times_s), network.symbol_interval_s, still, beta, SPEED_OF_LIGHT / frequency, slow
     )
     # Land beyond the unambiguous range folds into the cells it shares with nearer land.
     cells = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
-    clutter_loops.folded(lit, waves, cells)
+    clutter_loops.folded(lit, constant, waves, cells)
     transforms.forward(cells, out=cells)
     cells *= patches.ramp(network.subcarriers)
     return cells

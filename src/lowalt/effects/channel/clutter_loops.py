@@ -2,7 +2,7 @@
 
 from lowalt.common.jit import LEAN
 
-TOGETHER = 8
+TOGETHER = 4
 """Symbols that are turned from rows of cells into rows of symbols together."""
 
 
@@ -20,11 +20,11 @@ def lines(real, imaginary, shape, strong, out):
 
 
 @LEAN
-def folded(lit, waves, cells):
-    """Add lit[c] waves[c, n] to cells (N, M) at symbol n in the cell that c (K,) folds into."""
+def folded(lit, still, waves, cells):
+    """Add lit[c] (still[c] + waves[c, n]) to cells (N, M) at symbol n in the cell that c (K,) folds into."""
     # A few symbols of all cells at a time stay in the processor's cache.
     for first in range(0, len(cells), TOGETHER):
         for c in range(len(lit)):
-            place = c % cells.shape[1]
+            place, x, y = c % cells.shape[1], still[c].real, still[c].imag
             for n in range(first, min(first + TOGETHER, len(cells))):
-                cells[n, place] += complex(lit[c] * waves[c, n].real, lit[c] * waves[c, n].imag)
+                cells[n, place] += complex(lit[c] * (waves[c, n].real + x), lit[c] * (waves[c, n].imag + y))

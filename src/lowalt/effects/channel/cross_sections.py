@@ -107,6 +107,19 @@ def _cosines(normals, places, station, out):
             out[n, l] = (u[l] * a + v[l] * b + w[l] * c) / math.sqrt(a * a + b * b + c * c)
 
 
+@LEAN
+def _lambert(cosines, known, strength, out):
+    """Fill out (N, L) with the factors of `visible` of diffuse points with power 1, in one pass; known (L,)."""
+    # The order of the operations is that of `diffuse` and `visible`.
+    largest, rest = 2.0 * (1.0 + 1.0), 1.0 - strength
+    for n in range(len(cosines)):
+        cosine, row = cosines[n], out[n]
+        for l in range(np.uint64(len(known))):  # noqa: E741
+            lobe = largest * cosine[l] if cosine[l] > 0.0 else 0.0
+            factor = math.sqrt(rest + strength * lobe)
+            row[l] = factor if known[l] else 1.0
+
+
 def _blades(cloud: Cloud) -> list[tuple[np.ndarray, float]]:
     """Points (indices) of each rotor with more than one point, and their facets' radius (m)."""
     rotors = cloud.parts_of("rotor")
@@ -129,14 +142,20 @@ def visible(settings: dict, view: View, rng: np.random.Generator | None = None) 
     if not known.any():
         return np.ones(view.places.shape[:2])
     cosines = [aspect_cosine(end) for end in view.ends()]
-    lobes = [diffuse(cosine, settings["power"]) for cosine in cosines]
-    lobe = lobes[0] if len(lobes) == 1 else np.sqrt(lobes[0] * lobes[1])
+    strength, power = settings["strength"], settings["power"]
+    if len(cosines) == 1 and power == 1.0:
+        result = np.empty(cosines[0].shape)
+        _lambert(cosines[0], known, strength, result)
+    else:
+        lobes = [diffuse(cosine, power) for cosine in cosines]
+        lobe = lobes[0] if len(lobes) == 1 else np.sqrt(lobes[0] * lobes[1])
+        result = np.where(known, np.sqrt(1.0 - strength + strength * lobe), 1.0)
     if settings["blades"] == "facet":
         wave = 2 * np.pi * radar(view.network, view.station).centre_hz / SPEED_OF_LIGHT
         for mine, radius in _blades(view.cloud):
             if len(cosines) == 1:
-                lobe[:, mine] = facet(cosines[0][:, mine], wave * radius)
+                lobe = facet(cosines[0][:, mine], wave * radius)
             else:
-                lobe[:, mine] = bistatic_facet(view, mine, [cosine[:, mine] for cosine in cosines], wave * radius)
-    strength = settings["strength"]
-    return np.where(known, np.sqrt(1.0 - strength + strength * lobe), 1.0)
+                lobe = bistatic_facet(view, mine, [cosine[:, mine] for cosine in cosines], wave * radius)
+            result[:, mine] = np.where(known[mine], np.sqrt(1.0 - strength + strength * lobe), 1.0)
+    return result

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.special import fresnel
 
 from lowalt.common.errors import InputError
+from lowalt.common.jit import LEAN
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects.channel.capsules import capsules
 from lowalt.effects.channel.shadow_rays import cast_rays
@@ -114,6 +115,15 @@ def _surfaces(view: View) -> dict:
     return surfaces
 
 
+@LEAN
+def _factors(found, rest, dimmed, behind, out):
+    """Fill out (N, L): `dimmed` where rest (N, L), else `behind` where found (N, L), else 1."""
+    for n in range(len(out)):
+        one, other, row = found[n], rest[n], out[n]
+        for l in range(np.uint64(out.shape[1])):  # noqa: E741
+            row[l] = dimmed if other[l] else (behind if one[l] else 1.0)
+
+
 def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
     """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
 
@@ -133,11 +143,14 @@ def visible_of(settings: dict, view: View, dark: np.ndarray | None) -> np.ndarra
     if len(ends) == 2:
         out, back = (visible_of(settings, end, dark) for end in ends)
         return np.sqrt(out * back)
+    strength, behind = settings["strength"], 1.0
     if settings["blades"] == "opaque" or view.nodes or not view.cloud.parts_of("rotor"):
-        return 1.0 - settings["strength"] * hidden(view, known=dark)
-    if settings["blades"] == "bent":
-        rest = hidden(view, "rest", dark)
-        lost = np.where(rest, 1.0, (1.0 - through_blades(view)) * hidden(view, "blades", rest))
+        found = rest = hidden(view, known=dark)
     else:
-        lost = hidden(view, "rest", dark)
-    return 1.0 - settings["strength"] * lost
+        found = rest = hidden(view, "rest", dark)
+        if settings["blades"] == "bent":
+            # The rays to the rest's points are not cast again, so `found` holds these too.
+            found, behind = hidden(view, "blades", rest), 1.0 - strength * (1.0 - through_blades(view))
+    result = np.empty(found.shape)
+    _factors(found, rest, 1.0 - strength, behind, result)
+    return result

@@ -63,9 +63,18 @@ def speckle(
     still: ratio of their powers; beta: slope of the spectrum over radial speed (s/m); slow: (cells,) factor on Doppler
     frequencies, None for 1.
     """
-    kept = _normal(rng, cells)[:, None]
+    constant, moving = parts(rng, cells, count, step_s, still, beta, wavelength_m, slow)
+    return moving + constant[:, None]
+
+
+def parts(
+    rng: np.random.Generator, cells: int, count: int, step_s: float, still: float, beta: float, wavelength_m: float,
+    slow: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return the parts of `speckle`, whose sum it is: the constant one (cells,), the moving one (cells, count)."""
+    kept = _normal(rng, cells)
     if not np.isfinite(still):
-        return np.repeat(kept, count, axis=1)
+        return kept, np.zeros((cells, count), np.complex128)
     shape = _shape(count, step_s, beta, wavelength_m)
     lines = np.empty((cells, len(shape)), np.complex128)
     # Draw only lines near zero frequency, positive and negative; the power of all others is negligible.
@@ -77,5 +86,4 @@ def speckle(
     shape = np.ascontiguousarray(np.atleast_2d(np.sqrt(1 / (1 + still)) * shape))
     clutter_loops.lines(*circular(words, np.sqrt(0.5)), shape, strong, lines)
     moving = np.fft.ifft(lines, axis=1, norm="forward", out=lines)[:, :count]
-    moving += np.sqrt(still / (1 + still)) * kept
-    return moving
+    return np.sqrt(still / (1 + still)) * kept, moving
