@@ -57,7 +57,7 @@ NONE = RayGrid(
 """No grid at all."""
 
 
-@LEAN
+@INLINED
 def _image(vertices, tree, f, axes, middle, radius_m, far, way, out):
     """Fill out (5,) with the edges of triangle f's widened image, low and high, and how far it reaches to the station.
 

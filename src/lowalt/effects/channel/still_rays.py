@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, INNER, LEAN
+from lowalt.common.jit import INLINED, LEAN
 from lowalt.effects.channel.ray_grid import SYMBOLS, RayGrid, farthest
 from lowalt.effects.channel.ray_tests import hit_each, sides
 from lowalt.effects.channel.surface_tree import Tree
@@ -46,7 +46,7 @@ def _met(vertices, tree, f, x, y, z, a, b, c, spread):
     return HIDDEN if (least > 0 or most < 0) and ahead > room else OPEN
 
 
-@INNER
+@INLINED
 def _judged(vertices, tree, grid, k, start, aim, way, stamp, stamps, some):
     """Fill `some` with the triangles of grid k that may meet some rays from `start` (3,) to within `way` (m) of `aim`.
 
@@ -90,7 +90,7 @@ def _judged(vertices, tree, grid, k, start, aim, way, stamp, stamps, some):
     return count, FREE
 
 
-@INNER
+@INLINED
 def _block(tree, some, count, start, station, ways, free, found):
     """Set found (n,) of one point where one of the triangles some[:count] hides it; station (n, 3) m."""
     size = len(station)
