@@ -6,7 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from lowalt.common import portable
+from lowalt.common import portable, streams
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
 from lowalt.common.matrices import nearest_rotations, thinnest
@@ -101,6 +101,15 @@ def test_compiled_words_are_those_of_the_generator_and_leave_it_where_it_would_s
     assert compiled.state == plain.state
     assert compiled.state["has_uint32"] == kept
     assert np.array_equal(words(compiled, 5), plain.random_raw(5))
+
+
+@pytest.mark.parametrize("last", [bytes(4), bytes(8), b"\x00\x00\x00\x01", b"\xff" * 4])
+def test_a_stream_is_seeded_by_its_digest_as_one_integer(last, monkeypatch):
+    """Also where the integer's upper words are zeros, which count as no words."""
+    made = bytes(range(1, 33 - len(last))) + last
+    monkeypatch.setattr(streams, "digest", lambda *keys: made)
+    wanted = np.random.PCG64(np.random.SeedSequence(int.from_bytes(made, "little")))
+    assert streams.stream(7, "any").bit_generator.state == wanted.state
 
 
 def test_the_first_draws_of_a_stream_are_written_down():
