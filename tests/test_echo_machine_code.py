@@ -71,7 +71,7 @@ def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
     # numba offers no public name for the key of a cache entry; only the key shows that this cache is asked.
     for compiled in (run, one_way):
         key = compiled._cache._index_key(("signature",), Codegen())
-        assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func) in key
+        assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func, compiled._cache.options) in key
 
 
 def test_a_kernel_without_an_entry_for_python_refuses_a_call_and_serves_kernels():
@@ -102,3 +102,41 @@ def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):
         done = subprocess.run(call, env={"PYTHONPATH": paths}, capture_output=True, text=True, check=True)
         assert done.stdout == "3.0\n"
         (tmp_path / f"{module}.py").rename(tmp_path / "two.py")
+
+
+PRODUCTS = """
+import numpy as np
+from lowalt.common.jit import LEAN, VECTOR
+
+
+def loop(a, b, out):
+    for k in range(len(out)):
+        out[k] = a[k] * b[k]
+
+
+def other(a, b, out):
+    for k in range(len(out)):
+        out[k] = a[k] * b[k]
+
+
+rng = np.random.default_rng(1)
+a, b = rng.normal(size=(2, 300, 2)).view(complex)[..., 0]
+found = np.empty(300, complex)
+VECTOR(other)(a, b, found.copy())
+LEAN(loop)(a, b, found)
+written = (a.real * b.real - a.imag * b.imag) + 1j * (a.real * b.imag + a.imag * b.real)
+print((found == written).all())
+"""
+
+
+def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_written(tmp_path):
+    # numba compiles such a product once for all kernels, with the options of the first one.
+    (tmp_path / "products.py").write_text(PRODUCTS)
+    ended = subprocess.run([sys.executable, "products.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert ended.stdout == "True\n", ended.stderr
+
+
+def test_the_key_of_kept_code_has_the_kernel_s_own_options():
+    assert (
+        len({digest(run.py_func, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3
+    )

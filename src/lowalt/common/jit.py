@@ -2,9 +2,10 @@
 
 numba's own cache looks at the file of a function only. It does not look at the functions that it calls in other
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
-kernel's bytecode, of all kernels and constants that it uses, of those that these use, and so on. Code that is not
-compiled has no part in it. Processes that need the same machine code at the same time take turns: one compiles, the
-others load what it kept.
+kernel's bytecode and options, of all kernels and constants that it uses, of those that these use, and so on. Code that
+is not compiled has no part in it. Processes that need the same machine code at the same time take turns: one compiles,
+the others load what it kept. numba's own parts, such as the product of complex numbers, are compiled for each set of
+options by themselves: else the first kernel of a process would decide whether products are fused in all others.
 """
 
 import hashlib
@@ -17,8 +18,9 @@ import numpy as np
 from numba import njit
 from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
-from numba.core.registry import CPUDispatcher
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
+from numba.core.targetconfig import ConfigStack
 
 from lowalt.common.turns import Turn
 
@@ -48,6 +50,11 @@ def _used(function: FunctionType) -> Iterator[tuple[str, object]]:
         yield name, cell.cell_contents
 
 
+def _options_of(options: dict) -> str:
+    """Return the options of a kernel as text."""
+    return f"{[(option, _text_of(options[option])) for option in sorted(options)]}"
+
+
 def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
     """Yield as text everything that determines the machine code of `function`; each kernel that it calls comes once."""
     name = f"{function.__module__}.{function.__qualname__}"
@@ -63,8 +70,7 @@ def _parts(function: FunctionType, seen: set[str]) -> Iterator[str]:
             yield _text_of(value)
     for label, value in _used(function):
         if isinstance(value, Dispatcher):
-            options = sorted(value.targetoptions.items())
-            yield f"{label} {[(option, _text_of(setting)) for option, setting in options]}"
+            yield f"{label} {_options_of(value.targetoptions)}"
             yield from _parts(value.py_func, seen)
         elif isinstance(value, type) and hasattr(value, "_fields"):
             yield f"{label} {value._fields}"
@@ -77,12 +83,34 @@ def _fields(kind) -> tuple:
     return (getattr(kind, "fields", ()), *map(_fields, getattr(kind, "types", ())))
 
 
-def digest(function: FunctionType) -> str:
-    """Return the SHA-256 of a kernel's bytecode and of all kernels, settings and constants that it uses."""
-    total = hashlib.sha256()
+def digest(function: FunctionType, options: dict | None = None) -> str:
+    """Return the SHA-256 of a kernel's bytecode and options, and of all kernels and constants that it uses."""
+    total = hashlib.sha256(_options_of(options or {}).encode())
     for part in _parts(function, set()):
         total.update(part.encode() + b"\0")
     return total.hexdigest()
+
+
+class _PartsByOptions(dict):
+    """numba's own parts of kernels by their names, types, and how freely the kernel that asks for one may round."""
+
+    def _key(self, key):
+        """The key together with the options of the kernel that is being compiled."""
+        stack = ConfigStack()
+        return key, str(stack.top().fastmath) if stack else ""
+
+    def get(self, key, default=None):
+        """Return the part that was compiled for these options, or `default`."""
+        return super().get(self._key(key), default)
+
+    def __getitem__(self, key):
+        return super().__getitem__(self._key(key))
+
+    def __setitem__(self, key, value):
+        super().__setitem__(self._key(key), value)
+
+
+cpu_target.target_context.cached_internal_func = _PartsByOptions()
 
 
 class _DigestCache(FunctionCache):
@@ -92,6 +120,8 @@ class _DigestCache(FunctionCache):
     """Whether the function may use counted references, and so allocate."""
     inner = False
     """Whether the function has no entry for Python."""
+    options: dict[str, Any] | None = None
+    """How the function is compiled."""
 
     def __init__(self, function):
         super().__init__(function)
@@ -100,7 +130,8 @@ class _DigestCache(FunctionCache):
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""
-        key = (*super()._index_key(sig, codegen), digest(self._py_func), tuple(map(_fields, sig)))
+        parts = digest(self._py_func, self.options)
+        key = (*super()._index_key(sig, codegen), parts, tuple(map(_fields, sig)))
         return (*key, "inner") if self.inner else key
 
     def load_overload(self, sig, target_context):
@@ -162,7 +193,7 @@ def kernel(inner: bool = False, **options) -> Callable:
         """Compile a function and give it a cache of this module."""
         compiled = njit(**options)(function)
         compiled._cache = _DigestCache(function)
-        compiled._cache.counted = options.get("_nrt", True)
+        compiled._cache.counted, compiled._cache.options = options.get("_nrt", True), options
         if inner:
             compiled.__class__, compiled._cache.inner = _Inner, True
         return compiled
