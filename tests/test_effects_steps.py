@@ -6,7 +6,7 @@ import pytest
 from lowalt.effects.catalogue import called
 from lowalt.effects.chain import EXACT, Chain
 from lowalt.effects.received import Scene, observe, received_signal
-from lowalt.effects.steps import error_before, steps_alone
+from lowalt.effects.steps import SHARE, error_before, steps_alone
 from test_effects_bounds import network, target
 
 NEAR = {"squint": {}, "wavefront": {}, "symbol_motion": {}}
@@ -25,8 +25,9 @@ def test_behind_a_converter_the_mean_square_error_stays_within_its_share_of_the_
     exact, coarse = (
         received_signal(Scene(radio, 3, tolerance, effects), station, cloud, row).signal for tolerance in (None, 1e-2)
     )
-    allowed = 0.04 * 0.5 * 1e-2 * abs(exact).max()
+    allowed = SHARE * 1e-2 * abs(exact).max()
     assert np.sqrt(np.mean(abs(coarse - exact) ** 2)) <= allowed
+    assert abs(coarse - exact).max() <= 1e-2 * abs(exact).max()
     # The test would say nothing if interpolation stayed at rounding.
     chain = chain_of(radio, cloud, row, effects)
     chain.run(frozenset(), leads=False)

@@ -32,7 +32,7 @@ from lowalt.effects.interface import (
     WeighsPoints,
 )
 from lowalt.effects.need import Decision
-from lowalt.effects.steps import error_before, steps_alone
+from lowalt.effects.steps import SHARE, error_before, steps_alone
 from lowalt.effects.target_echo import TargetEcho
 from lowalt.effects.view import View
 from lowalt.targets.cloud import Cloud
@@ -120,9 +120,9 @@ def received_signal(
     chain.receiving.again = share is not None and bool(asked)
     chain.others = others(scene, chain, cloud, row, clouds or {})
     if exact:
-        if share is not None and asked and steps_alone(chain):
+        if scene.tolerance is not None and asked and steps_alone(chain):
             largest = largest_of(chain.run(frozenset(), leads=False))
-            chain.error = error_before(chain, INTERPOLATION * share * largest)
+            chain.error = error_before(chain, SHARE * scene.tolerance * largest)
         outcome = chain.run(frozenset(asked), leads=False)
         notes = need.decisions(asked, {}, [], share, float(abs(outcome.signal).max()))
         return Received(outcome.signal, outcome.cell, power, notes)

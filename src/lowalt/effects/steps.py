@@ -6,6 +6,9 @@ from lowalt.effects.catalogue import providing
 from lowalt.effects.chain import COARSEST, EXACT, Chain
 from lowalt.effects.interface import Amplifies, ChoosesCells, Quantises
 
+SHARE = 0.05
+"""Share of the tolerance by which interpolation may err before a converter, rms: nothing else errs there."""
+
 
 def steps_alone(chain: Chain) -> bool:
     """Return whether converters are the only effects without a bound of an error, apart from choices of cells."""
