@@ -68,3 +68,20 @@ def test_a_symbol_in_which_no_point_echoes_is_zero():
     found = steering.echo(view, (), factor)
     assert not found[20:].any()
     assert found[:20].all()
+
+
+def test_a_coefficient_that_instants_share_is_gathered_once():
+    rng = np.random.default_rng(1)
+    numbers = rng.integers(0, POINTS, (40, 16))
+    coefficient = rng.random((40, POINTS)) + 0j
+    sender = lit_points.ImagePath(rng.random((40, POINTS, 3)), 2.0 * coefficient)
+    path = lit_points.ImagePath(rng.random((40, POINTS, 3)), coefficient, sender=sender)
+    known = lit_points.paths_at([path], numbers)
+    later = path._replace(places=path.places + 1.0)
+    (found,) = lit_points.paths_at([later], numbers, known)
+    assert found.lit.coefficient is known[0].lit.coefficient
+    assert found.lit.sender.coefficient is known[0].lit.sender.coefficient
+    np.testing.assert_array_equal(found.lit.coefficient, np.take_along_axis(coefficient, numbers, 1))
+    np.testing.assert_array_equal(found.lit.places, known[0].lit.places + 1.0)
+    (other,) = lit_points.paths_at([path._replace(coefficient=-coefficient)], numbers, known)
+    np.testing.assert_array_equal(other.lit.coefficient, -known[0].lit.coefficient)

@@ -4,7 +4,8 @@ Surfaces hide half of a target's points or more. A symbol's points with any stre
 without as fill the table, so that all symbols have equally many.
 """
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -34,15 +35,15 @@ def _sorted(strength, numbers):
     for n in range(symbols):
         first, last = 0, count
         for l in range(count):  # noqa: E741
-            lit = False
+            lit = 0
             for r in range(routes):
-                lit = lit or strength[r, n, l] != 0.0
-            if lit:
-                numbers[n, first] = l
-                first += 1
-            else:
-                last -= 1
-                numbers[n, last] = l
+                lit |= 1 if strength[r, n, l] != 0.0 else 0
+            # Both ends of what is not yet filled take the number, and one of them stays: no branch, which is hard to
+            # predict.
+            numbers[n, first] = l
+            numbers[n, last - 1] = l
+            first += lit
+            last -= 1 - lit
         most = max(most, first)
     return most
 
@@ -95,7 +96,32 @@ def places_at(places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     return out.swapaxes(1, 2)
 
 
-def path_at(path: ImagePath, numbers: np.ndarray) -> ImagePath:
-    """Return a path to each symbol's points `numbers` (N, W) alone."""
-    sender = None if path.sender is None else path_at(path.sender, numbers)
-    return ImagePath(places_at(path.places, numbers), at_points(path.coefficient, numbers), path.station_m, sender)
+class Gathered(NamedTuple):
+    """A path to all points, and the same to each symbol's lit points alone."""
+
+    path: ImagePath
+    lit: ImagePath
+
+
+def path_at(path: ImagePath, numbers: np.ndarray, known: Gathered | None = None) -> ImagePath:
+    """Return a path to each symbol's points `numbers` (N, W) alone.
+
+    known: a path of the same points `numbers` at another instant; where both have one coefficient, it serves again.
+    """
+    sender = None
+    if path.sender is not None:
+        once = known is not None and known.path.sender is not None
+        sender = path_at(path.sender, numbers, Gathered(known.path.sender, known.lit.sender) if once else None)
+    if known is not None and known.path.coefficient is path.coefficient:
+        coefficient = known.lit.coefficient
+    else:
+        coefficient = at_points(path.coefficient, numbers)
+    return ImagePath(places_at(path.places, numbers), coefficient, path.station_m, sender)
+
+
+def paths_at(
+    paths: Sequence[ImagePath], numbers: np.ndarray, known: Sequence[Gathered] | None = None
+) -> list[Gathered]:  # fmt: skip
+    """Return each path with the same to the points `numbers` (N, W) alone; known: as in `path_at`, for every path."""
+    known = known or [None] * len(paths)
+    return [Gathered(path, path_at(path, numbers, own)) for path, own in zip(paths, known, strict=True)]

@@ -46,7 +46,8 @@ def products(out_re, out_im, back_re, back_im, strength, times, lit, count, real
             imag[i] = own * (out_re[i] * back_im[i] + out_im[i] * back_re[i])
         return
     for i in range(np.uint64(count)):
-        at = lit[i]
+        # Without a sign, no number can count from the end.
+        at = np.uint64(lit[i])
         own = times * strength[at]
         real[i] = own * (out_re[at] * back_re[at] - out_im[at] * back_im[at])
         imag[i] = own * (out_re[at] * back_im[at] + out_im[at] * back_re[at])
@@ -61,7 +62,7 @@ def places(there, home, middle, half_cells, reach, lit, count, u):
             u[i] = (half_cells * (there[i] + home[i]) - middle) * scale
         return
     for i in range(np.uint64(count)):
-        at = lit[i]
+        at = np.uint64(lit[i])
         u[i] = (half_cells * (there[at] + home[at]) - middle) * scale
 
 
