@@ -7,7 +7,7 @@ import pytest
 
 import reference_effects
 from lowalt.common.errors import InputError
-from lowalt.effects import moment_loops, response_tables
+from lowalt.effects import moment_loops, response_tables, spread_loops
 from lowalt.effects.response import OneWayFactors, response
 from test_effects import network
 
@@ -94,3 +94,25 @@ def test_a_point_in_the_station_is_refused(point):
 def test_rows_are_filled_to_whole_vectors():
     assert [moment_loops.padded(count) for count in (1, 16, 17)] == [16, 16, 32]
     assert response_tables.round_up(1.0) >= 1.0
+
+
+@pytest.mark.parametrize("points", [1, 4, 19])
+def test_the_least_and_the_largest_of_each_symbol_are_found(points):
+    values, found = np.random.default_rng(5).normal(size=(7, points)), np.empty((2, 7))
+    moment_loops.extremes(values, *found)
+    np.testing.assert_array_equal(found, [values.min(axis=1), values.max(axis=1)])
+
+
+def test_the_largest_subcarrier_is_bounded_by_the_largest_value_of_each_function():
+    planes, peaks = np.random.default_rng(6).normal(size=(5, 2, 9)), np.linspace(0.1, 1.0, 9)
+    wanted = (np.hypot(planes[:, 0], planes[:, 1]) @ peaks).max()
+    assert spread_loops.largest(planes, peaks) == pytest.approx(wanted, rel=1e-14)
+    assert spread_loops.largest(planes[:0], peaks) == 0.0
+
+
+@pytest.mark.parametrize("nodes", [1, 4])
+def test_peaks_are_the_largest_values_of_the_functions_in_use(nodes):
+    reach, *given = 3.0, 64, 1e-12
+    functions = response_tables.table(reach, *given) if nodes == 1 else response_tables.joined(reach, nodes, *given)[1]
+    found = response_tables.peaks(reach, nodes, *given)
+    np.testing.assert_array_equal(found, np.maximum(functions.max(axis=1), -functions.min(axis=1)))

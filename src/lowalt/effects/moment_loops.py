@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, VECTOR
+from lowalt.common.jit import INNER_VECTOR, ORDERED, VECTOR
 
 BLOCK = 4
 """Orders that share a pass over the points."""
@@ -24,6 +24,17 @@ def filled(values, size, out):
         out[i] = values[i]
     for i in range(len(values), size):
         out[i] = values[0]
+
+
+@ORDERED
+def extremes(values, low, high):
+    """Fill low and high (N,) with the least and the largest of values (N, L)."""
+    for n in range(len(values)):
+        row = values[n]
+        least, most = row[0], row[0]
+        for i in range(np.uint64(len(row))):
+            least, most = min(least, row[i]), max(most, row[i])
+        low[n], high[n] = least, most
 
 
 @INNER_VECTOR

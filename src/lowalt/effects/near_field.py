@@ -4,6 +4,7 @@ A target fills a small box of direction cosines and inverse ranges while a few s
 is a smooth function: a polynomial of a few dozen terms (`near_field_terms`).
 """
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -99,7 +100,7 @@ def _box(
     low: np.ndarray, high: np.ndarray, wider: float, array: Arrays, error: float, points: int, frequencies: int
 ) -> Box | None:  # fmt: skip
     """The polynomials over the directions from low to high (3,), None where summing every point costs less."""
-    each = float(np.prod(array.shape)) * (ELEMENT + ORDER * array.series.shape[1])
+    each = math.prod(array.shape) * (ELEMENT + ORDER * array.series.shape[1])
     if points * each < WORK:
         return None
     middle = 0.5 * (low + high)
@@ -109,13 +110,13 @@ def _box(
     if found is None:
         return None
     counts, matters, most = found
-    if WORK + points * frequencies * most + float(np.prod(counts)) * each > points * each:
+    if WORK + points * frequencies * most + math.prod(counts) * each > points * each:
         return None
     nodes = _nodes(counts, middle, half, array)
     if nodes is None:
         return None
     found = _terms(nodes, counts, array, frequencies)
-    terms = chosen(found, matters, error / 4 * float(np.prod(array.shape)))
+    terms = chosen(found, matters, error / 4 * math.prod(array.shape))
     return Box(middle, half, counts, *terms, _mix(frequencies)[:, : len(terms[-1]) - 1])
 
 

@@ -1,7 +1,7 @@
 """One array's complex factors over one path to every point: coefficient, array sum, 1/r and half the two-way phase."""
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from lowalt.echo.radar import Radar, radar
 from lowalt.effects import direct_loops, near_field, response_loops, waves
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import ONE, Instant, Kept
-from lowalt.effects.moment_loops import padded
+from lowalt.effects.moment_loops import extremes, padded
 
 
 class ImagePath(NamedTuple):
@@ -120,7 +120,8 @@ class PathFactors:
             np.empty(count[1], np.complex128), out, excess,
         )  # fmt: skip
         self._check(fault)
-        low, high = excess.min(axis=1), excess.max(axis=1)
+        low, high = np.empty((2, count[0]))
+        extremes(excess, low, high)
         return OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
 
     def spans(self, shape: tuple[int, int], squint: bool) -> tuple[np.ndarray, np.ndarray, float]:
@@ -211,5 +212,12 @@ class PathFactors:
 
 def _stepped(kappas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Half of how far frequencies over the carrier are from their middle (Q,), and the waves that hold for it."""
+    return _stepped_at(tuple(kappas.tolist()))
+
+
+@lru_cache(maxsize=64)
+def _stepped_at(given: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """What `_stepped` returns for these frequencies, which must not be changed."""
+    kappas = np.array(given)
     steps = 0.5 * (kappas - 0.5 * (kappas[0] + kappas[-1]))
     return steps, waves.waves_within(0.5 * float(abs(steps).max()))

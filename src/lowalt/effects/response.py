@@ -185,7 +185,7 @@ class OneWayFactors:
     def largest(self, moments: list[np.ndarray]) -> float:
         """Return a bound of the largest subcarrier of `moments`: each order's function counts by its largest value."""
         return sum(
-            float((np.hypot(planes[:, 0], planes[:, 1]) @ abs(self.functions(reach)).max(axis=1)).max(initial=0.0))
+            spread_loops.largest(planes, tables.peaks(reach, len(self.nodes), self.radio.subcarriers, self.rest))
             for planes, (_, reach) in zip(moments, self.frames, strict=True)
         )
 

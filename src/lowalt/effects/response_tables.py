@@ -14,6 +14,7 @@ from lowalt.effects import interpolation
 from lowalt.effects.moment_loops import BLOCK
 
 
+@lru_cache(maxsize=16)
 def half_diagonal(shape: tuple[int, int]) -> float:
     """Return the distance of an array's corner from its middle, in spacings; no element's path differs by more."""
     return 0.5 * float(np.hypot(shape[0] - 1, shape[1] - 1))
@@ -97,6 +98,16 @@ def joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarr
     return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
 
 
+@lru_cache(maxsize=64)
+def peaks(reach: float, nodes: int, count: int, error: float) -> np.ndarray:
+    """Return the largest magnitude (K,) at the subcarriers of each function of `joined`, at one frequency of `table`.
+
+    The result is kept and must not be changed.
+    """
+    functions = joined(reach, nodes, count, error)[1] if nodes > 1 else table(reach, count, error)
+    return abs(functions).max(axis=1)
+
+
 def frequencies(
     network: Network, radio: Radar, squint: bool, error: float, longest: float | None = None
 ) -> np.ndarray:  # fmt: skip
@@ -104,17 +115,22 @@ def frequencies(
 
     The phase of an array's middle counts as range. Only the elements' paths relative to the middle's remain, so they
     alone decide how many frequencies are needed; longest: bound of these of either array, in spacings, None for the
-    distance of its corner.
+    distance of its corner. The result is kept and must not be changed.
     """
     count = radio.subcarriers
     if not squint or count == 1:
         return np.array([radio.kappa])
     half = 0.5 * (count - 1) * network.subcarrier_spacing_hz / network.carrier_hz
     both = [half_diagonal(shape) if longest is None else longest for shape in (network.transmit, network.receive)]
-    band = np.pi * half * sum(both)
+    return _band_points(radio.kappa + half, half, np.pi * half * sum(both), error)
+
+
+@lru_cache(maxsize=64)
+def _band_points(middle: float, half: float, band: float, error: float) -> np.ndarray:
+    """Chebyshev points, `half` to either side of `middle`, that interpolate exp(j band x) within `error`."""
     # Interpolation of exp(j B x) errs by at most 4 times the sum of |J_p(B)| over p >= nodes. Each J_p is below half
     # the J_p before it, so the sum is at most 2 |J_nodes(B)|.
     nodes = int(band) + 2
     while 8.0 * abs(jv(nodes, band)) > error:
         nodes += 1
-    return radio.kappa + half + half * interpolation.points(nodes)
+    return middle + half * interpolation.points(nodes)

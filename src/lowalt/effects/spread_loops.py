@@ -78,6 +78,21 @@ def carried(response, data, tones):
 
 
 @VECTOR
+def largest(planes, peaks):
+    """Return the largest sum over orders of the magnitudes of planes (N, 2, P), real and imaginary, times peaks (P,).
+
+    Without symbols that is zero.
+    """
+    most = 0.0
+    for n in range(len(planes)):
+        real, imag, total = planes[n, 0], planes[n, 1], 0.0
+        for p in range(np.uint64(len(peaks))):
+            total += math.sqrt(real[p] * real[p] + imag[p] * imag[p]) * peaks[p]
+        most = max(most, total)
+    return most
+
+
+@VECTOR
 def spread(planes, table, own, whole, cells, work, turn, sums, fresh, data, result):
     """Add own[n] times the response of moments (N, 2, P), real and imaginary, delayed, to result (N, M).
 
