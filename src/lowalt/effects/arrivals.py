@@ -42,12 +42,12 @@ def arriving(
     allowed = 0.5 * max(echo.error, moving.rounding(view))
     strengths = echo.strengths
     count = moving.count(view, allowed, strengths.max(axis=0) / max(float(strengths.sum(axis=1).max()), 1e-300))
-    farther_m, lit = moving.farther_m(view), lit_points.lit(factor)
+    farther_m = moving.farther_m(view)
     if (
         1 < count < view.network.subcarriers
         and np.isfinite(farther_m)
         and not held
-        and time_series.alone(view, lit, on)
+        and time_series.alone(view, lit_points.lit(factor), on)
     ):
         still, samples = time_series.arrived(
             view, moving.nodes_s(view, count), np.ascontiguousarray(echo.sending.aired[rows]), factor,

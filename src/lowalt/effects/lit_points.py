@@ -28,16 +28,22 @@ MOST = 0.85
 
 
 @LEAN
-def _sorted(strength, numbers):
-    """Fill numbers (N, L) with points, those with any strength (R, N, L) first; return the most that a symbol has."""
+def _sorted(strength, found, numbers):
+    """Fill numbers (N, L) with points, those with any strength (R, N, L) first; return the most that a symbol has.
+
+    found: (L,) int64, work space.
+    """
     routes, symbols, count = strength.shape
     most = 0
     for n in range(symbols):
         first, last = 0, count
+        for r in range(routes):
+            own = strength[r, n]
+            for i in range(np.uint64(count)):
+                before = found[i] if r > 0 else 0
+                found[i] = before | (1 if own[i] != 0.0 else 0)
         for l in range(count):  # noqa: E741
-            lit = 0
-            for r in range(routes):
-                lit |= 1 if strength[r, n, l] != 0.0 else 0
+            lit = found[l]
             # Both ends of what is not yet filled take the number, and one of them stays: no branch, which is hard to
             # predict.
             numbers[n, first] = l
@@ -69,7 +75,8 @@ def lit(factor: np.ndarray | float) -> np.ndarray | None:
     if np.ndim(factor) < 2 or factor.shape[-2] < 2:
         return None
     numbers = np.empty(factor.shape[-2:], np.int64)
-    most = _sorted(np.ascontiguousarray(factor, np.float64).reshape(-1, *numbers.shape), numbers)
+    strength = np.ascontiguousarray(factor, np.float64).reshape(-1, *numbers.shape)
+    most = _sorted(strength, np.empty(numbers.shape[1], np.int64), numbers)
     width = max(padded(most), padded(1))
     return np.ascontiguousarray(numbers[:, :width]) if width <= MOST * numbers.shape[1] else None
 
