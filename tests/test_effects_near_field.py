@@ -7,7 +7,7 @@ import pytest
 
 from lowalt.common.config import load_yaml
 from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.effects import near_field, near_field_terms, waves
+from lowalt.effects import near_field, near_field_loops, near_field_terms, waves
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 SPACING = SPEED_OF_LIGHT / (2 * NETWORK.carrier_hz)
@@ -172,3 +172,17 @@ def test_terms_that_are_left_out_sum_to_no_more_than_is_allowed(allowed):
     # A quarter of what is allowed would not do for many fewer.
     assert (kept != 0).sum() <= (abs(wanted) > 0.01 * allowed).sum() or allowed == 0.0
     assert allowed > 0.0 or (kept == wanted).all()
+
+
+def test_directions_of_some_symbols_are_held_against_a_box_together():
+    low = np.random.default_rng(8).uniform(-1.0, 0.0, (3, 9))
+    high, bounds = low + 0.5, np.empty((2, 3))
+    least, most = low[:, 2:6].min(axis=1), high[:, 2:6].max(axis=1)
+    middle, half = 0.5 * (least + most), 0.5 * (most - least) + 1e-9
+    assert near_field_loops.held(low, high, 2, 6, middle, half, *bounds)
+    np.testing.assert_array_equal(bounds, [least, most])
+    for axis in range(3):
+        moved = 2e-9 * np.eye(3)[axis]
+        assert not near_field_loops.held(low, high, 2, 6, middle + moved, half, *bounds)
+        assert not near_field_loops.held(low, high, 2, 6, middle - moved, half, *bounds)
+    assert not near_field_loops.held(low, high, 2, 6, *near_field.NOWHERE, *bounds)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.effects import interpolation, near_field_loops, response_loops
-from lowalt.effects.near_field_loops import directions, evaluated
+from lowalt.effects.near_field_loops import directions, evaluated, held
 from lowalt.effects.near_field_terms import MOST, Aperture, chosen, orders
 
 SYMBOLS = 100
@@ -24,6 +24,8 @@ WORK = 2_000_000
 """Time of a box before any node or point is summed, in terms of one point."""
 ELEMENT, ORDER = 14.0, 0.5
 """Time of an element and of an order of its series at one point, in terms of one point."""
+NOWHERE = np.full(3, np.nan), np.zeros(3)
+"""Middle and half of a box that holds no direction."""
 GRID = 8
 """Steps of an octave to which a box's halves are rounded up, so that boxes share their numbers of nodes and terms."""
 
@@ -59,10 +61,6 @@ class Box(NamedTuple):
     ends: np.ndarray
     mix: np.ndarray
 
-    def holds(self, low: np.ndarray, high: np.ndarray) -> bool:
-        """Return whether directions from low to high (3,) are in the box."""
-        return bool((low >= self.middle - self.half).all() and (high <= self.middle + self.half).all())
-
 
 def sums(
     places: np.ndarray, array: Arrays, error: float, out: np.ndarray, kept: dict[int, Box] | None = None
@@ -78,9 +76,10 @@ def sums(
     for first in range(0, symbols, SYMBOLS):
         rows = slice(first, min(first + SYMBOLS, symbols))
         points = (rows.stop - first) * count
-        low, high = least[:, rows].min(axis=1), most[:, rows].max(axis=1)
         box = None if kept is None else kept.get(first)
-        if box is None or not box.holds(low, high):
+        low, high = np.empty((2, 3))
+        inside = held(least, most, rows.start, rows.stop, *(NOWHERE if box is None else box[:2]), low, high)
+        if not inside:
             wider = WIDER if kept is not None else 1.0
             box = _box(low, high, wider, array, error, points, len(out))
         if box is None:

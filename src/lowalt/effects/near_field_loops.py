@@ -34,6 +34,22 @@ def directions(places, station, axes, low, high, out):
 
 
 @LEAN
+def held(low, high, first, last, middle, half, least, most):
+    """Fill least and most (3,) with the bounds low and high (3, N) of symbols from first to last, together.
+
+    Returns whether they lie within half (3,) of middle (3,).
+    """
+    inside = True
+    for k in range(3):
+        a, b = low[k, first], high[k, first]
+        for n in range(first + 1, last):
+            a, b = min(a, low[k, n]), max(b, high[k, n])
+        least[k], most[k] = a, b
+        inside = inside and a >= middle[k] - half[k] and b <= middle[k] + half[k]
+    return inside
+
+
+@LEAN
 def nodes(across, up, near, station, axes, out):
     """Fill out (A, B, C, 3) m with places at direction cosines across (A,) and up (B,), inverse ranges near (C,) (1/m).
 

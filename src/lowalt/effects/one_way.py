@@ -100,13 +100,10 @@ class PathFactors:
         out, excess = np.empty((2, len(kappas), *count)), np.empty(count)
         gains, shares = np.empty((0, 0, 0, 0), np.complex128), ONE
         if wavefront:
-            centre = 0.5 * (kappas.min() + kappas.max())
-            series = tables.series(
-                np.pi * (kappas - centre) / spacing, spacing * tables.half_diagonal(shape), error / 40
-            )
+            wave, series, highest = _spherical(tuple(kappas.tolist()), spacing, shape, error / 40)
             array = near_field.Arrays(
-                radio.station, axes, spacing, 0.5 * centre / spacing, radio.kappa, self.aims, shape, series,
-                waves.waves(error / 40), 0.5 * float(kappas.max()) / spacing,
+                radio.station, axes, spacing, wave, radio.kappa, self.aims, shape, series, waves.waves(error / 40),
+                highest,
             )  # fmt: skip
             if kept is None:
                 gains = np.empty((1, *out.shape[1:]), np.complex128)
@@ -208,6 +205,16 @@ class PathFactors:
                 f"position of a point at symbol {(fault - 1) // self.places.shape[1]} is that of station {self.name} "
                 "(r = 0), expected r > 0"
             )
+
+
+@lru_cache(maxsize=64)
+def _spherical(
+    given: tuple[float, ...], spacing: float, shape: tuple[int, int], error: float
+) -> tuple[float, np.ndarray, float]:  # fmt: skip
+    """What `near_field.Arrays` holds of the frequencies `given`: wave, series and highest; series must not change."""
+    kappas, centre = np.array(given), 0.5 * (min(given) + max(given))
+    series = tables.series(np.pi * (kappas - centre) / spacing, spacing * tables.half_diagonal(shape), error)
+    return 0.5 * centre / spacing, series, 0.5 * max(given) / spacing
 
 
 def _stepped(kappas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
