@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from effects_frames import checked, frame, network, received
 from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
 from lowalt.effects.receiver import (
     _oscillator,
     phase_noise,
 )
+from lowalt.effects.receiver._oscillator_loops import weighed_lines
 
 FLAT = ((1.0, -90.0),)
 STEEP = ((10.0, -30.0), (1e3, -80.0), (1e5, -100.0), (1e6, -125.0), (1e7, -130.0))
@@ -191,3 +193,25 @@ def test_odd_looks_have_the_right_variance(look):
 def test_impossible_spectra_are_refused(given, radar, message):
     with pytest.raises(InputError, match=message):
         phase_noise.check({**phase_noise.DEFAULTS, **given}, checked(radar))
+
+
+@pytest.mark.parametrize("symbols, subcarriers", [(12, 64), (5, 7)])
+@pytest.mark.parametrize("delay_s", [None, 2e-6])
+def test_both_parts_come_of_one_stream_one_after_the_other(symbols, subcarriers, delay_s):
+    look = (symbols, subcarriers, 0.0025, 1 / (subcarriers * 120e3))
+    rng = stream(3, "phase")
+    slow = _oscillator.slow_phase(STEEP, look, delay_s, rng)
+    lags = _oscillator.covariance(STEEP, look, delay_s)
+    root = np.linalg.cholesky(lags[abs(np.subtract.outer(np.arange(subcarriers), np.arange(subcarriers)))])
+    expected = slow + rng.standard_normal((symbols, subcarriers)) @ root.T
+    got = _oscillator.phase(STEEP, look, delay_s, stream(3, "phase"))
+    np.testing.assert_allclose(got, expected, atol=1e-9 * abs(expected).max())
+
+
+def test_lines_are_weighed_by_the_delay_and_others_are_zero():
+    drawn, amplitude = np.random.default_rng(1).standard_normal((30, 2)), np.linspace(1.0, 2.0, 30)
+    got = np.full(40, np.nan, np.complex128)
+    weighed_lines(drawn, amplitude, *_oscillator._even_turns(0.3, 30), got)
+    expected = (drawn[:, 0] + 1j * drawn[:, 1]) * amplitude * 2 * abs(np.sin(0.3 * np.arange(1, 31)))
+    np.testing.assert_allclose(got[1:31], expected, rtol=1e-12)
+    assert (got[[0, *range(31, 40)]] == 0).all()

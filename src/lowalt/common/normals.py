@@ -101,6 +101,27 @@ def _fill_pairs(words, work, out):
             some[i, 0], some[i, 1] = real[i], imaginary[i]
 
 
+@LEAN
+def _fill_beside(words, first, work, out):
+    """Fill out (N, first + 2 K) as `beside` does; work: (4, BLOCK)."""
+    pairs = (out.shape[1] - first) // 2
+    for n in range(len(out)):
+        for start in range(0, pairs, BLOCK):
+            size = min(BLOCK, pairs - start)
+            real, imaginary, some = work[0, :size], work[1, :size], out[n, first + 2 * start :]
+            _block(words[2 * (n * pairs + start) :], 1.0, real, imaginary, work[2, :size], work[3, :size])
+            for i in range(np.uint64(size)):
+                some[_TWO * i], some[_TWO * i + _NEXT] = real[i], imaginary[i]
+
+
+def beside(words: np.ndarray, first: int, out: np.ndarray) -> None:
+    """Fill the columns of out (N, first + 2 K) float64 from `first` on, row by row, with 2 N K normals.
+
+    They are those of `interleaved`; words: (2 N K,) uint64.
+    """
+    _fill_beside(words, first, aligned(4, BLOCK), out)
+
+
 def interleaved(words: np.ndarray) -> np.ndarray:
     """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
     out = np.empty((len(words) // 2, 2))

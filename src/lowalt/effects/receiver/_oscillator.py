@@ -13,7 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from lowalt.common import normals
+from lowalt.common.draws import Draws
 from lowalt.effects.receiver import _toeplitz
+from lowalt.effects.receiver._oscillator_loops import weighed_lines
 from lowalt.effects.waveform import turned
 
 SPACING = 90
@@ -144,38 +147,47 @@ def _twists(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=4)
-def _root(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray | None:
-    """Lower Cholesky root (M, M) of the fast part's covariance, None where there is no fast part."""
-    lags = covariance(points, at_key, delay_s)
+def _weights(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
+    """Rows of samples (M,) that drawn numbers weigh: the Q of `Grid.blend`, and M for a symbol's fast part.
+
+    The latter are columns of the lower Cholesky root of the fast part's covariance; where it is zero, there are none.
+    """
+    blend, lags = grid(*at_key).blend, covariance(points, at_key, delay_s)
     if lags[0] <= 0:
-        return None
+        return blend
     # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
     lags[0] *= 1 + 4 * np.finfo(float).eps * len(lags) ** 2
-    return _toeplitz.root(lags)
+    weights = np.empty((len(blend) + len(lags), len(lags)))
+    weights[: len(blend)] = blend
+    _toeplitz.upper(lags, weights[len(blend) :])
+    return weights
 
 
-def _even_sines(step: float, count: int) -> np.ndarray:
-    """Return sin(k step), k = 1 .. count, from the sines and cosines of multiples that add up to k."""
+def _even_turns(step: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return sine and cosine (2, S) of every S-th multiple of step, and (2, S) of the first S, S^2 more than `count`.
+
+    Multiples of both kinds add up to each of step, ..., count step.
+    """
     side = math.isqrt(count) + 1
     few, many = step * np.arange(side), step * side * np.arange(side)
-    sines = np.outer(np.sin(many), np.cos(few))
-    sines += np.outer(np.cos(many), np.sin(few))
-    return sines.reshape(-1)[1 : count + 1]
+    return np.stack([np.sin(many), np.cos(many)]), np.stack([np.sin(few), np.cos(few)])
 
 
 def _slow_at_nodes(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
     """Return the slow part (N, Q) in rad of a drawn phase, at the nodes of each symbol."""
     at, symbols = grid(*at_key), at_key[0]
     amplitude = _lines(points, at_key)
-    if delay_s is not None:
-        amplitude = amplitude * 2 * np.abs(_even_sines(np.pi * at.slow_hz[0] * delay_s, len(at.slow_hz)))
-    drawn = rng.standard_normal((len(amplitude), 2)).view(np.complex128)[:, 0] * amplitude
+    drawn = rng.standard_normal((len(amplitude), 2))
     # Lines 2 N apart have equal phases at the symbols' starts: add them, then do one short transform a node.
     every, between = _twists(at_key)
     turns = 2 * symbols
-    padded = np.zeros(every.shape[1] * turns, np.complex128)
-    padded[1 : len(drawn) + 1] = drawn
-    folded = every @ padded.reshape(-1, turns) * between
+    lines = np.empty(every.shape[1] * turns, np.complex128)
+    if delay_s is None:
+        lines[0], lines[len(drawn) + 1 :] = 0.0, 0.0
+        lines[1 : len(drawn) + 1] = drawn.view(np.complex128)[:, 0] * amplitude
+    else:
+        weighed_lines(drawn, amplitude, *_even_turns(np.pi * at.slow_hz[0] * delay_s, len(amplitude)), lines)
+    folded = every @ lines.reshape(-1, turns) * between
     return turns * np.fft.ifft(folded, axis=1)[:, :symbols].real.T
 
 
@@ -190,16 +202,19 @@ def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Ge
     delay_s: return phi(t) - phi(t - delay) instead, None for phi itself.
     """
     slow = _slow_at_nodes(points, at_key, delay_s, rng)
-    (symbols, nodes), blend = slow.shape, grid(*at_key).blend
-    fast = rng.standard_normal((symbols, at_key[1]))
-    root = _root(points, at_key, delay_s)
-    if root is None:
-        return slow @ blend
-    # Both parts are products of drawn numbers and a matrix, so one product adds them.
-    drawn, weights = np.concatenate([slow, fast], axis=1), np.concatenate([blend, root.T])
-    result = np.empty(fast.shape)
-    # The root is a lower triangle: a block of samples asks only for the draws up to its end.
-    for first in range(0, len(root), BLOCK):
-        rows = slice(first, min(first + BLOCK, len(root)))
-        np.matmul(drawn[:, : nodes + rows.stop], weights[: nodes + rows.stop, rows], out=result[:, rows])
+    (symbols, nodes), samples = slow.shape, at_key[1]
+    drawn, weights = np.empty((symbols, nodes + samples)), _weights(points, at_key, delay_s)
+    drawn[:, :nodes] = slow
+    if isinstance(rng, Draws) and samples % 2 == 0:
+        normals.beside(rng.words(symbols * samples), nodes, drawn)
+    else:
+        drawn[:, nodes:] = rng.standard_normal((symbols, samples))
+    if len(weights) == nodes:
+        return slow @ weights
+    # Both parts are products of drawn numbers and rows of samples, so one product adds them.
+    result = np.empty((symbols, samples))
+    # The fast part's rows are a triangle: a block of samples asks only for the draws up to its end.
+    for first in range(0, samples, BLOCK):
+        last = min(first + BLOCK, samples)
+        np.matmul(drawn[:, : nodes + last], weights[: nodes + last, first:last], out=result[:, first:last])
     return result

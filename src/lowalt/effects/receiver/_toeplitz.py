@@ -33,12 +33,17 @@ def _factored(one, other, upper):
             one[i] = turned
 
 
+def upper(lags: np.ndarray, out: np.ndarray) -> None:
+    """Fill out (M, M) with the transpose of `root`."""
+    _factored(np.array(lags, np.float64), np.empty(len(lags)), out)
+
+
 def root(lags: np.ndarray) -> np.ndarray:
     """Return the lower Cholesky root (M, M) of the positive definite matrix whose entry i, j is lags[|i - j|], (M,).
 
     Source: A. W. Bojanczyk, R. P. Brent, F. R. de Hoog, D. R. Sweet, On the stability of the Bareiss and related
     Toeplitz factorization algorithms, SIAM J. Matrix Anal. Appl. 16(1), 1995.
     """
-    upper = np.empty((len(lags), len(lags)))
-    _factored(np.array(lags, np.float64), np.empty(len(lags)), upper)
-    return upper.T
+    transposed = np.empty((len(lags), len(lags)))
+    upper(lags, transposed)
+    return transposed.T
