@@ -14,7 +14,7 @@ from lowalt.effects.interface import AddsNoise, ChangesResponse, Quantises
 from lowalt.effects.range_noise import RangeNoise
 from lowalt.effects.sending import Sending
 from lowalt.effects.view import View
-from lowalt.effects.waveform import Frame
+from lowalt.effects.waveform import Carried, Frame
 
 
 @runtime_checkable
@@ -31,6 +31,16 @@ class TakesTones(Protocol):
 
     def retimed(self, settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
         """Return the samples (N, M) of `receive`, given np.fft.fft of its samples; tones may be overwritten."""
+
+
+@runtime_checkable
+class TakesResponses(Protocol):
+    """Optional, receiver: an effect that changes tones and can also begin with responses and the data they carry."""
+
+    def retoned_responses(
+        self, settings: dict, carried: Carried, frame: Frame, rng: np.random.Generator
+    ) -> np.ndarray:  # fmt: skip
+        """Return what `retoned` returns of their tones (N, M); they are not changed."""
 
 
 class Heard:
@@ -101,7 +111,7 @@ class Receiving:
 
     def aired(self, spectrum: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> Heard:
         """Return what is heard behind the effects `left` of responses (N, M) of the symbols `rows`, as sent."""
-        return self._behind(left, rows, tones=waveform.tones_of(spectrum, self.sending.aired[rows]))
+        return self._behind(left, rows, tones=waveform.carrying(spectrum, self.sending.aired[rows]))
 
     def sampled(self, samples: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> Heard:
         """Return what is heard of time samples (N, M) of the symbols `rows`, behind the effects `left`."""
@@ -109,7 +119,7 @@ class Receiving:
 
     def _behind(
         self, left: list[NamedEffect], rows: slice | np.ndarray, samples: np.ndarray | None = None,
-        tones: np.ndarray | None = None,
+        tones: np.ndarray | Carried | None = None,
     ) -> Heard:  # fmt: skip
         """What is heard behind the effects `left` of samples, or of tones, which are overwritten.
 
@@ -123,15 +133,15 @@ class Receiving:
             stays = len(providing(left[place:], ChangesTones)) == len(left) - place
             next_takes = len(providing(left[place : place + 2], TakesTones)) == 2
             if tones is not None and (stays or next_takes) and providing([effect], ChangesTones):
-                tones = effect.module.retoned(effect.settings, tones, *given)
+                tones = _retoned(effect, tones, *given)
             elif takes:
-                samples, tones = effect.module.retimed(effect.settings, tones, *given), None
+                samples, tones = effect.module.retimed(effect.settings, _tones(tones), *given), None
             else:
-                samples, tones = samples if tones is None else transforms.inverse(tones, out=tones), None
+                samples, tones = samples if tones is None else _samples(tones), None
                 if providing([effect], Quantises):
                     self._converted = effect, samples
                 samples = effect.module.receive(effect.settings, samples, *given)
-        return Heard(*self.sending.carrying(transforms.forward(samples) if tones is None else tones, rows))
+        return Heard(*self.sending.carrying(transforms.forward(samples) if tones is None else _tones(tones), rows))
 
     @property
     def step(self) -> float:
@@ -157,3 +167,22 @@ class Receiving:
         delay_s = 2.0 * range_m / SPEED_OF_LIGHT
         drawn: dict | None = {} if self.again else None
         return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts, drawn=drawn)
+
+
+def _retoned(
+    effect: NamedEffect, tones: np.ndarray | Carried, frame: Frame, rng: np.random.Generator
+) -> np.ndarray:  # fmt: skip
+    """The tones (N, M) of symbols behind an effect that changes tones."""
+    if isinstance(tones, Carried) and providing([effect], TakesResponses):
+        return effect.module.retoned_responses(effect.settings, tones, frame, rng)
+    return effect.module.retoned(effect.settings, _tones(tones), frame, rng)
+
+
+def _tones(tones: np.ndarray | Carried) -> np.ndarray:
+    """The tones (N, M), worked out where they are not."""
+    return waveform.tones_of(*tones) if isinstance(tones, Carried) else tones
+
+
+def _samples(tones: np.ndarray | Carried) -> np.ndarray:
+    """The samples (N, M) of tones, which may be overwritten."""
+    return waveform.transmit(*tones) if isinstance(tones, Carried) else transforms.inverse(tones, out=tones)

@@ -29,6 +29,27 @@ def carried(response, data, tones):
             last[m] = below[m] * low[m]
 
 
+@INNER
+def apart(given, data, n, re, im):
+    """Fill re and im (256,) with the parts of symbol n's tones, in the transform's order.
+
+    given: the tones (N, 256), or where data has rows, the responses that carry data (N, 256).
+    """
+    own = given[n]
+    if len(data) == 0:
+        for m in range(np.uint64(256)):
+            re[m], im[m] = own[m].real, own[m].imag
+        return
+    sent, half = data[n], np.uint64(128)
+    above, high, last_re, last_im = own[half:], sent[half:], re[half:], im[half:]
+    for m in range(half):
+        a, b, c, d = above[m].real, above[m].imag, high[m].real, high[m].imag
+        re[m], im[m] = a * c - b * d, a * d + b * c
+    for m in range(half):
+        a, b, c, d = own[m].real, own[m].imag, sent[m].real, sent[m].imag
+        last_re[m], last_im[m] = a * c - b * d, a * d + b * c
+
+
 @LEAN
 def divided(tones, data, fresh, response):
     """Add tones (N, M) in the transform's order, times the conjugate of data (N, M), to response (N, M).

@@ -10,6 +10,7 @@ Source: Bailey, FFTs in external or hierarchical memory, J. Supercomputing 4, 19
 import numpy as np
 
 from lowalt.common.jit import INLINED, INNER, LEAN
+from lowalt.effects.tone_loops import apart
 
 LENGTH = 256
 QUARTER, HALF, REST = np.uint64(64), np.uint64(128), np.uint64(192)
@@ -113,3 +114,19 @@ def rows(given, inverse, scale, table, work, result):
         re, im = work[2 + one], work[2 + other]
         for m in range(np.uint64(LENGTH)):
             out[m] = complex(scale * re[m], scale * im[m])
+
+
+@LEAN
+def sampled(response, data, table, work, out):
+    """Fill out (N, 256) with the samples of responses (N, 256) that carry data (N, 256); work: (4, 256).
+
+    Tones are never held together. table: `turns`.
+    """
+    scale = 1.0 / LENGTH
+    re, im, new_re, new_im = work[0], work[1], work[2], work[3]
+    for n in range(len(response)):
+        row = out[n]
+        apart(response, data, n, re, im)
+        transformed(im, re, new_im, new_re, table)
+        for m in range(np.uint64(LENGTH)):
+            row[m] = complex(scale * new_re[m], scale * new_im[m])

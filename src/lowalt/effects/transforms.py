@@ -32,6 +32,13 @@ def inverse(given: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
     return _rows(given, True, 1.0 / given.shape[-1], out)
 
 
+def samples(response: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return np.fft.ifft of each row of tones, in the transform's order, of responses times data, both (N, LENGTH)."""
+    result = np.empty(response.shape, np.complex128)
+    transform_loops.sampled(response, data, table(), work(), result)
+    return result
+
+
 def _rows(given: np.ndarray, back: bool, scale: float, out: np.ndarray | None) -> np.ndarray:
     """The transforms of `forward`, or with `back` those of `inverse`; scale: of the latter's sums."""
     if given.ndim != 2 or given.shape[1] != LENGTH:

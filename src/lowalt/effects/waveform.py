@@ -9,7 +9,7 @@ Impairments are in `effects.receiver`.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -41,18 +41,39 @@ def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
     response's. Source: 3GPP TS 38.211, 5.3.1.
     """
+    response, data = _whole(response, data)
+    if response.ndim == 2 and response.shape[1] == transforms.LENGTH:
+        return transforms.samples(response, data)
     tones = tones_of(response, data)
     return transforms.inverse(tones, out=tones)
 
 
 def tones_of(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     """Return the transform (N, M) of the samples of `transmit`."""
-    shape = np.broadcast_shapes(response.shape, data.shape)
-    # Compiled loops take whole arrays: a view that repeats its rows would ask for machine code of its own.
-    response, data = (one if one.shape == shape else np.broadcast_to(one, shape).copy() for one in (response, data))
-    tones = np.empty(shape, np.complex128)
+    response, data = _whole(response, data)
+    tones = np.empty(response.shape, np.complex128)
     carried(response, data, tones)
     return tones
+
+
+def _whole(response: np.ndarray, data: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both as whole arrays (N, M): a view that repeats its rows would ask for machine code of its own."""
+    shape = np.broadcast_shapes(response.shape, data.shape)
+    given = (one if one.shape == shape else np.broadcast_to(one, shape) for one in (response, data))
+    first, second = (np.ascontiguousarray(one, np.complex128) for one in given)
+    return first, second
+
+
+class Carried(NamedTuple):
+    """Symbols on the air whose tones are not worked out yet: responses (N, M) and the data (N, M) that they carry."""
+
+    response: np.ndarray
+    data: np.ndarray
+
+
+def carrying(response: np.ndarray, data: np.ndarray) -> Carried:
+    """Return responses and data, each of which broadcasts to (N, M), as `Carried`."""
+    return Carried(*_whole(response, data))
 
 
 def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:

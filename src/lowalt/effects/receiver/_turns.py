@@ -1,11 +1,20 @@
-"""Time samples turned by phases that change from sample to sample, also from their tones to their tones."""
+"""Time samples turned by phases that change from sample to sample, also from their tones to their tones.
+
+Functions that return tones take tones (N, M), which are overwritten, or with `data` (N, M) the responses (N, M) that
+carry them, which are not.
+"""
 
 import numpy as np
 
 from lowalt.common.jit import LEAN
 from lowalt.common.memory import aligned
-from lowalt.effects import transforms
+from lowalt.effects import transforms, waveform
+from lowalt.effects.phasors import phasor
+from lowalt.effects.tone_loops import apart
 from lowalt.effects.transform_loops import transformed
+
+NONE = np.empty((0, transforms.LENGTH))
+"""No angles."""
 
 
 def samples(given: np.ndarray, between: np.ndarray, within: np.ndarray) -> np.ndarray:
@@ -15,12 +24,31 @@ def samples(given: np.ndarray, between: np.ndarray, within: np.ndarray) -> np.nd
     return result
 
 
-def tones(given: np.ndarray, between: np.ndarray, within: np.ndarray) -> np.ndarray:
-    """Return the transform of `samples` from that of its samples, (N, M), which is overwritten."""
+def tones(
+    given: np.ndarray, between: np.ndarray, within: np.ndarray, data: np.ndarray | None = None
+) -> np.ndarray:  # fmt: skip
+    """Return the transform of `samples` from that of its samples, or from the responses that carried data."""
     if given.shape[1] != transforms.LENGTH:
-        return transforms.forward(samples(transforms.inverse(given), between, within))
-    _turned_tones(given, between, within, transforms.table(), aligned(6, transforms.LENGTH))
-    return given
+        before = transforms.inverse(given) if data is None else waveform.transmit(given, data)
+        return transforms.forward(samples(before, between, within))
+    return _retoned(given, data, between, within, NONE)
+
+
+def phased_tones(given: np.ndarray, angle_rad: np.ndarray, data: np.ndarray | None = None) -> np.ndarray:
+    """Return `tones` of the turns exp(j angle), angle (N, M), which are never held together."""
+    if given.shape[1] != transforms.LENGTH:
+        return tones(given, np.ones(len(given), np.complex128), waveform.turned(angle_rad), data)
+    return _retoned(given, data, NONE[:, 0].astype(np.complex128), NONE.astype(np.complex128), angle_rad)
+
+
+def _retoned(
+    given: np.ndarray, data: np.ndarray | None, between: np.ndarray, within: np.ndarray, angle: np.ndarray
+) -> np.ndarray:  # fmt: skip
+    """The result of `_turned_tones`, in `given` where there are no data."""
+    out = given if data is None else np.empty(given.shape, np.complex128)
+    carried = NONE.astype(np.complex128) if data is None else data
+    _turned_tones(given, carried, between, within, angle, transforms.table(), aligned(6, transforms.LENGTH), out)
+    return out
 
 
 @LEAN
@@ -35,19 +63,27 @@ def _turned(given, between, within, out):
 
 
 @LEAN
-def _turned_tones(given, between, within, table, work):
-    """Turn the samples of given (N, 256) as `_turned` does; table: `transform_loops.turns`; work: (6, 256).
+def _turned_tones(given, data, between, within, angle, table, work, out):
+    """Turn the samples of given (N, 256) as `_turned` does, or by angle (N, 256) rad where it has rows.
 
-    A symbol stays in the nearest cache with both transforms.
+    given, data: as in `tone_loops.apart`; table: `transform_loops.turns`; work: (6, 256); out (N, 256), the tones, may
+    be given itself. A symbol stays in the nearest cache with both transforms.
     """
     re, im, new_re, new_im, c, s = work[0], work[1], work[2], work[3], work[4], work[5]
     count, scale = np.uint64(256), 1.0 / 256
     for n in range(len(given)):
-        turn, factor, row = between[n] * scale, within[n % len(within)], given[n]
-        for i in range(count):
-            re[i], im[i] = row[i].real, row[i].imag
-            c[i] = turn.real * factor[i].real - turn.imag * factor[i].imag
-            s[i] = turn.real * factor[i].imag + turn.imag * factor[i].real
+        row = out[n]
+        apart(given, data, n, re, im)
+        if len(angle) > 0:
+            phase = angle[n]
+            for i in range(count):
+                x, y = phasor(phase[i])
+                c[i], s[i] = x * scale, y * scale
+        else:
+            turn, factor = between[n] * scale, within[n % len(within)]
+            for i in range(count):
+                c[i] = turn.real * factor[i].real - turn.imag * factor[i].imag
+                s[i] = turn.real * factor[i].imag + turn.imag * factor[i].real
         # Real and imaginary parts change places: the inverse transform.
         transformed(im, re, new_im, new_re, table)
         for i in range(count):

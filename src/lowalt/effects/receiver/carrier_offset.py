@@ -4,7 +4,7 @@ import numpy as np
 
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets, _turns
-from lowalt.effects.waveform import Frame, turned
+from lowalt.effects.waveform import Carried, Frame, turned
 
 SOURCE = (
     "P. H. Moose, A technique for orthogonal frequency division multiplexing frequency offset correction, "
@@ -46,6 +46,11 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
     return _turns.tones(tones, *_phasors(settings, frame, rng))
+
+
+def retoned_responses(settings: dict, carried: Carried, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return what `retoned` returns of the tones (N, M) of responses and data."""
+    return _turns.tones(carried.response, *_phasors(settings, frame, rng), carried.data)
 
 
 def _phasors(settings: dict, frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

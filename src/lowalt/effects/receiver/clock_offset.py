@@ -13,8 +13,9 @@ from lowalt.common.memory import aligned
 from lowalt.effects import transforms
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _offsets
+from lowalt.effects.tone_loops import apart
 from lowalt.effects.transform_loops import transformed
-from lowalt.effects.waveform import Frame, turned
+from lowalt.effects.waveform import Carried, Frame, tones_of, turned
 
 SOURCE = (
     "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using non-synchronized sampling, "
@@ -27,6 +28,10 @@ MOST_SUBCARRIERS = 100_000
 
 ROUNDING = 1e-14
 """Largest share of a sample that the series of the stretch leaves out."""
+
+
+NONE = np.empty((0, transforms.LENGTH), np.complex128)
+"""No data."""
 
 
 def idle(settings: dict) -> bool:
@@ -81,30 +86,40 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
 
 def retimed(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the samples of `receive` from the tones (N, M) of its samples, in the transform's order, as work space."""
-    return _resampled(settings, tones, frame, rng, False)
+    return _resampled(settings, tones, None, frame, rng, False)
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    return _resampled(settings, tones, frame, rng, True)
+    return _resampled(settings, tones, None, frame, rng, True)
 
 
-def _resampled(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator, back: bool) -> np.ndarray:
-    """The samples of `retimed`, or with `back` the tones of `retoned`; tones are work space.
+def retoned_responses(settings: dict, carried: Carried, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return what `retoned` returns of the tones (N, M) of responses and data."""
+    return _resampled(settings, *carried, frame, rng, True)
+
+
+def _resampled(
+    settings: dict, given: np.ndarray, data: np.ndarray | None, frame: Frame, rng: np.random.Generator, back: bool
+) -> np.ndarray:  # fmt: skip
+    """The samples of `retimed`, or with `back` the tones of `retoned`; tones `given` without data are work space.
 
     Tones are turned as far as each symbol's middle sample is early, and a series over the other samples adds the rest.
     """
     rate = fast(settings, frame, rng)
     early = -rate / (1 + rate)
-    count, baseband = tones.shape[1], np.fft.ifftshift(frame.baseband_hz)
+    count, baseband = given.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
     at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
-    turns = _turns(len(tones), early * frame.network.symbol_interval_s * baseband, at_middle)
+    turns = _turns(len(given), early * frame.network.symbol_interval_s * baseband, at_middle)
     weights, columns = _series(2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle)
     if count == transforms.LENGTH:
         columns /= count
-        _stretched(tones, *turns, weights, columns, back, transforms.table(), aligned(8, count))
-        return tones
+        out = given if data is None else np.empty(given.shape, np.complex128)
+        held = NONE if data is None else data
+        _stretched(given, held, turns, (weights, columns), back, transforms.table(), aligned(8, count), out)
+        return out
+    tones = given if data is None else tones_of(given, data)
     _stepped(tones, *turns)
     samples = np.zeros_like(tones) if back else transforms.inverse(tones)
     for weight, column in zip(weights[1:], columns[1:], strict=True):
@@ -139,24 +154,25 @@ def _turns(symbols: int, turns: np.ndarray, first: np.ndarray) -> tuple[np.ndarr
 
 
 @LEAN
-def _stretched(tones, coarse, fine, weights, columns, back, table, work):
-    """Replace tones (N, 256) by their samples, or with `back` by the tones of those, as `_resampled` does.
+def _stretched(given, data, turns, series, back, table, work, out):
+    """Fill out (N, 256) with samples of tones, or with `back` with the tones of those, as `_resampled` does.
 
-    coarse, fine: as in `_stepped`; weights, columns: as in `_series`, the latter divided by 256; table:
-    `transform_loops.turns`; work: (8, 256).
+    given, data: as in `tone_loops.apart`; turns: coarse and fine as in `_stepped`; series: weights and columns as in
+    `_series`, the latter divided by 256; table: `transform_loops.turns`; work: (8, 256). out may be given itself.
     """
-    count = np.uint64(256)
+    count, (coarse, fine), (weights, all_columns) = np.uint64(256), turns, series
     re, im, new_re, new_im, own_re, own_im = work[0], work[1], work[2], work[3], work[4], work[5]
     sum_re, sum_im = work[6], work[7]
-    for n in range(len(tones)):
-        row, one, other = tones[n], coarse[n // len(fine)], fine[n % len(fine)]
+    for n in range(len(given)):
+        row, one, other = out[n], coarse[n // len(fine)], fine[n % len(fine)]
+        apart(given, data, n, re, im)
         for m in range(count):
             a, b, x, y = one[m].real, one[m].imag, other[m].real, other[m].imag
-            c, s, x, y = a * x - b * y, a * y + b * x, row[m].real, row[m].imag
+            c, s, x, y = a * x - b * y, a * y + b * x, re[m], im[m]
             own_re[m], own_im[m] = x * c - y * s, x * s + y * c
             sum_re[m], sum_im[m] = 0.0, 0.0
         for k in range(1 if back else 0, len(weights)):
-            weight, column = weights[k], columns[k]
+            weight, column = weights[k], all_columns[k]
             for m in range(count):
                 re[m], im[m] = own_re[m] * weight[m], own_im[m] * weight[m]
             # Real and imaginary parts change places: the inverse transform.

@@ -11,7 +11,7 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
 from lowalt.effects.receiver import _oscillator, _turns
-from lowalt.effects.waveform import Frame, turned
+from lowalt.effects.waveform import Carried, Frame, turned
 
 SOURCE = (
     "IEEE Std 1139-2008 (L(f)); D. Petrovic, W. Rave, G. Fettweis, Effects of phase noise on OFDM systems with and "
@@ -93,12 +93,32 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     the target's reference point; all echoes are taken to have it. Noise beyond half the sample rate is filtered out.
     Source: Petrovic et al. 2007 (within a symbol); Budge and Burt 1993 (range correlation).
     """
-    return _turns.samples(samples, np.ones(len(samples), np.complex128), _phasors(settings, frame, rng))
+    return _turns.samples(samples, _ones(frame), _phasors(settings, frame, rng))
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the tones (N, M) of the samples of `receive` from those of its samples, which are overwritten."""
-    return _turns.tones(tones, np.ones(len(tones), np.complex128), _phasors(settings, frame, rng))
+    return _retoned(settings, tones, None, frame, rng)
+
+
+def retoned_responses(settings: dict, carried: Carried, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return what `retoned` returns of the tones (N, M) of responses and data."""
+    return _retoned(settings, *carried, frame, rng)
+
+
+def _retoned(
+    settings: dict, given: np.ndarray, data: np.ndarray | None, frame: Frame, rng: np.random.Generator
+) -> np.ndarray:  # fmt: skip
+    """The tones of `retoned`, or with `data` those of `retoned_responses`."""
+    if frame.drawn is None:
+        return _turns.phased_tones(given, phase(settings, frame, rng), data)
+    # Turns are kept for a look that is computed again.
+    return _turns.tones(given, _ones(frame), _phasors(settings, frame, rng), data)
+
+
+def _ones(frame: Frame) -> np.ndarray:
+    """Turns (N,) at the symbols' starts: none."""
+    return np.ones(len(frame.sent), np.complex128)
 
 
 def _phasors(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:

@@ -1,0 +1,55 @@
+"""Responses whose data are put on within the next compiled pass, without an array of tones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from effects_frames import frame
+from lowalt.common.streams import stream
+from lowalt.effects import waveform
+from lowalt.effects.catalogue import called
+from test_effects import network
+
+EFFECTS = {"clock_offset": {"fixed_ppm": 3.0}, "carrier_offset": {"fixed_ppm": 3.0}, "phase_noise": {"shared": False}}
+
+
+def carried(symbols, subcarriers):
+    """Responses and data (N, M)."""
+    rng = np.random.default_rng(5)
+    responses = rng.normal(size=(symbols, subcarriers)) + 1j * rng.normal(size=(symbols, subcarriers))
+    return responses, waveform.sent(stream(1, "waveform"), symbols, subcarriers)
+
+
+@pytest.mark.parametrize("subcarriers", [32, 9, 256])
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_begins_with_responses_and_their_data_as_with_their_tones(name, subcarriers):
+    look, effect = frame(network(subcarriers=subcarriers, symbols=9)), called({name: EFFECTS[name]})[0]
+    responses, data = carried(9, subcarriers)
+    kept = responses.copy()
+    truth = effect.module.retoned(effect.settings, waveform.tones_of(responses, data), look, stream(6, name))
+    both = waveform.carrying(responses, data)
+    found = effect.module.retoned_responses(effect.settings, both, look, stream(6, name))
+    np.testing.assert_array_equal(found, truth)
+    np.testing.assert_array_equal(responses, kept)
+    assert abs(found - waveform.tones_of(responses, data)).max() > 1e-6
+
+
+@pytest.mark.parametrize("subcarriers", [32, 256])
+def test_phase_noise_of_a_look_that_is_computed_again_is_that_of_the_first_time(subcarriers):
+    look, effect = frame(network(subcarriers=subcarriers, symbols=9)), called({"phase_noise": {"shared": False}})[0]
+    both = waveform.carrying(*carried(9, subcarriers))
+    once = effect.module.retoned_responses(effect.settings, both, look, stream(6, "phase"))
+    look = replace(look, drawn={})
+    for draws in (stream(6, "phase"), stream(7, "phase")):
+        found = effect.module.retoned_responses(effect.settings, both, look, draws)
+        np.testing.assert_array_equal(found, once)
+
+
+@pytest.mark.parametrize("subcarriers", [8, 9, 256])
+def test_samples_of_responses_are_those_of_their_tones(subcarriers):
+    responses, data = carried(4, subcarriers)
+    expected = np.fft.ifft(np.fft.ifftshift(responses * data, axes=1), axis=1)
+    np.testing.assert_allclose(waveform.transmit(responses, data), expected, rtol=0, atol=1e-15)
+    same = waveform.transmit(responses[:1], data), waveform.transmit(np.tile(responses[:1], (4, 1)), data)
+    np.testing.assert_array_equal(*same)
