@@ -53,3 +53,15 @@ def test_samples_of_responses_are_those_of_their_tones(subcarriers):
     np.testing.assert_allclose(waveform.transmit(responses, data), expected, rtol=0, atol=1e-15)
     same = waveform.transmit(responses[:1], data), waveform.transmit(np.tile(responses[:1], (4, 1)), data)
     np.testing.assert_array_equal(*same)
+
+
+@pytest.mark.parametrize("subcarriers", [32, 256])
+@pytest.mark.parametrize("settings", [{}, {"bits": 3}, {"bits": 3, "clip": False, "backoff_db": 0.0}])
+def test_a_converter_makes_the_tones_of_its_samples(settings, subcarriers):
+    look, effect = frame(network(subcarriers=subcarriers, symbols=9)), called({"adc": settings})[0]
+    samples = waveform.transmit(*carried(9, subcarriers))
+    truth = np.fft.fft(effect.module.receive(effect.settings, samples, look, stream(6, "adc")), axis=1)
+    found = effect.module.toned(effect.settings, samples, look, stream(6, "adc"))
+    np.testing.assert_allclose(found, truth, rtol=0, atol=1e-14 * subcarriers * abs(samples).max())
+    assert abs(found - np.fft.fft(samples, axis=1)).max() > 1e-5 * abs(truth).max()
+    assert not effect.module.toned(effect.settings, 0 * samples, look, stream(6, "adc")).any()

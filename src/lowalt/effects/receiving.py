@@ -43,6 +43,14 @@ class TakesResponses(Protocol):
         """Return what `retoned` returns of their tones (N, M); they are not changed."""
 
 
+@runtime_checkable
+class GivesTones(Protocol):
+    """Optional, receiver: an effect that can transform the samples that it makes at once."""
+
+    def toned(self, settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+        """Return np.fft.fft of the samples (N, M) of `receive`."""
+
+
 class Heard:
     """What a receiver has made of a look: responses (N, M), or their tones and the data (N, M) that they carried."""
 
@@ -140,7 +148,11 @@ class Receiving:
                 samples, tones = samples if tones is None else _samples(tones), None
                 if providing([effect], Quantises):
                     self._converted = effect, samples
-                samples = effect.module.receive(effect.settings, samples, *given)
+                next_takes = place + 1 == len(left) or bool(providing([left[place + 1]], TakesTones))
+                if next_takes and providing([effect], GivesTones):
+                    tones = effect.module.toned(effect.settings, samples, *given)
+                else:
+                    samples = effect.module.receive(effect.settings, samples, *given)
         return Heard(*self.sending.carrying(transforms.forward(samples) if tones is None else _tones(tones), rows))
 
     @property

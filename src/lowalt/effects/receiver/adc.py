@@ -4,7 +4,9 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INLINED, LEAN
+from lowalt.effects import transforms
+from lowalt.effects.transform_loops import transformed
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -32,9 +34,23 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = Tru
     """
     parts = np.ascontiguousarray(samples, np.complex128).view(np.float64).reshape(-1)
     out = np.empty_like(parts)
-    most = 2.0 ** (bits - 1) if clip else np.inf
+    most = _most(bits, clip)
     clipped = _steps(parts, full_scale * 2.0 ** (1 - bits), most, full_scale, out)
     return out.view(np.complex128).reshape(samples.shape), int(clipped)
+
+
+def _most(bits: int, clip: bool) -> float:
+    """The number of steps to each side of zero."""
+    return 2.0 ** (bits - 1) if clip else np.inf
+
+
+@INLINED
+def _middle(part, step, most):
+    """The middle of the step that a part falls into, `most` to each side."""
+    code = np.floor(part / step)
+    code = code if code > -most else -most
+    code = code if code < most - 1.0 else most - 1.0
+    return (code + 0.5) * step
 
 
 @LEAN
@@ -42,12 +58,29 @@ def _steps(parts, step, most, full_scale, out):
     """Fill out (K,) with the middles of the steps of parts (K,), `most` to each side; return how many are clipped."""
     clipped = 0
     for i in range(np.uint64(len(parts))):
-        code = np.floor(parts[i] / step)
-        code = code if code > -most else -most
-        code = code if code < most - 1.0 else most - 1.0
-        out[i] = (code + 0.5) * step
+        out[i] = _middle(parts[i], step, most)
         clipped += 1 if abs(parts[i]) > full_scale else 0
     return clipped
+
+
+@LEAN
+def _stepped_tones(samples, step, most, table, work, out):
+    """Fill out (N, 256) with the transform of the middles of the steps of samples (N, 256), as in `_steps`.
+
+    table: `transform_loops.turns`; work: (4, 256).
+    """
+    count, re, im, new_re, new_im = np.uint64(256), work[0], work[1], work[2], work[3]
+    for n in range(len(samples)):
+        given, row = samples[n], out[n]
+        for i in range(count):
+            re[i], im[i] = given[i].real, given[i].imag
+        for i in range(count):
+            re[i] = _middle(re[i], step, most)
+        for i in range(count):
+            im[i] = _middle(im[i], step, most)
+        transformed(re, im, new_re, new_im, table)
+        for m in range(count):
+            row[m] = complex(new_re[m], new_im[m])
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
@@ -68,3 +101,15 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     """
     scale = full_scale(samples, settings["backoff_db"])
     return quantise(samples, settings["bits"], scale, settings["clip"])[0] if scale > 0 else samples
+
+
+def toned(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of what `receive` returns, which are then not written as samples."""
+    scale = full_scale(samples, settings["backoff_db"])
+    if not scale > 0 or samples.shape[1] != transforms.LENGTH:
+        return transforms.forward(receive(settings, samples, frame, rng))
+    out, most = np.empty(samples.shape, np.complex128), _most(settings["bits"], settings["clip"])
+    height = scale * 2.0 ** (1 - settings["bits"])
+    given = np.ascontiguousarray(samples, np.complex128)
+    _stepped_tones(given, height, most, transforms.table(), transforms.work(), out)
+    return out
