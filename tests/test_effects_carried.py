@@ -7,8 +7,8 @@ import pytest
 
 from effects_frames import frame
 from lowalt.common.streams import stream
-from lowalt.effects import waveform
-from lowalt.effects.catalogue import called
+from lowalt.effects import receiving, waveform
+from lowalt.effects.catalogue import called, providing
 from test_effects import network
 
 EFFECTS = {"clock_offset": {"fixed_ppm": 3.0}, "carrier_offset": {"fixed_ppm": 3.0}, "phase_noise": {"shared": False}}
@@ -65,3 +65,15 @@ def test_a_converter_makes_the_tones_of_its_samples(settings, subcarriers):
     np.testing.assert_allclose(found, truth, rtol=0, atol=1e-14 * subcarriers * abs(samples).max())
     assert abs(found - np.fft.fft(samples, axis=1)).max() > 1e-5 * abs(truth).max()
     assert not effect.module.toned(effect.settings, 0 * samples, look, stream(6, "adc")).any()
+
+
+def test_effects_that_draw_nothing_leave_their_generator_as_it_is():
+    look, draws = frame(network(subcarriers=256, symbols=9)), receiving.UNUSED
+    before, samples = draws.bit_generator.state, waveform.transmit(*carried(9, 256))
+    effects = called({"adc": {}, "phase_noise": {}, "carrier_offset": {}})
+    found = providing(effects, receiving.DrawsNothing)
+    assert [one.name for one in found] == ["adc"]
+    for one in found:
+        one.module.receive(one.settings, samples, look, draws)
+        one.module.toned(one.settings, samples, look, draws)
+    assert draws.bit_generator.state == before

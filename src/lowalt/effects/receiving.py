@@ -51,6 +51,17 @@ class GivesTones(Protocol):
         """Return np.fft.fft of the samples (N, M) of `receive`."""
 
 
+@runtime_checkable
+class DrawsNothing(Protocol):
+    """Optional, receiver: an effect without random numbers. No stream is made for it; its generator is UNUSED."""
+
+    DRAWS_NOTHING: bool
+
+
+UNUSED = np.random.Generator(np.random.PCG64(0))
+"""The generator of effects that draw nothing."""
+
+
 class Heard:
     """What a receiver has made of a look: responses (N, M), or their tones and the data (N, M) that they carried."""
 
@@ -134,7 +145,8 @@ class Receiving:
         A transform takes longer than most effects, so tones are kept while no effect asks for samples.
         """
         for place, effect in enumerate(left):
-            given = self.frame, self.draws(stream_name(effect.name))
+            still = providing([effect], DrawsNothing)
+            given = self.frame, UNUSED if still else self.draws(stream_name(effect.name))
             takes = bool(providing([effect], TakesTones))
             if tones is None and takes:
                 tones = transforms.forward(samples)

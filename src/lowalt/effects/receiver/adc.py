@@ -14,6 +14,7 @@ SOURCE = (
     "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, overload)"
 )
 DEFAULTS = {"bits": 12, "backoff_db": 12.0, "clip": True}
+DRAWS_NOTHING = True
 
 
 def idle(settings: dict) -> bool:
