@@ -210,6 +210,10 @@ INNER = kernel(inner=True, **_LEAN)
 """As LEAN, for functions that only kernels call."""
 INLINED = kernel(inner=True, forceinline=True, **_LEAN)
 """As INNER, and copied into its callers, so that named tuples of arrays are not copied at each call."""
+WRITTEN = kernel(fastmath=False, **_LEAN)
+"""As LEAN, also where a kernel that may reorder sums is the first to call it: numba hands on options not given."""
+INNER_WRITTEN = kernel(inner=True, fastmath=False, **_LEAN)
+"""As WRITTEN, for functions that only kernels call."""
 _REORDERED = {"contract", "reassoc", "nsz"}
 VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""
