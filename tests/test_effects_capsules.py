@@ -51,3 +51,11 @@ def test_a_bone_along_the_ray_and_one_of_no_length_hide_a_node_and_what_was_hidd
     found[0] = [False, False, False, False, True]
     capsules(PLACE, nodes, np.array([[3, 4]]), np.array([0.15]), found)
     assert found.tolist() == [[True, True, False, False, True]]
+
+
+def test_a_capsule_hides_no_node_that_lies_in_it():
+    # Node 0 lies inside the capsule round the bone from 1 to 2, whose surface its ray crosses; node 3 behind it.
+    nodes = np.array([[[0.1, 0.0, 0.0], [0.3, 1.0, 0.0], [0.3, -1.0, 0.0], [-1.0, 0.0, 0.0]]])
+    found = np.zeros((1, 4), np.bool_)
+    capsules(PLACE, nodes, np.array([[1, 2]]), np.array([0.5]), found)
+    assert found.tolist() == [[False, False, False, True]]
