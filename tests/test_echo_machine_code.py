@@ -136,6 +136,41 @@ def test_products_of_complex_numbers_are_fused_in_no_kernel_that_is_done_as_writ
     assert ended.stdout == "True\n", ended.stderr
 
 
+CALLED = """
+import numpy as np
+from lowalt.common.jit import INNER, LEAN, PLAIN, VECTOR, _DigestCache
+
+_DigestCache.load_overload = lambda *_arguments: None
+
+
+def callee(a, b):
+    return a.real * b.real - a.imag * b.imag
+
+
+def calling(called):
+    def loop(a, b, out):
+        for k in range(len(out)):
+            out[k] = called(a[k], b[k])
+
+    return VECTOR(loop)
+
+
+rng = np.random.default_rng(1)
+a, b = rng.normal(size=(2, 300, 2)).view(complex)[..., 0]
+found = np.empty(300)
+for kind in (INNER, LEAN, PLAIN, VECTOR):
+    calling(kind(callee))(a, b, found)
+    print(kind is VECTOR, (found == a.real * b.real - a.imag * b.imag).all())
+"""
+
+
+def test_a_function_done_as_written_stays_so_for_a_first_caller_that_may_fuse(tmp_path):
+    # An option that a function does not give, numba takes from the function that calls it first.
+    (tmp_path / "called.py").write_text(CALLED)
+    ended = subprocess.run([sys.executable, "called.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert ended.stdout == "False True\n" * 3 + "True False\n", ended.stderr
+
+
 def test_the_key_of_kept_code_has_the_kernel_s_own_options():
     assert (
         len({digest(run.py_func, options) for options in (None, {"fastmath": {"contract"}}, {"fastmath": set()})}) == 3

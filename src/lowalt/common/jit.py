@@ -4,8 +4,9 @@ numba's own cache looks at the file of a function only. It does not look at the 
 files, so an edit there would leave old machine code in use. Here the key of every cache entry holds a digest of the
 kernel's bytecode and options, of all kernels and constants that it uses, of those that these use, and so on. Code that
 is not compiled has no part in it. Processes that need the same machine code at the same time take turns: one compiles,
-the others load what it kept. numba's own parts, such as the product of complex numbers, are compiled for each set of
-options by themselves: else the first kernel of a process would decide whether products are fused in all others.
+the others load what it kept. Whether products are fused and sums reordered is said for every kernel, and numba's own
+parts, such as the product of complex numbers, are compiled for each set of options by themselves: else the first
+kernel of a process to call a function would decide how that function rounds in all others.
 """
 
 import hashlib
@@ -181,19 +182,23 @@ class _Inner(CPUDispatcher):
         raise TypeError(f"{self.py_func.__qualname__} has no entry for Python, only kernels call it")
 
 
+_DEFAULTS: dict[str, Any] = {"fastmath": False, "error_model": "python", "_nrt": True}
+"""Options of every kernel: one that is not given, numba takes from the kernel that is the first to ask for this one."""
+
+
 def kernel(inner: bool = False, **options) -> Callable:
     """Return a decorator like `numba.njit(**options)` whose on-disk cache follows everything that is compiled.
 
     inner: only kernels call the function. Calling it from Python raises TypeError.
     """
     # Entries for Python and for C take a fifth of all compilation. No kernel is ever handed to C.
-    options |= {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
+    options = _DEFAULTS | options | {"no_cfunc_wrapper": True, "no_cpython_wrapper": inner}
 
     def wrap(function: Callable) -> Callable:
         """Compile a function and give it a cache of this module."""
         compiled = njit(**options)(function)
         compiled._cache = _DigestCache(function)
-        compiled._cache.counted, compiled._cache.options = options.get("_nrt", True), options
+        compiled._cache.counted, compiled._cache.options = options["_nrt"], options
         if inner:
             compiled.__class__, compiled._cache.inner = _Inner, True
         return compiled
@@ -210,10 +215,6 @@ INNER = kernel(inner=True, **_LEAN)
 """As LEAN, for functions that only kernels call."""
 INLINED = kernel(inner=True, forceinline=True, **_LEAN)
 """As INNER, and copied into its callers, so that named tuples of arrays are not copied at each call."""
-WRITTEN = kernel(fastmath=False, **_LEAN)
-"""As LEAN, also where a kernel that may reorder sums is the first to call it: numba hands on options not given."""
-INNER_WRITTEN = kernel(inner=True, fastmath=False, **_LEAN)
-"""As WRITTEN, for functions that only kernels call."""
 _REORDERED = {"contract", "reassoc", "nsz"}
 VECTOR = kernel(fastmath=_REORDERED, **_LEAN)
 """As LEAN, and the compiler may reorder sums and fuse products, so that loops become vector instructions."""

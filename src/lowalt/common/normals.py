@@ -6,7 +6,7 @@ divisor can be zero, and without a check for it these loops become vector instru
 
 import numpy as np
 
-from lowalt.common.jit import INNER_WRITTEN, WRITTEN
+from lowalt.common.jit import INNER, LEAN
 from lowalt.common.memory import aligned
 from lowalt.common.portable import COSINE, LN2, LOGARITHM, SINE
 
@@ -28,7 +28,7 @@ BLOCK = 256
 """Complex numbers made together; all their steps stay in the nearest cache."""
 
 
-@INNER_WRITTEN
+@INNER
 def _block(words, scale, real, imaginary, twos, lower):
     """Fill real and imaginary (K,) as `fill` does; twos, lower: (K,) work space."""
     count = np.uint64(len(real))
@@ -78,7 +78,7 @@ def _block(words, scale, real, imaginary, twos, lower):
         imaginary[i] = scale * (radius * (-y if below else y))
 
 
-@WRITTEN
+@LEAN
 def fill(words, scale, work, out):
     """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64.
 
@@ -90,7 +90,7 @@ def fill(words, scale, work, out):
         _block(words[2 * first :], scale, out[0, first:last], out[1, first:last], more, lower)
 
 
-@WRITTEN
+@LEAN
 def _fill_pairs(words, work, out):
     """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,); work: (4, BLOCK)."""
     for first in range(0, len(out), BLOCK):
@@ -101,7 +101,7 @@ def _fill_pairs(words, work, out):
             some[i, 0], some[i, 1] = real[i], imaginary[i]
 
 
-@WRITTEN
+@LEAN
 def _fill_beside(words, first, work, out):
     """Fill out (N, first + 2 K) as `beside` does; work: (4, BLOCK)."""
     pairs = (out.shape[1] - first) // 2
