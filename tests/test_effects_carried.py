@@ -65,15 +65,34 @@ def test_a_converter_makes_the_tones_of_its_samples(settings, subcarriers):
     np.testing.assert_allclose(found, truth, rtol=0, atol=1e-14 * subcarriers * abs(samples).max())
     assert abs(found - np.fft.fft(samples, axis=1)).max() > 1e-5 * abs(truth).max()
     assert not effect.module.toned(effect.settings, 0 * samples, look, stream(6, "adc")).any()
+    tones = np.fft.fft(samples, axis=1)
+    found = effect.module.retoned(effect.settings, tones.copy(), look, stream(6, "adc"))
+    np.testing.assert_allclose(found, truth, rtol=0, atol=1e-14 * subcarriers * abs(samples).max())
+    assert not effect.module.retoned(effect.settings, 0 * tones, look, stream(6, "adc")).any()
+
+
+NO_DATA = "phase_noise", "clock_offset", "carrier_offset", "timing_offset", "iq_imbalance", "adc"
+
+
+@pytest.mark.parametrize("name", NO_DATA)
+def test_effects_that_need_no_data_do_the_same_whatever_the_frame_s_data(name):
+    given = {"shared": False} if name == "phase_noise" else {}
+    effect, samples = called({name: given})[0], waveform.transmit(*carried(9, 256))
+    assert providing([effect], receiving.NeedsNoData)
+    look = frame(network(subcarriers=256, symbols=9))
+    bare = replace(look, sent=np.broadcast_to(np.ones((), np.complex128), look.sent.shape))
+    found = [effect.module.receive(effect.settings, samples.copy(), one, stream(6, name)) for one in (look, bare)]
+    np.testing.assert_array_equal(*found)
+    assert abs(found[0] - samples).max() > 1e-9 * abs(samples).max()
 
 
 def test_effects_that_draw_nothing_leave_their_generator_as_it_is():
     look, draws = frame(network(subcarriers=256, symbols=9)), receiving.UNUSED
     before, samples = draws.bit_generator.state, waveform.transmit(*carried(9, 256))
-    effects = called({"adc": {}, "phase_noise": {}, "carrier_offset": {}})
+    effects = called({"adc": {}, "phase_noise": {}, "carrier_offset": {}, "iq_imbalance": {}})
     found = providing(effects, receiving.DrawsNothing)
-    assert [one.name for one in found] == ["adc"]
+    assert {one.name for one in found} == {"adc", "iq_imbalance"}
     for one in found:
         one.module.receive(one.settings, samples, look, draws)
-        one.module.toned(one.settings, samples, look, draws)
+        one.module.retoned(one.settings, np.fft.fft(samples, axis=1), look, draws)
     assert draws.bit_generator.state == before

@@ -39,7 +39,7 @@ def test_tones_stay_where_all_that_follows_changes_them_or_the_next_effect_begin
         vars(module).update({offered: step(offered) for offered in OFFERS[kind]})
         effects.append(SimpleNamespace(name=name, settings={}, module=module))
     sending = SimpleNamespace(carrying=lambda tones, rows: (tones,))
-    built = SimpleNamespace(frame=None, draws=lambda name: None, sending=sending)
+    built = SimpleNamespace(frame=None, again=False, draws=lambda name: None, sending=sending)
     tones = np.exp(1j * np.arange(12.0)).reshape(3, 4)
     heard = receiving.Receiving._behind(built, effects, slice(None), tones=tones.copy())
     assert asked == expected

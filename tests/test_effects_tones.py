@@ -30,8 +30,9 @@ def test_the_strongest_cell_is_that_of_a_transform(subcarriers, noise, carried):
     rng = np.random.default_rng(1)
     responses = looks(rng, 60, subcarriers, noise)
     cells = np.fft.ifft(responses, axis=1)
-    data = waveform.sent(stream(1, "waveform"), 60, subcarriers) if carried else None
-    value, cell = strongest_cell.strongest(waveform.tones_of(responses, data) if carried else responses, data)
+    signs = waveform.sent_signs(stream(1, "waveform"), 60, subcarriers) if carried else None
+    given = waveform.tones_of(responses, waveform.of_signs(signs)) if carried else responses
+    value, cell = strongest_cell.strongest(given, signs)
     np.testing.assert_allclose(abs(cells)[np.arange(60), cell], abs(cells).max(axis=1), rtol=1e-12)
     np.testing.assert_allclose(value, cells[np.arange(60), cell], rtol=0, atol=1e-13 * abs(cells).max())
 

@@ -52,3 +52,15 @@ def aligned(*shape: int) -> np.ndarray:
     room = np.empty(count + LINE // 8)
     first = -room.__array_interface__["data"][0] % LINE // 8
     return room[first : first + count].reshape(shape)
+
+
+def aligned_complex(*shape: int) -> np.ndarray:
+    """Return a new complex128 array of this shape that begins with a line of the cache."""
+    return aligned(*shape[:-1], 2 * shape[-1]).view(np.complex128)
+
+
+def aligned_copy(values: np.ndarray) -> np.ndarray:
+    """Return float64 values of any shape in a new array that begins with a line of the cache."""
+    result = aligned(*values.shape)
+    result[...] = values
+    return result

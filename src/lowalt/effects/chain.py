@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from lowalt.effects import need, strongest_cell, waveform
 from lowalt.effects.catalogue import ON_ALL_ECHOES, NamedEffect, placed, providing
 from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, ChoosesCells, FiltersCells, SamplesTime
 from lowalt.effects.listening import Listening
+from lowalt.effects.outcome import Outcome
 from lowalt.effects.receiving import Heard, Receiving
 from lowalt.effects.sending import Sending
 from lowalt.effects.target_echo import EXACT, TargetEcho
@@ -25,14 +26,6 @@ class FiltersSymbols(Protocol):
     """Optional, detection: a filter over symbols, alike in all cells, that does to responses what it does to cells."""
 
     ALONG_SYMBOLS: bool
-
-
-class Outcome(NamedTuple):
-    """Signal (N,), chosen cells (N,), and magnitude of the strongest cell minus that of the second (N,)."""
-
-    signal: np.ndarray
-    cell: np.ndarray
-    gap: np.ndarray
 
 
 class Chain:
@@ -124,6 +117,8 @@ class Chain:
             view = view.at(view.times_s[rows])
             factor = factor if np.ndim(factor) == 0 else factor[..., rows, :]
         noise, left = self.receiving.noise()
+        if (tones := self.target.sent()) is not None:
+            return self.receiving.toned(tones, left)
         plain = not left and not self.sending.distorts and self._unknown is None
         samples = None
         if (on | self._company) & {"symbol_motion", "cyclic_prefix"}:

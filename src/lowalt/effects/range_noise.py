@@ -13,7 +13,7 @@ import numpy as np
 from lowalt.common.jit import INNER, INNER_ORDERED, VECTOR
 from lowalt.common.normals import circular, fill
 from lowalt.effects import strongest_cell, transforms
-from lowalt.effects.strongest_cell import NONE, SLOTS, _cell, _power, walked
+from lowalt.effects.strongest_cell import SLOTS, _cell, taken, walked
 from lowalt.effects.transform_loops import transformed
 
 ASIDE = 1
@@ -151,7 +151,7 @@ def _by_neighbours(parts, words, near, n, total, reach, space, noisy_space):
     largest noise; spaces: as in `_found`. Returns the strongest cell without noise, too.
     """
     wave, _, held, rows, seen = space
-    _, numbers, chosen, values, _, _, scale = noisy_space
+    numbers, chosen, values, _, _, scale = noisy_space
     count = parts.shape[1]
     first, last, best, _, rest = walked(parts, near, n, total, 2.0 * reach, wave, held, rows, seen)
     for q in range(first, last + 1):
@@ -170,7 +170,7 @@ def _by_neighbours(parts, words, near, n, total, reach, space, noisy_space):
 @INNER
 def _by_all(parts, words, near, reach, noisy_space):
     """The strongest cell in noise (`_strongest`), all cells worked out, and the one without; see `_by_neighbours`."""
-    _, numbers, chosen, values, work, table, scale = noisy_space
+    numbers, chosen, values, work, table, scale = noisy_space
     first, last, count, power = near - ASIDE, near + ASIDE, parts.shape[1], 0.0
     most = _transformed(parts, work, table, first, last)
     for q in range(first, last + 1):
@@ -202,10 +202,10 @@ def _found(responses, words, start, space, noisy_space, value, cell):
     of the look and 16 are left, the loop gives up.
     """
     symbols, count = responses.shape
-    parts, none, table, scale = space[1], noisy_space[0], noisy_space[5], noisy_space[6]
+    parts, table, scale = space[1], noisy_space[4], noisy_space[5]
     left, near, reach = 0, start, scale * LARGEST * (1.0 + ROOM)
     for n in range(symbols):
-        total = _power(responses[n], none, parts) / count
+        total = taken(responses[n], parts) / count
         found = NOTHING
         # Behind strong noise neighbours settle nothing.
         if len(table) == 0 or 2.0 * reach < np.sqrt(total):
@@ -223,4 +223,4 @@ def _space(count: int, scale: float) -> tuple:
     table = transforms.table() if count == transforms.LENGTH else np.empty((0, count))
     chosen, values = np.empty(count, np.int64), np.empty(count, np.complex128)
     numbers = np.zeros(2 * SLOTS, np.uint64), np.empty((2, SLOTS)), np.empty((2, SLOTS))
-    return NONE, numbers, chosen, values, np.empty((2, count)), table, scale
+    return numbers, chosen, values, np.empty((2, count)), table, scale

@@ -18,9 +18,9 @@ from lowalt.common.network import Network, Station
 from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
-from lowalt.effects import need
+from lowalt.effects import need, sent_alone
 from lowalt.effects.catalogue import BY_NEED, LOOK_WIDE, PAIR_WIDE, NamedEffect, placed, providing
-from lowalt.effects.chain import EXACT, Chain, Outcome
+from lowalt.effects.chain import EXACT, Chain
 from lowalt.effects.interface import (
     AddsEchoes,
     AddsPaths,
@@ -32,6 +32,7 @@ from lowalt.effects.interface import (
     WeighsPoints,
 )
 from lowalt.effects.need import Decision
+from lowalt.effects.outcome import Outcome, largest_of
 from lowalt.effects.steps import SHARE, error_before, steps_alone
 from lowalt.effects.target_echo import TargetEcho
 from lowalt.effects.view import View
@@ -115,6 +116,8 @@ def received_signal(
     # Call the engine only where the chain would not compute the same echo itself.
     if not link and (not exact or (chain.target.bent and not weighed)):
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
+    if exact and not asked:
+        sent_alone.send(chain)
     chain.receiving.power = power = arriving(seen_alone(chain) if own is None or weighed else own.signal)
     # At a tolerance the chain runs first without the physics by need.
     chain.receiving.again = share is not None and bool(asked)
@@ -189,11 +192,6 @@ def _drawn(scene: Scene, row: dict, station: Station, name: str, end: Station | 
     if name in PAIR_WIDE and station.transmitter is not None:
         return scene.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
     return scene.stream(name, row, station.name)
-
-
-def largest_of(outcome: Outcome) -> float:
-    """Return the largest magnitude of an outcome's signal (its units)."""
-    return float(abs(outcome.signal).max())
 
 
 def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:

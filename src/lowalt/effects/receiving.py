@@ -58,26 +58,33 @@ class DrawsNothing(Protocol):
     DRAWS_NOTHING: bool
 
 
+@runtime_checkable
+class NeedsNoData(Protocol):
+    """Optional, receiver: an effect that reads no data. Its frame has ones in their place, so that none are made."""
+
+    NEEDS_NO_DATA: bool
+
+
 UNUSED = np.random.Generator(np.random.PCG64(0))
 """The generator of effects that draw nothing."""
 
 
 class Heard:
-    """What a receiver has made of a look: responses (N, M), or their tones and the data (N, M) that they carried."""
+    """What a receiver has made of a look: responses (N, M), or their tones and the QPSK data that they carried."""
 
-    def __init__(self, responses: np.ndarray, data: np.ndarray | None = None, noise: RangeNoise | None = None):
-        """Keep responses, or with `data`, of unit modulus, the tones (`waveform.tones_of`) of symbols of such data.
+    def __init__(self, responses: np.ndarray, signs: np.ndarray | None = None, noise: RangeNoise | None = None):
+        """Keep responses, or with `signs` (2, N, M) of QPSK data, the tones (`waveform.tones_of`) of such symbols.
 
         noise: what is to be added to the range cells of responses.
         """
-        self.given, self.data, self.noise = responses, data, noise
+        self.given, self.signs, self.noise = responses, signs, noise
 
     @cached_property
     def responses(self) -> np.ndarray:
         """The responses (N, M), the data divided out."""
         if self.noise is not None:
             return self.given + self.noise.response
-        return self.given if self.data is None else waveform.without(self.given, self.data)
+        return self.given if self.signs is None else waveform.without(self.given, waveform.of_signs(self.signs))
 
     def cells(self, sending: Sending) -> np.ndarray:
         """Return the range cells, all M or those of the pilots' comb."""
@@ -91,7 +98,7 @@ class Heard:
         """Return the strongest range cells of all symbols, values (N,) and numbers (N,), from no response at all."""
         if self.noise is not None:
             return self.noise.strongest(self.given)
-        return strongest_cell.strongest(self.given, self.data)
+        return strongest_cell.strongest(self.given, self.signs)
 
 
 class Receiving:
@@ -132,6 +139,10 @@ class Receiving:
         """Return what is heard behind the effects `left` of responses (N, M) of the symbols `rows`, as sent."""
         return self._behind(left, rows, tones=waveform.carrying(spectrum, self.sending.aired[rows]))
 
+    def toned(self, tones: np.ndarray, left: list[NamedEffect]) -> Heard:
+        """Return what is heard of the tones (N, M) of a look, which are overwritten, behind the effects `left`."""
+        return self._behind(left, slice(None), tones=tones)
+
     def sampled(self, samples: np.ndarray, left: list[NamedEffect], rows: slice | np.ndarray) -> Heard:
         """Return what is heard of time samples (N, M) of the symbols `rows`, behind the effects `left`."""
         return self._behind(left, rows, samples=samples)
@@ -146,13 +157,14 @@ class Receiving:
         """
         for place, effect in enumerate(left):
             still = providing([effect], DrawsNothing)
-            given = self.frame, UNUSED if still else self.draws(stream_name(effect.name))
+            frame = self.bare if providing([effect], NeedsNoData) else self.frame
+            given = frame, UNUSED if still else self.draws(stream_name(effect.name))
             takes = bool(providing([effect], TakesTones))
             if tones is None and takes:
                 tones = transforms.forward(samples)
-            stays = len(providing(left[place:], ChangesTones)) == len(left) - place
+            stays = len(_on_tones(left[place:], self.again)) == len(left) - place
             next_takes = len(providing(left[place : place + 2], TakesTones)) == 2
-            if tones is not None and (stays or next_takes) and providing([effect], ChangesTones):
+            if tones is not None and (stays or next_takes) and _on_tones([effect], self.again):
                 tones = _retoned(effect, tones, *given)
             elif takes:
                 samples, tones = effect.module.retimed(effect.settings, _tones(tones), *given), None
@@ -191,6 +203,12 @@ class Receiving:
         delay_s = 2.0 * range_m / SPEED_OF_LIGHT
         drawn: dict | None = {} if self.again else None
         return Frame(view.network, view.station, ones, self.power, delay_s, starts_s=starts, drawn=drawn)
+
+
+def _on_tones(effects: list[NamedEffect], again: bool) -> list[NamedEffect]:
+    """Those of some effects that change tones. In a look that is computed `again`, a converter's step is asked for."""
+    steps = providing(effects, Quantises) if again else []
+    return [effect for effect in providing(effects, ChangesTones) if effect not in steps]
 
 
 def _retoned(

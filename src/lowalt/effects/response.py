@@ -9,10 +9,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from lowalt.common.memory import aligned, aligned_complex
 from lowalt.common.network import Network, Station
 from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
 from lowalt.echo.radar import radar
-from lowalt.effects import moment_loops, spread_loops, waveform
+from lowalt.effects import moment_loops, spread_loops, spread_search, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.gain_times import Instant, Kept
 from lowalt.effects.one_way import ImagePath as ImagePath
@@ -166,12 +167,19 @@ class OneWayFactors:
             return waveform.tones_of(self.spectrum(moments), data)
         return self._spread(moments, np.ascontiguousarray(data))
 
+    def searched(
+        self, moments: list[np.ndarray], signs: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return what `spread_search.spread_and_search` does of the `moments` of the only pair of paths."""
+        given = moments[0], self.functions(self.frames[0][1]), *self.delays(0)
+        return spread_search.spread_and_search(given, self.radio.subcarriers, signs)
+
     def _spread(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
         """The subcarriers (N, M) of moments, or with data (N, M) the tones of those of one pair."""
         count = self.radio.subcarriers
         half = (count + 1) // 2
-        work = np.empty((4, half)), np.empty((2, half)), np.empty((2, count))
-        result = np.empty((len(self.refs), count), np.complex128)
+        work = aligned(4, half), aligned(2, half), aligned(2, count)
+        result = aligned_complex(len(self.refs), count)
         for number, (planes, (_, reach)) in enumerate(zip(moments, self.frames, strict=True)):
             given = planes, self.functions(reach), *self.delays(number)
             spread_loops.spread(*given, *work, number == 0, data, result)

@@ -8,6 +8,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.special import factorial, jv
 
+from lowalt.common.memory import aligned_copy
 from lowalt.common.network import Network
 from lowalt.echo.radar import Radar
 from lowalt.effects import interpolation
@@ -53,7 +54,8 @@ def table(reach: float, count: int, error: float) -> np.ndarray:
 
     P is a multiple of BLOCK; the orders from P on sum to less than `error`.
     """
-    return _bessel(_orders(reach, error), 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count)
+    at = 2 * np.pi * (np.arange(count) - 0.5 * (count - 1)) * reach / count
+    return aligned_copy(_bessel(_orders(reach, error), at))
 
 
 def _orders(reach: float, error: float) -> int:
@@ -95,7 +97,7 @@ def joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarr
     mix = values @ interpolation.coefficients(fine).T
     kept = 1 + int(np.flatnonzero(abs(mix).sum(axis=0)[::-1].cumsum()[::-1] > error)[-1])
     place = np.arccos(np.linspace(-1.0, 1.0, count))
-    return np.ascontiguousarray(mix[:, :kept]), np.cos(np.arange(kept)[:, None] * place)
+    return np.ascontiguousarray(mix[:, :kept]), aligned_copy(np.cos(np.arange(kept)[:, None] * place))
 
 
 @lru_cache(maxsize=64)

@@ -35,7 +35,12 @@ class Sending:
     @cached_property
     def known(self) -> np.ndarray:
         """The data (N, M) that all symbols carry, as the receiver knows them."""
-        return self._drawn("waveform")
+        return self._drawn("waveform") if self.source is not None else waveform.of_signs(self.signs)
+
+    @cached_property
+    def signs(self) -> np.ndarray:
+        """The signs (2, N, M) int8 of QPSK data (`waveform.sent_signs`), where no effect chooses other data."""
+        return waveform.sent_signs(self.draws("waveform"), self.network.symbols, self.network.subcarriers)
 
     @cached_property
     def aired(self) -> np.ndarray:
@@ -59,24 +64,24 @@ class Sending:
 
     def received(self, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
         """Return the responses (N, M) of the time samples of the symbols `rows`, the known data divided out."""
-        found, data = self.carrying(transforms.forward(samples), rows)
-        return found if data is None else waveform.without(found, data)
+        found, signs = self.carrying(transforms.forward(samples), rows)
+        return found if signs is None else waveform.without(found, self.known[rows])
 
     def with_samples(self, responses: np.ndarray, samples: np.ndarray, rows: slice | np.ndarray) -> np.ndarray:
         """Return responses (N, M) plus those of time samples (N, M) of the symbols `rows`; both are overwritten."""
-        found, data = self.carrying(transforms.forward(samples, out=samples), rows)
-        if data is None:
+        found, signs = self.carrying(transforms.forward(samples, out=samples), rows)
+        if signs is None:
             return responses + found
-        divided(found, np.ascontiguousarray(data), False, responses)
+        divided(found, np.ascontiguousarray(self.known[rows]), False, responses)
         return responses
 
     def carrying(self, tones: np.ndarray, rows: slice | np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the tones (N, M) of samples of the symbols `rows`, and the data (N, M) that are in them.
+        """Return the tones (N, M) of samples of the symbols `rows`, and the signs (2, N, M) of the data in them.
 
         Data of any but unit modulus are divided out: responses, and None.
         """
         if self.source is None:
-            return tones, self.known[rows]
+            return tones, self.signs[:, rows]
         return np.fft.fftshift(tones, axes=-1) / self.known[rows], None
 
     def still(self, spectrum: np.ndarray, prefix: NamedEffect | None, offset_cells: float = 0.0) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.common.network import Station
 from lowalt.echo.pointwise.terms import aim_cosines
 from lowalt.echo.radar import constants, radar
-from lowalt.effects import lit_points, waveform
+from lowalt.effects import lit_points, strongest_cell, waveform
 from lowalt.effects.gain_times import Instant
 from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
@@ -103,6 +103,20 @@ class Steered:
         if self.steady:
             return self.beams[0][2].tones(moments[0], data)
         return waveform.tones_of(self.spectrum(moments), data)
+
+    def searched(
+        self, moments: list[list[np.ndarray]], signs: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+        """Return `spectrum`, or with signs (2, N, M) its tones that carry them, and its strongest range cells.
+
+        signs: int8, those of QPSK data (`waveform.sent_signs`). Values and numbers (N,) of cells are those of
+        `strongest_cell.strongest`.
+        """
+        if self.steady and len(self.beams[0][2].pairs) == 1:
+            return self.beams[0][2].searched(moments[0], signs)
+        responses = self.spectrum(moments)
+        value, cell = strongest_cell.strongest(responses)
+        return responses if signs is None else waveform.tones_of(responses, waveform.of_signs(signs)), value, cell
 
     def largest(self, moments: list[list[np.ndarray]]) -> float:
         """Return a bound of the largest subcarrier that `spectrum` makes of these moments."""

@@ -11,8 +11,9 @@ from functools import lru_cache
 import numpy as np
 
 from lowalt.common.jit import INNER_VECTOR, VECTOR
-from lowalt.effects import transforms
-from lowalt.effects.tone_loops import divided
+from lowalt.common.memory import aligned
+from lowalt.effects import transforms, waveform
+from lowalt.effects.tone_loops import HALF
 
 MOST = 8
 """Range cells of a symbol that are worked out one by one; a transform gives all cells in the time of about as many."""
@@ -20,8 +21,6 @@ FEWEST = 16
 """Least number of range cells for a search; a transform of so few takes no longer."""
 SLOTS = 16
 """Range cells whose phase factors are held, a power of two of at least MOST."""
-NONE = np.empty(0, np.complex128)
-"""No data."""
 ROOM = 1e-12
 """Share of a symbol's power added to what its cells leave: a difference keeps the rounding of its parts."""
 
@@ -34,29 +33,42 @@ def _wave(count: int) -> np.ndarray:
 
 
 @INNER_VECTOR
-def _power(row, data, parts):
-    """Fill parts (2, M) with real and imaginary parts of a response, and return the sum of its squares.
+def _without(tones, x, y, re, im):
+    """Fill re and im (K,) with tones (K,) times the conjugate of QPSK symbols of signs x and y (K,)."""
+    for m in range(np.uint64(len(re))):
+        a, b, c, d = tones[m].real, tones[m].imag, HALF * x[m], HALF * y[m]
+        re[m], im[m] = a * c + b * d, b * c - a * d
 
-    row: the response (M,), or with `data` (M,) tones of it in the transform's order (`tone_loops.divided`).
+
+@INNER_VECTOR
+def power(parts):
+    """Sum of the squares of parts (2, M)."""
+    re, im, total = parts[0], parts[1], 0.0
+    for m in range(np.uint64(len(re))):
+        total += re[m] * re[m] + im[m] * im[m]
+    return total
+
+
+@INNER_VECTOR
+def taken(row, parts):
+    """Fill parts (2, M) with real and imaginary parts of a response (M,), and return the sum of its squares."""
+    re, im = parts[0], parts[1]
+    for m in range(np.uint64(len(row))):
+        re[m], im[m] = row[m].real, row[m].imag
+    return power(parts)
+
+
+@INNER_VECTOR
+def taken_without(tones, x, y, parts):
+    """Fill parts as `taken` does with the response of tones (M,), in the transform's order, of symbols of signs x, y.
+
+    x, y: (M,) int8, of the real and imaginary parts of the QPSK symbols that the tones carried.
     """
-    count = len(row)
-    re, im, power = parts[0], parts[1], 0.0
-    half = count // 2 if len(data) else 0
-    rest = count - half
-    if len(data) == 0:
-        for m in range(np.uint64(count)):
-            re[m], im[m] = row[m].real, row[m].imag
-    else:
-        high_re, high_im, high, above, below = re[half:], im[half:], data[half:], row[:rest], row[rest:]
-        for m in range(np.uint64(rest)):
-            a, b, c, d = above[m].real, above[m].imag, high[m].real, high[m].imag
-            high_re[m], high_im[m] = a * c + b * d, b * c - a * d
-        for m in range(np.uint64(half)):
-            a, b, c, d = below[m].real, below[m].imag, data[m].real, data[m].imag
-            re[m], im[m] = a * c + b * d, b * c - a * d
-    for m in range(np.uint64(count)):
-        power += re[m] * re[m] + im[m] * im[m]
-    return power
+    count, re, im = len(tones), parts[0], parts[1]
+    half = count // 2
+    _without(tones, x[half:], y[half:], re[half:], im[half:])
+    _without(tones[count - half :], x, y, re[:half], im[:half])
+    return power(parts)
 
 
 @INNER_VECTOR
@@ -109,21 +121,20 @@ def walked(parts, near, n, total, clear, wave, held, rows, seen):
 
 
 @VECTOR
-def found(responses, data, none, start, space, value, cell):
+def found(responses, signs, start, space, value, cell):
     """Fill value and cell (N,) with the strongest range cells of responses (N, M); return whether few are left.
 
-    data: (N, M) where `responses` are tones, else (0, M); none: (0,); start: a cell near the first symbol's; space: of
-    `space`. Symbols whose strongest cell is not certain after MOST cells are left, with cell -1; once more than a
-    quarter of the look and 16 are left, the loop gives up.
+    signs: (2, N, M) where `responses` are tones, as in `taken_without`, else (2, 0, M); start: a cell near the first
+    symbol's; space: of `space`. Symbols whose strongest cell is not certain after MOST cells are left, with cell -1;
+    once more than a quarter of the look and 16 are left, the loop gives up.
     """
     symbols, count = responses.shape
     wave, parts, held, rows, seen = space
     left, near = 0, start
     for n in range(symbols):
-        own = none
-        if len(data) > 0:
-            own = data[n]
-        total = _power(responses[n], own, parts) / count
+        row = responses[n]
+        total = taken_without(row, signs[0, n], signs[1, n], parts) if signs.shape[1] > 0 else taken(row, parts)
+        total /= count
         _, _, best, top, rest = walked(parts, near, n, total, 0.0, wave, held, rows, seen)
         value[n], near = seen[best % SLOTS], best % count
         cell[n] = near if total > 0.0 else 0
@@ -138,35 +149,38 @@ def found(responses, data, none, start, space, value, cell):
 def space(count: int) -> tuple[np.ndarray, ...]:
     """Return the table and the work space of a search among `count` range cells, as `walked` takes them."""
     # No cell's phase factors are held yet.
-    held, rows = np.full(SLOTS, -1), np.empty((SLOTS, 2, count))
-    return _wave(count), np.empty((2, count)), held, rows, np.empty(SLOTS, np.complex128)
+    held, rows = np.full(SLOTS, -1), aligned(SLOTS, 2, count)
+    return _wave(count), aligned(2, count), held, rows, np.empty(SLOTS, np.complex128)
 
 
-def strongest(responses: np.ndarray, data: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def strongest(responses: np.ndarray, signs: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Return the strongest range cells of responses (N, M): their values (N,) and numbers (N,).
 
-    data: (N, M) of unit modulus, where `responses` are the tones (`waveform.tones_of`) of symbols that carried them.
+    signs: (2, N, M) int8, where `responses` are the tones (`waveform.tones_of`) of symbols that carried such QPSK data.
     Source: Parseval's theorem.
     """
     symbols, count = responses.shape
     value, cell = np.empty(symbols, np.complex128), np.full(symbols, -1)
-    given = np.empty((0, count), np.complex128) if data is None else np.ascontiguousarray(data)
+    given = np.empty((2, 0, count), np.int8) if signs is None else np.ascontiguousarray(signs)
     if count >= FEWEST and symbols > 0:
-        start = int(abs(_cells(responses[:1], given[:1])).argmax())
-        found(np.ascontiguousarray(responses), given, NONE, start, space(count), value, cell)
+        start = int(abs(_cells(responses[:1], given[:, :1])).argmax())
+        found(np.ascontiguousarray(responses), given, start, space(count), value, cell)
     rest = np.flatnonzero(cell < 0)
     if len(rest):
         rows = slice(None) if len(rest) == symbols else rest
-        cells = _cells(responses[rows], given[rows] if len(given) else given)
-        cell[rest] = abs(cells).argmax(axis=1)
-        value[rest] = cells[np.arange(len(rest)), cell[rest]]
+        fill(responses[rows], given[:, rows] if given.shape[1] else given, rest, value, cell)
     return value, cell
 
 
-def _cells(responses: np.ndarray, data: np.ndarray) -> np.ndarray:
-    """All range cells (N, M) of responses, or of tones that carried `data`."""
-    if len(data):
-        spectrum = np.empty(responses.shape, np.complex128)
-        divided(np.ascontiguousarray(responses), np.ascontiguousarray(data), True, spectrum)
-        responses = spectrum
+def fill(responses: np.ndarray, signs: np.ndarray, rows: np.ndarray, value: np.ndarray, cell: np.ndarray) -> None:
+    """Set value and cell, (N,), at `rows` (K,), from all range cells of responses (K, M), or of tones of `signs`."""
+    cells = _cells(responses, signs)
+    cell[rows] = abs(cells).argmax(axis=1)
+    value[rows] = cells[np.arange(len(rows)), cell[rows]]
+
+
+def _cells(responses: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """All range cells (N, M) of responses, or of tones that carried the data of `signs`."""
+    if signs.shape[1]:
+        responses = waveform.without(responses, waveform.of_signs(signs))
     return transforms.inverse(responses)

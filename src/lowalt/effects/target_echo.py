@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lowalt.effects import arrivals, need, steering, strongest_cell, waveform
+from lowalt.effects import arrivals, lit_points, need, steering, strongest_cell, waveform
 from lowalt.effects.catalogue import BY_END, NamedEffect, providing
 from lowalt.effects.interface import AddsPaths, BoundsItself, MovesImages, WeighsPoints, WeighsRoutes
 from lowalt.effects.lit_points import SkipsDarkPoints
@@ -32,6 +32,8 @@ class TargetEcho:
         self.by_need = {effect.name: effect for effect in providing(channel, BoundsItself)}
         self._seen: dict[str, np.ndarray] = {}
         self._products: dict[tuple[str, ...], np.ndarray | float] = {}
+        self._strongest: list[np.ndarray] | None = None
+        self._tones: np.ndarray | None = None
         self.factor: np.ndarray | float = self.weight(view)
 
     def weight(self, view: View) -> np.ndarray | float:
@@ -75,14 +77,35 @@ class TargetEcho:
         return told[0].module.routes(told[0].settings, self.view, self.paths, weighing, self._product)
 
     @cached_property
-    def direct(self) -> np.ndarray:
-        """The target's subcarriers (N, M) on the direct path alone, without physics by need, to rounding."""
-        return steering.echo(self.view, factor=self.factor, error=EXACT)
+    def _alone(self) -> tuple[steering.Steered, list[list[np.ndarray]]]:
+        """The direct path alone, without physics by need, to rounding, and its moments."""
+        rays = steering.Steered(self.view, error=EXACT, lit=lit_points.lit(self.factor))
+        return rays, rays.moments(rays.paired(self.factor))
 
     @cached_property
+    def direct(self) -> np.ndarray:
+        """The target's subcarriers (N, M) on the direct path alone, without physics by need, to rounding."""
+        rays, moments = self._alone
+        if self._strongest is not None:
+            return rays.spectrum(moments)
+        result, *self._strongest = rays.searched(moments, None)
+        return result
+
+    @property
     def strongest(self) -> tuple[np.ndarray, np.ndarray]:
         """The strongest range cells of `direct`: their values (N,) and numbers (N,)."""
-        return strongest_cell.strongest(self.direct)
+        value, cell = self._strongest or strongest_cell.strongest(self.direct)
+        return value, cell
+
+    def send(self) -> None:
+        """Make the tones of `direct` in the pass that finds its strongest cells, for `sent`; the data are QPSK."""
+        rays, moments = self._alone
+        self._tones, *self._strongest = rays.searched(moments, self.sending.signs)
+
+    def sent(self) -> np.ndarray | None:
+        """Return the tones (N, M) that `send` made, once: whoever gets them may overwrite them."""
+        tones, self._tones = self._tones, None
+        return tones
 
     @cached_property
     def own_response(self) -> np.ndarray:

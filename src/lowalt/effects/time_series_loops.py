@@ -81,7 +81,7 @@ def arrived(planes, sizes, table, own, whole, cells, data, shapes, waves, halved
     real, imag = rows[6], rows[7]
     for n in range(len(still)):
         step = turned(whole[n], cells[n], 2, LENGTH), turned(whole[n], cells[n], 2 * STRIDE, LENGTH)
-        ramp(turned(whole[n], cells[n], 1 - LENGTH, LENGTH), step, LENGTH, turn[0], turn[1])
+        ramp(turned(whole[n], cells[n], 1 - LENGTH, LENGTH), step, turn[0], turn[1])
         factors(own[n], turn, data[n], delay, tones)
         for i in range(np.uint64(LENGTH)):
             re[i], im[i] = 0.0, 0.0

@@ -3,16 +3,41 @@
 Tones stand in the transform's order: the oscillator's subcarrier and those above it first, then those below it.
 """
 
+import math
+
 import numpy as np
 
 from lowalt.common.jit import INNER, LEAN
 
+HALF = math.sqrt(0.5)
+"""Size of both parts of a QPSK symbol of unit modulus."""
+
+
+_EACH = np.uint64(0x0101010101010101)
+"""One in each byte."""
+_SEVEN, _ONE, _FULL = np.uint64(7), np.uint64(1), np.uint64(255)
+
 
 @LEAN
-def looked_up(numbers, table, out):
-    """Fill out (K,) with table[numbers[k] >> 6], numbers (K,) uint8."""
-    for k in range(len(out)):
-        out[k] = table[numbers[k] >> 6]
+def signs_of(words, re, im):
+    """Fill re and im (K,), words of eight bytes, with 1 or -1 in each byte, as the upper two bits of words (K,) say.
+
+    The highest bit of a byte is set in the lower half plane; where it differs from the next one, the symbol is on the
+    left.
+    """
+    for k in range(len(words)):
+        word = words[k]
+        re[k] = (((word ^ (word << _ONE)) >> _SEVEN) & _EACH) * _FULL | _EACH
+        im[k] = ((word >> _SEVEN) & _EACH) * _FULL | _EACH
+
+
+@LEAN
+def from_signs(signs, out):
+    """Fill out (N, M) with the QPSK symbols whose real and imaginary parts have these signs, (2, N, M) int8."""
+    for n in range(len(out)):
+        row, re, im = out[n], signs[0, n], signs[1, n]
+        for m in range(np.uint64(len(row))):
+            row[m] = complex(HALF * re[m], HALF * im[m])
 
 
 @LEAN

@@ -16,9 +16,9 @@ import numpy as np
 from lowalt.common.network import Network, Station
 from lowalt.effects import transforms
 from lowalt.effects.phasors import phasors
-from lowalt.effects.tone_loops import carried, divided, looked_up
+from lowalt.effects.tone_loops import HALF, carried, divided, from_signs, signs_of
 
-QPSK = np.exp(1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
+QPSK = HALF * np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j])
 """The four data symbols, of unit modulus."""
 
 
@@ -27,11 +27,23 @@ def sent(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray
 
     Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
     """
+    return of_signs(sent_signs(rng, symbols, subcarriers))
+
+
+def sent_signs(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
+    """Return the data of `sent` as signs (2, symbols, subcarriers) int8, of real and imaginary parts: 1 or -1."""
     count = symbols * subcarriers
-    # The upper two bits of each byte, the lowest byte of a word first.
-    taken = rng.bit_generator.random_raw(-(-count // 8)).astype("<u8", copy=False).view(np.uint8)
-    result = np.empty((symbols, subcarriers), np.complex128)
-    looked_up(taken, QPSK, result.reshape(-1))
+    # The upper two bits of each byte say which symbol of QPSK it is, the lowest byte of a word comes first.
+    words = rng.bit_generator.random_raw(-(-count // 8)).astype("<u8", copy=False)
+    signs = np.empty((2, len(words)), "<u8")
+    signs_of(words, signs[0], signs[1])
+    return signs.view(np.int8)[:, :count].reshape(2, symbols, subcarriers)
+
+
+def of_signs(signs: np.ndarray) -> np.ndarray:
+    """Return the QPSK data (N, M) complex128 of signs (2, N, M) int8."""
+    result = np.empty(signs.shape[1:], np.complex128)
+    from_signs(np.ascontiguousarray(signs), result)
     return result
 
 

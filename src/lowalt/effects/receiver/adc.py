@@ -14,7 +14,7 @@ SOURCE = (
     "A. Gersho, R. M. Gray, Vector Quantization and Signal Compression, 1992, ch. 5 (mid-rise quantiser, overload)"
 )
 DEFAULTS = {"bits": 12, "backoff_db": 12.0, "clip": True}
-DRAWS_NOTHING = True
+DRAWS_NOTHING = NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:
@@ -65,23 +65,31 @@ def _steps(parts, step, most, full_scale, out):
 
 
 @LEAN
-def _stepped_tones(samples, step, most, table, work, out):
+def _stepped_tones(given, back, step, most, table, work, out):
     """Fill out (N, 256) with the transform of the middles of the steps of samples (N, 256), as in `_steps`.
 
-    table: `transform_loops.turns`; work: (4, 256).
+    given: the samples, or with `back` their tones; it may be out itself. table: as `transform_loops.turns` returns it;
+    work: (4, 256).
     """
-    count, re, im, new_re, new_im = np.uint64(256), work[0], work[1], work[2], work[3]
-    for n in range(len(samples)):
-        given, row = samples[n], out[n]
+    count, scale = np.uint64(256), 1.0 / 256
+    for n in range(len(given)):
+        row, new = given[n], out[n]
+        re, im, new_re, new_im = work[0], work[1], work[2], work[3]
         for i in range(count):
-            re[i], im[i] = given[i].real, given[i].imag
+            re[i], im[i] = row[i].real, row[i].imag
+        if back:
+            # Real and imaginary parts change places: the inverse transform.
+            transformed(im, re, new_im, new_re, table)
+            re, im, new_re, new_im = new_re, new_im, re, im
+            for i in range(count):
+                re[i], im[i] = scale * re[i], scale * im[i]
         for i in range(count):
             re[i] = _middle(re[i], step, most)
         for i in range(count):
             im[i] = _middle(im[i], step, most)
         transformed(re, im, new_re, new_im, table)
         for m in range(count):
-            row[m] = complex(new_re[m], new_im[m])
+            new[m] = complex(new_re[m], new_im[m])
 
 
 def full_scale(samples: np.ndarray, backoff_db: float) -> float:
@@ -109,8 +117,23 @@ def toned(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Gene
     scale = full_scale(samples, settings["backoff_db"])
     if not scale > 0 or samples.shape[1] != transforms.LENGTH:
         return transforms.forward(receive(settings, samples, frame, rng))
-    out, most = np.empty(samples.shape, np.complex128), _most(settings["bits"], settings["clip"])
-    height = scale * 2.0 ** (1 - settings["bits"])
     given = np.ascontiguousarray(samples, np.complex128)
-    _stepped_tones(given, height, most, transforms.table(), transforms.work(), out)
+    return _converted(settings, given, False, scale, np.empty(samples.shape, np.complex128))
+
+
+def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
+    """Return the tones (N, M) of what `receive` returns of the samples of tones (N, M), which are overwritten.
+
+    The range follows from the tones: by Parseval's theorem the mean power of samples is that of tones over M.
+    """
+    if tones.shape[1] != transforms.LENGTH:
+        return toned(settings, transforms.inverse(tones, out=tones), frame, rng)
+    scale = full_scale(tones, settings["backoff_db"]) / math.sqrt(tones.shape[1])
+    return _converted(settings, tones, True, scale, tones) if scale > 0 else tones
+
+
+def _converted(settings: dict, given: np.ndarray, back: bool, scale: float, out: np.ndarray) -> np.ndarray:
+    """The tones (N, M) of the converter's output, in `out`; given, back: as in `_stepped_tones`."""
+    height, most = scale * 2.0 ** (1 - settings["bits"]), _most(settings["bits"], settings["clip"])
+    _stepped_tones(given, back, height, most, transforms.table(), transforms.work(), out)
     return out

@@ -11,6 +11,7 @@ SOURCE = (
     "IEEE Trans. Commun. 42(10), 1994, Eqs. 1 to 4; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
 )
 DEFAULTS = {"fixed_hz": 0.0, "sigma_hz": 0.0, "fixed_ppm": 0.0, "sigma_ppm": 0.017}
+NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:

@@ -10,6 +10,7 @@ SOURCE = (
     "(frequency-independent IQ mismatch)"
 )
 DEFAULTS = {"gain_db": 0.5, "phase_deg": 2.0}
+DRAWS_NOTHING = NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:

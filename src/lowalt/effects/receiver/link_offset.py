@@ -18,6 +18,7 @@ SOURCE = (
     "satellites: estimate"
 )
 DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
+NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:

@@ -30,6 +30,7 @@ DEFAULTS = {
     "loop_hz": 100.0,
     "reference": [[1.0, -46.0], [10.0, -76.0], [100.0, -96.0]],
 }  # fmt: skip
+NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:

@@ -17,6 +17,7 @@ SOURCE = (
     "IEEE Trans. Commun. 47(11), 1999 (window offset inside the guard interval is a linear phase)"
 )
 DEFAULTS = {"fixed_s": 0.0, "sigma_s": 2e-8, "prefix_slack_s": 2.9e-7}
+NEEDS_NO_DATA = True
 
 
 def idle(settings: dict) -> bool:
