@@ -12,6 +12,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.effects.receiver import (
     _oscillator,
+    _toeplitz,
     phase_noise,
 )
 from lowalt.effects.receiver._oscillator_loops import weighed_lines
@@ -202,8 +203,13 @@ def test_both_parts_come_of_one_stream_one_after_the_other(symbols, subcarriers,
     rng = stream(3, "phase")
     slow = _oscillator.slow_phase(STEEP, look, delay_s, rng)
     lags = _oscillator.covariance(STEEP, look, delay_s)
-    root = np.linalg.cholesky(lags[abs(np.subtract.outer(np.arange(subcarriers), np.arange(subcarriers)))])
-    expected = slow + rng.standard_normal((symbols, subcarriers)) @ root.T
+    matrix = lags[abs(np.subtract.outer(np.arange(subcarriers), np.arange(subcarriers)))]
+    numbers = rng.standard_normal((symbols, subcarriers))
+    fast = [
+        numbers[:, first::2] @ np.linalg.cholesky(part.T @ matrix @ part).T
+        for first, part in enumerate(_toeplitz.parts(np.eye(subcarriers)))
+    ]
+    expected = slow + _toeplitz.joined(*fast)
     got = _oscillator.phase(STEEP, look, delay_s, stream(3, "phase"))
     np.testing.assert_allclose(got, expected, atol=1e-9 * abs(expected).max())
 

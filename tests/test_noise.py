@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
+from lowalt.common import normals
 from lowalt.common.draws import Draws
 from lowalt.common.errors import InputError
-from lowalt.common.normals import circular
 from lowalt.motion import write_table
 from lowalt.noise import add_noise
 from lowalt.noise.__main__ import load_echoes, load_powers, main
@@ -119,8 +119,18 @@ def test_many_normals_drawn_at_once_are_those_drawn_few_at_a_time():
 def test_the_compiled_normals_are_those_of_the_draws(count):
     plain, raw = (Draws(np.random.PCG64(count)) for _ in range(2))
     expected = 0.3 * plain.standard_normal(2 * count)
-    found = circular(raw.words(2 * count), 0.3)
+    found = normals.circular(raw.words(2 * count), 0.3)
     assert np.array_equal(found, expected.reshape(-1, 2).T)
+
+
+@pytest.mark.parametrize("count", [3, 300])
+def test_normals_apart_are_the_draws_at_even_and_at_odd_places(count):
+    real, imaginary = np.zeros((5, count + 4)), np.zeros((5, count + 3))
+    normals.apart(Draws(np.random.PCG64(1)).words(10 * count), real, imaginary)
+    expected = Draws(np.random.PCG64(1)).standard_normal((5, count, 2))
+    np.testing.assert_array_equal(real[:, 4:], expected[..., 0])
+    np.testing.assert_array_equal(imaginary[:, 3:], expected[..., 1])
+    assert not real[:, :4].any() and not imaginary[:, :3].any()
 
 
 def test_an_echo_file_that_was_cut_is_named(tmp_path):

@@ -102,24 +102,22 @@ def _fill_pairs(words, work, out):
 
 
 @LEAN
-def _fill_beside(words, first, work, out):
-    """Fill out (N, first + 2 K) as `beside` does; work: (4, BLOCK)."""
-    pairs = (out.shape[1] - first) // 2
-    for n in range(len(out)):
-        for start in range(0, pairs, BLOCK):
-            size = min(BLOCK, pairs - start)
-            real, imaginary, some = work[0, :size], work[1, :size], out[n, first + 2 * start :]
-            _block(words[2 * (n * pairs + start) :], 1.0, real, imaginary, work[2, :size], work[3, :size])
-            for i in range(np.uint64(size)):
-                some[_TWO * i], some[_TWO * i + _NEXT] = real[i], imaginary[i]
+def _fill_apart(words, count, work, real, imaginary):
+    """Fill real and imaginary as `apart` does; work: (2, BLOCK)."""
+    for n in range(len(real)):
+        own, other = real[n, real.shape[1] - count :], imaginary[n, imaginary.shape[1] - count :]
+        for first in range(0, count, BLOCK):
+            last = min(first + BLOCK, count)
+            more, lower = work[0, : last - first], work[1, : last - first]
+            _block(words[2 * (n * count + first) :], 1.0, own[first:last], other[first:last], more, lower)
 
 
-def beside(words: np.ndarray, first: int, out: np.ndarray) -> None:
-    """Fill the columns of out (N, first + 2 K) float64 from `first` on, row by row, with 2 N K normals.
+def apart(words: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> None:
+    """Fill the last K columns of real (N, K or more) and imaginary (N, K or more) float64, row by row.
 
-    They are those of `interleaved`; words: (2 N K,) uint64.
+    They become the parts of N K complex normals: draws 2 k and 2 k + 1 of `interleaved`; words: (2 N K,) uint64.
     """
-    _fill_beside(words, first, aligned(4, BLOCK), out)
+    _fill_apart(words, len(words) // (2 * len(real)), aligned(2, BLOCK), real, imaginary)
 
 
 def interleaved(words: np.ndarray) -> np.ndarray:

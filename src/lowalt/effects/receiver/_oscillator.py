@@ -3,6 +3,7 @@
 The spectrum is split by smooth windows that add up to one. Below 16 / T_r it is a sum of lines 1 / (2 N T_r) apart,
 each with a Gaussian amplitude: exact from symbol to symbol, and inside a symbol interpolated to 1e-9. Above, two
 symbols are independent, and the M samples of each are Gaussian with just the covariance of that part of the spectrum.
+Phases within a symbol are worked out as even and odd part about its middle (`_toeplitz.parts`).
 Source: D. B. Percival, A. T. Walden, Spectral Analysis for Univariate Time Series, 2020, ch. 11 (simulation by lines).
 """
 
@@ -147,19 +148,31 @@ def _twists(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=4)
-def _weights(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
-    """Rows of samples (M,) that drawn numbers weigh: the Q of `Grid.blend`, and M for a symbol's fast part.
+def _blends(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
+    """Polynomials that carry even (ceil(Q / 2), ceil(M / 2)) and odd (Q // 2, M // 2) part from nodes to samples."""
+    even, odd = _toeplitz.parts(grid(*at_key).blend)
+    even, odd = _toeplitz.parts(even.T)[0].T, _toeplitz.parts(odd.T)[1].T
+    # Both nodes of a pair have a share; a node in the middle has no other.
+    pairs = slice(len(even) - len(odd), None)
+    even[pairs] *= 2
+    return even, 2 * odd
 
-    The latter are columns of the lower Cholesky root of the fast part's covariance; where it is zero, there are none.
+
+@lru_cache(maxsize=4)
+def _weights(points: tuple, at_key: tuple, delay_s: float | None) -> list[np.ndarray]:
+    """Rows that drawn numbers weigh, of the even part (:, ceil(M / 2)) and of the odd part (:, M // 2).
+
+    Those of `_blends` come first, then a square root of the fast part's covariance; where it is zero, there is none.
     """
-    blend, lags = grid(*at_key).blend, covariance(points, at_key, delay_s)
+    blends, lags = _blends(at_key), covariance(points, at_key, delay_s)
     if lags[0] <= 0:
-        return blend
+        return list(blends)
     # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
     lags[0] *= 1 + 4 * np.finfo(float).eps * len(lags) ** 2
-    weights = np.empty((len(blend) + len(lags), len(lags)))
-    weights[: len(blend)] = blend
-    _toeplitz.upper(lags, weights[len(blend) :])
+    weights = [np.empty((sum(blend.shape), blend.shape[1])) for blend in blends]
+    for rows, blend in zip(weights, blends, strict=True):
+        rows[: len(blend)] = blend
+    _toeplitz.roots(lags, *(rows[len(blend) :] for rows, blend in zip(weights, blends, strict=True)))
     return weights
 
 
@@ -196,25 +209,41 @@ def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.rand
     return _slow_at_nodes(points, at_key, delay_s, rng) @ grid(*at_key).blend
 
 
+def _weighed(drawn: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The product (N, K) of drawn numbers (N, J + K) and weights (J + K, K) whose last K rows are a triangle."""
+    size, before = weights.shape[1], len(weights) - weights.shape[1]
+    result = np.empty((len(drawn), size))
+    # A block of samples asks only for the draws up to its end.
+    for first in range(0, size, BLOCK):
+        last = min(first + BLOCK, size)
+        np.matmul(drawn[:, : before + last], weights[: before + last, first:last], out=result[:, first:last])
+    return result
+
+
+def parts(
+    points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return even (N, ceil(M / 2)) and odd part (N, M // 2) in rad of what `phase` returns (`_toeplitz.parts`)."""
+    slow = _toeplitz.parts(_slow_at_nodes(points, at_key, delay_s, rng))
+    weights = _weights(points, at_key, delay_s)
+    if len(weights[0]) == slow[0].shape[1]:
+        return slow[0] @ weights[0], slow[1] @ weights[1]
+    even, odd = drawn = [np.empty((len(slow[0]), len(rows))) for rows in weights]
+    for numbers, nodes in zip(drawn, slow, strict=True):
+        numbers[:, : nodes.shape[1]] = nodes
+    shape = at_key[:2]
+    if isinstance(rng, Draws) and shape[1] % 2 == 0:
+        normals.apart(rng.words(math.prod(shape)), even, odd)
+    else:
+        numbers = rng.standard_normal(shape)
+        even[:, slow[0].shape[1] :], odd[:, slow[1].shape[1] :] = numbers[:, ::2], numbers[:, 1::2]
+    # Both parts are products of drawn numbers and rows of samples, so one product adds slow and fast part.
+    return _weighed(even, weights[0]), _weighed(odd, weights[1])
+
+
 def phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
     """Return drawn phase noise (N, M) in rad of the spectrum `points` at the instants of `grid(*at_key)`.
 
     delay_s: return phi(t) - phi(t - delay) instead, None for phi itself.
     """
-    slow = _slow_at_nodes(points, at_key, delay_s, rng)
-    (symbols, nodes), samples = slow.shape, at_key[1]
-    drawn, weights = np.empty((symbols, nodes + samples)), _weights(points, at_key, delay_s)
-    drawn[:, :nodes] = slow
-    if isinstance(rng, Draws) and samples % 2 == 0:
-        normals.beside(rng.words(symbols * samples), nodes, drawn)
-    else:
-        drawn[:, nodes:] = rng.standard_normal((symbols, samples))
-    if len(weights) == nodes:
-        return slow @ weights
-    # Both parts are products of drawn numbers and rows of samples, so one product adds them.
-    result = np.empty((symbols, samples))
-    # The fast part's rows are a triangle: a block of samples asks only for the draws up to its end.
-    for first in range(0, samples, BLOCK):
-        last = min(first + BLOCK, samples)
-        np.matmul(drawn[:, : nodes + last], weights[: nodes + last, first:last], out=result[:, first:last])
-    return result
+    return _toeplitz.joined(*parts(points, at_key, delay_s, rng))

@@ -10,6 +10,7 @@ from lowalt.common.jit import LEAN
 from lowalt.common.memory import aligned
 from lowalt.effects import transforms, waveform
 from lowalt.effects.phasors import phasor
+from lowalt.effects.receiver import _toeplitz
 from lowalt.effects.tone_loops import apart
 from lowalt.effects.transform_loops import transformed
 
@@ -31,23 +32,30 @@ def tones(
     if given.shape[1] != transforms.LENGTH:
         before = transforms.inverse(given) if data is None else waveform.transmit(given, data)
         return transforms.forward(samples(before, between, within))
-    return _retoned(given, data, between, within, NONE)
+    return _retoned(given, data, between, within, NONE, NONE)
 
 
-def phased_tones(given: np.ndarray, angle_rad: np.ndarray, data: np.ndarray | None = None) -> np.ndarray:
-    """Return `tones` of the turns exp(j angle), angle (N, M), which are never held together."""
+def phased_tones(
+    given: np.ndarray, even: np.ndarray, odd: np.ndarray, data: np.ndarray | None = None
+) -> np.ndarray:  # fmt: skip
+    """Return `tones` of the turns exp(j angle), which are never held together.
+
+    even (N, ceil(M / 2)), odd (N, M // 2): the `_toeplitz.parts` of angle (N, M) in rad.
+    """
     if given.shape[1] != transforms.LENGTH:
-        return tones(given, np.ones(len(given), np.complex128), waveform.turned(angle_rad), data)
-    return _retoned(given, data, NONE[:, 0].astype(np.complex128), NONE.astype(np.complex128), angle_rad)
+        return tones(given, np.ones(len(given), np.complex128), waveform.turned(_toeplitz.joined(even, odd)), data)
+    return _retoned(given, data, NONE[:, 0].astype(np.complex128), NONE.astype(np.complex128), even, odd)
 
 
 def _retoned(
-    given: np.ndarray, data: np.ndarray | None, between: np.ndarray, within: np.ndarray, angle: np.ndarray
+    given: np.ndarray, data: np.ndarray | None, between: np.ndarray, within: np.ndarray, even: np.ndarray,
+    odd: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
     """The result of `_turned_tones`, in `given` where there are no data."""
     out = given if data is None else np.empty(given.shape, np.complex128)
     carried = NONE.astype(np.complex128) if data is None else data
-    _turned_tones(given, carried, between, within, angle, transforms.table(), aligned(6, transforms.LENGTH), out)
+    work = aligned(6, transforms.LENGTH)
+    _turned_tones(given, carried, (between, within), (even, odd), transforms.table(), work, out)
     return out
 
 
@@ -63,21 +71,24 @@ def _turned(given, between, within, out):
 
 
 @LEAN
-def _turned_tones(given, data, between, within, angle, table, work, out):
-    """Turn the samples of given (N, 256) as `_turned` does, or by angle (N, 256) rad where it has rows.
+def _turned_tones(given, data, turns, angles, table, work, out):
+    """Turn the samples of given (N, 256) as `_turned` does, or by angles (rad) where these have rows.
 
-    given, data: as in `tone_loops.apart`; table: `transform_loops.turns`; work: (6, 256); out (N, 256), the tones, may
+    turns: between and within as in `samples`; angles: even and odd (N, 128) as in `phased_tones`; given, data: as in
+    `tone_loops.apart`; table: `transform_loops.turns`; work: (6, 256); out (N, 256), the tones, may
     be given itself. A symbol stays in the nearest cache with both transforms.
     """
     re, im, new_re, new_im, c, s = work[0], work[1], work[2], work[3], work[4], work[5]
-    count, scale = np.uint64(256), 1.0 / 256
+    (between, within), (even, odd), count, scale = turns, angles, np.uint64(256), 1.0 / 256
     for n in range(len(given)):
         row = out[n]
         apart(given, data, n, re, im)
-        if len(angle) > 0:
-            phase = angle[n]
+        if len(even) > 0:
+            sums, differences = even[n], odd[n]
+            for i in range(128):
+                c[128 + i], c[127 - i] = sums[i] + differences[i], sums[i] - differences[i]
             for i in range(count):
-                x, y = phasor(phase[i])
+                x, y = phasor(c[i])
                 c[i], s[i] = x * scale, y * scale
         else:
             turn, factor = between[n] * scale, within[n % len(within)]

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver import _oscillator, _turns
+from lowalt.effects.receiver import _oscillator, _toeplitz, _turns
 from lowalt.effects.waveform import Carried, Frame, turned
 
 SOURCE = (
@@ -80,11 +80,17 @@ def _locked(own: tuple, reference: tuple, loop_hz: float) -> tuple[tuple[float, 
 
 def phase(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
     """Return the drawn phase (N, M) in rad at every sample's instant; on a link that of two oscillators."""
+    return _toeplitz.joined(*_parts(settings, frame, rng))
+
+
+def _parts(settings: dict, frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The `_toeplitz.parts` of what `phase` returns."""
     points = disciplined(settings)
     look = (*frame.sent.shape, frame.network.symbol_interval_s, frame.sample_s)
-    if frame.station.transmitter is not None:
-        return _oscillator.phase(points, look, None, rng) - _oscillator.phase(points, look, None, rng)
-    return _oscillator.phase(points, look, frame.delay_s if settings["shared"] else None, rng)
+    if frame.station.transmitter is None:
+        return _oscillator.parts(points, look, frame.delay_s if settings["shared"] else None, rng)
+    one, other = (_oscillator.parts(points, look, None, rng) for _ in range(2))
+    return one[0] - other[0], one[1] - other[1]
 
 
 def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
@@ -112,7 +118,7 @@ def _retoned(
 ) -> np.ndarray:  # fmt: skip
     """The tones of `retoned`, or with `data` those of `retoned_responses`."""
     if frame.drawn is None:
-        return _turns.phased_tones(given, phase(settings, frame, rng), data)
+        return _turns.phased_tones(given, *_parts(settings, frame, rng), data)
     # Turns are kept for a look that is computed again.
     return _turns.tones(given, _ones(frame), _phasors(settings, frame, rng), data)
 
