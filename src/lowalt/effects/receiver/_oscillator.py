@@ -9,41 +9,18 @@ Source: D. B. Percival, A. T. Walden, Spectral Analysis for Univariate Time Seri
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
 from lowalt.common import normals
 from lowalt.common.draws import Draws
 from lowalt.effects.receiver import _toeplitz
-from lowalt.effects.receiver._oscillator_loops import weighed_lines
+from lowalt.effects.receiver._oscillator_grid import grid
+from lowalt.effects.receiver._oscillator_loops import halved_lines, range_correlated, weighed_lines
 from lowalt.effects.waveform import turned
-
-SPACING = 90
-"""Fewest samples from one symbol to the next; with fewer, the slow part would reach half the sample rate."""
 
 BLOCK = 64
 """Samples whose fast part is summed together."""
-
-
-class Grid(NamedTuple):
-    """Where a spectrum is taken and how phases follow from it; weights hold the windows and the widths (Hz)."""
-
-    slow_hz: np.ndarray
-    slow_weight: np.ndarray
-    """(J,) lines of the slow part."""
-    node_s: np.ndarray
-    blend: np.ndarray
-    """(Q,) s into a symbol where the slow part is taken, and (Q, M) polynomial that carries it to every sample."""
-    low_hz: np.ndarray
-    low_width: np.ndarray
-    low_weight: np.ndarray
-    low_cosine: np.ndarray
-    """(K,) nodes, evenly in log f, of the fast part's lower end, with their cosines at all lags (K, M)."""
-    high_hz: np.ndarray
-    high_weight: np.ndarray
-    """(H,) even nodes up to half the sample rate, for an inverse FFT."""
 
 
 def density(points: tuple, frequency_hz: np.ndarray) -> np.ndarray:
@@ -54,62 +31,6 @@ def density(points: tuple, frequency_hz: np.ndarray) -> np.ndarray:
     """
     offset, level = np.array(points, float).T
     return 10 ** (np.interp(np.log(frequency_hz), np.log(offset), level) / 10)
-
-
-def _above(frequency_hz: np.ndarray, edge_hz: float) -> np.ndarray:
-    """Window from 0 to 1 over the octave around `edge_hz`, smooth in log f."""
-    place = np.clip(np.log2(frequency_hz / edge_hz) + 0.5, 0.0, 1.0)
-    return place**3 * (10 + place * (6 * place - 15))
-
-
-@lru_cache(maxsize=8)
-def grid(symbols: int, subcarriers: int, interval_s: float, sample_s: float) -> Grid:
-    """Return the grid of a look of N symbols, `interval_s` apart, of M samples, `sample_s` apart.
-
-    Needs interval_s of at least SPACING samples.
-    """
-    useful_s, band_hz = subcarriers * sample_s, 1 / sample_s
-    slow_edge = 16 / interval_s
-    high_edge = max(min(8, subcarriers / 8) / useful_s, 2 * slow_edge)
-
-    step = 1 / (2 * symbols * interval_s)
-    slow_hz = step * np.arange(1, math.ceil(math.sqrt(2) * slow_edge / step))
-    slow_weight = step * (1 - _above(slow_hz, slow_edge))
-    # Chebyshev nodes of a tone of a radians to either side err by 2 (a / 2)^Q / Q!.
-    reach = math.pi * slow_hz[-1] * useful_s
-    nodes = next(q for q in range(4, 1000) if 2 * (reach / 2) ** q < 1e-9 * math.factorial(q))
-    roots = chebyshev.chebpts1(nodes)
-    place = 2 * (np.arange(subcarriers) + 0.5) / subcarriers - 1
-    vander = chebyshev.chebvander(roots, nodes - 1)
-    blend = np.linalg.solve(vander.T, chebyshev.chebvander(place, nodes - 1).T)
-    node_s = (roots + 1) / 2 * useful_s - 0.5 * sample_s
-
-    octave = max(64, math.ceil(8 * high_edge * useful_s))
-    count = math.ceil(octave * (1 + math.log2(high_edge / slow_edge)))
-    low_hz = slow_edge / math.sqrt(2) * 2 ** (np.arange(count) / octave)
-    low_width = low_hz * math.log(2) / octave
-    low_weight = 2 * low_width * _above(low_hz, slow_edge) * (1 - _above(low_hz, high_edge))
-    low_cosine = np.cos(2 * np.pi * sample_s * np.outer(low_hz, np.arange(subcarriers)))
-
-    period = subcarriers * math.ceil(max(8, 8 / (high_edge * useful_s)))
-    high_hz = np.arange(1, period // 2 + 1) * band_hz / period
-    high_weight = _above(high_hz, high_edge) * band_hz / period
-    return Grid(
-        slow_hz, slow_weight, node_s, blend, low_hz, low_width, low_weight, low_cosine, high_hz, high_weight
-    )  # fmt: skip
-
-
-def correlated(frequency_hz: np.ndarray, width_hz: np.ndarray | float, delay_s: float | None) -> np.ndarray | float:
-    """Return the factor on the density of phi(t) - phi(t - delay): 4 sin^2(pi f delay), mean over each node's width.
-
-    1 for delay None, an oscillator that is not shared. Source: M. C. Budge, M. P. Burt, Range
-    correlation effects on phase and amplitude noise, IEEE Southeastcon 1993.
-    """
-    if delay_s is None:
-        return 1.0
-    plain = 4 * np.sin(np.pi * frequency_hz * delay_s) ** 2
-    share = np.sinc(width_hz * delay_s)
-    return plain * share + 2 * (1 - share)
 
 
 @lru_cache(maxsize=4)
@@ -123,10 +44,15 @@ def covariance(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarra
     """Return the covariance (M,) in rad^2 of the fast part at lags 0 .. M - 1 samples; `at_key` as in `slow_phase`."""
     at = grid(*at_key)
     low, high = _weighted(points, at_key)
-    low = low * correlated(at.low_hz, at.low_width, delay_s)
-    high = high * correlated(at.high_hz, at.high_hz[0], delay_s)
-    period = 2 * len(high)
-    return low @ at.low_cosine + period * np.fft.irfft(np.append(0.0, high), period)[: at.low_cosine.shape[1]]
+    spectrum = np.zeros(len(high) + 1)
+    if delay_s is None:
+        spectrum[1:] = high
+    else:
+        low, given = np.empty(len(low)), low
+        range_correlated(given, at.low_hz, at.low_width, delay_s, low)
+        range_correlated(high, at.high_hz, at.high_width, delay_s, spectrum[1:])
+    fast = np.fft.irfft(spectrum, 2 * len(high), norm="forward")[: at.low_blend.shape[1]]
+    return low @ at.low_cosine @ at.low_blend + fast
 
 
 @lru_cache(maxsize=2)
@@ -137,14 +63,17 @@ def _lines(points: tuple, at_key: tuple) -> np.ndarray:
 
 
 @lru_cache(maxsize=4)
-def _twists(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """Turns of the lines up to each node of a symbol: (Q, K) for every 2 N lines, (Q, 2 N) for the lines between.
+def _waves(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
+    """Cosines and sines of lines from a symbol's middle to its later nodes: of every 2 N lines, and of those between.
 
-    Lines are evenly apart from zero frequency, so a line's turn is the product of two.
+    (Q, K), the sines behind the cosines, and none for a node in the middle; (2, ceil(Q / 2), 2 N), cosines and sines.
     """
     at, turns = grid(*at_key), 2 * at_key[0]
-    every = np.arange(len(at.slow_hz) // turns + 1) * turns
-    return tuple(turned(2 * np.pi * at.slow_hz[0] * np.outer(at.node_s, lines)) for lines in (every, np.arange(turns)))
+    later = 2 * np.pi * at.slow_hz[0] * at.node_s[len(at.node_s) // 2 :]
+    every = np.outer(later, np.arange(len(at.slow_hz) // turns + 1) * turns)
+    between = np.outer(later, np.arange(turns))
+    sines = np.sin(every[2 * len(later) - len(at.node_s) :])
+    return np.concatenate([np.cos(every), sines]), np.stack([np.cos(between), np.sin(between)])
 
 
 @lru_cache(maxsize=4)
@@ -176,37 +105,45 @@ def _weights(points: tuple, at_key: tuple, delay_s: float | None) -> list[np.nda
     return weights
 
 
-def _even_turns(step: float, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return sine and cosine (2, S) of every S-th multiple of step, and (2, S) of the first S, S^2 more than `count`.
+def _slow_at_nodes(
+    points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Return even (N, ceil(Q / 2)) and odd part (N, Q // 2) in rad of the slow part of a drawn phase, at the nodes.
 
-    Multiples of both kinds add up to each of step, ..., count step.
+    Numbers drawn for the lines are their amplitudes at the middle of the first symbol.
     """
-    side = math.isqrt(count) + 1
-    few, many = step * np.arange(side), step * side * np.arange(side)
-    return np.stack([np.sin(many), np.cos(many)]), np.stack([np.sin(few), np.cos(few)])
-
-
-def _slow_at_nodes(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
-    """Return the slow part (N, Q) in rad of a drawn phase, at the nodes of each symbol."""
-    at, symbols = grid(*at_key), at_key[0]
-    amplitude = _lines(points, at_key)
-    drawn = rng.standard_normal((len(amplitude), 2))
-    # Lines 2 N apart have equal phases at the symbols' starts: add them, then do one short transform a node.
-    every, between = _twists(at_key)
-    turns = 2 * symbols
-    lines = np.empty(every.shape[1] * turns, np.complex128)
-    if delay_s is None:
-        lines[0], lines[len(drawn) + 1 :] = 0.0, 0.0
-        lines[1 : len(drawn) + 1] = drawn.view(np.complex128)[:, 0] * amplitude
+    at, symbols, amplitude = grid(*at_key), at_key[0], _lines(points, at_key)
+    if isinstance(rng, Draws):
+        drawn = normals.circular(rng.words(2 * len(amplitude)))
     else:
-        weighed_lines(drawn, amplitude, *_even_turns(np.pi * at.slow_hz[0] * delay_s, len(amplitude)), lines)
-    folded = every @ lines.reshape(-1, turns) * between
-    return turns * np.fft.ifft(folded, axis=1)[:, :symbols].real.T
+        drawn = np.ascontiguousarray(rng.standard_normal((len(amplitude), 2)).T)
+    # Lines 2 N apart have equal phases at the symbols' middles: add them, then do one short transform a node.
+    every, between = _waves(at_key)
+    nodes, turns = len(every), 2 * symbols
+    lines = np.empty((every.shape[1], 2, turns))
+    step = None if delay_s is None else np.pi * at.slow_hz[0] * delay_s
+    weighed_lines(drawn, amplitude, *_delays(step, every.shape[1], turns), lines)
+    folded = (every @ lines.reshape(-1, 2 * turns)).reshape(nodes, 2, turns)
+    halves = np.empty((nodes, symbols + 1), np.complex128)
+    halved_lines(folded, between, halves)
+    found = np.fft.irfft(halves, turns, norm="forward")[:, :symbols].T
+    return found[:, : between.shape[1]], found[:, between.shape[1] :]
+
+
+def _delays(step: float | None, rows: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit phasors (R,) of every multiple of `turns` steps (rad) and (turns,) of the steps between.
+
+    The sine of a product's angle is half the factor on a line's amplitude; without a step, the factor is one.
+    """
+    if step is None:
+        return np.full(rows, 0.5j), np.ones(turns, np.complex128)
+    return turned(step * turns * np.arange(rows)), turned(step * np.arange(turns))
 
 
 def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
     """Return the slow part (N, M) in rad of a drawn phase; `at_key` are the arguments of `grid`."""
-    return _slow_at_nodes(points, at_key, delay_s, rng) @ grid(*at_key).blend
+    slow = _slow_at_nodes(points, at_key, delay_s, rng)
+    return _toeplitz.joined(*(nodes @ blend for nodes, blend in zip(slow, _blends(at_key), strict=True)))
 
 
 def _weighed(drawn: np.ndarray, weights: np.ndarray) -> np.ndarray:
@@ -224,7 +161,7 @@ def parts(
     points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return even (N, ceil(M / 2)) and odd part (N, M // 2) in rad of what `phase` returns (`_toeplitz.parts`)."""
-    slow = _toeplitz.parts(_slow_at_nodes(points, at_key, delay_s, rng))
+    slow = _slow_at_nodes(points, at_key, delay_s, rng)
     weights = _weights(points, at_key, delay_s)
     if len(weights[0]) == slow[0].shape[1]:
         return slow[0] @ weights[0], slow[1] @ weights[1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.effects.checks import CheckedScene
-from lowalt.effects.receiver import _oscillator, _toeplitz, _turns
+from lowalt.effects.receiver import _oscillator, _oscillator_grid, _toeplitz, _turns
 from lowalt.effects.waveform import Carried, Frame, turned
 
 SOURCE = (
@@ -46,10 +46,10 @@ def check(settings: dict, scene: CheckedScene) -> None:
             raise InputError(f"effects.phase_noise.{key}: offsets {offsets}, expected positive and rising (Hz)")
     network = scene.network
     band = network.subcarriers * network.subcarrier_spacing_hz
-    if network.symbol_interval_s * band < _oscillator.SPACING:
+    if network.symbol_interval_s * band < _oscillator_grid.SPACING:
         raise InputError(
             f"effects.phase_noise: network.symbol_interval_s is {network.symbol_interval_s:g}, expected at least "
-            f"{_oscillator.SPACING} samples of 1 / (M df), {_oscillator.SPACING / band:g}"
+            f"{_oscillator_grid.SPACING} samples of 1 / (M df), {_oscillator_grid.SPACING / band:g}"
         )
 
 
