@@ -30,6 +30,21 @@ def phasor(angle):
     return c, s * turn
 
 
+SMALL = 0.375
+"""Largest angle (rad) of `small_phasor`."""
+# 1 / k!, whose series leave out less than 2e-17 of cosine and sine up to SMALL.
+_F2, _F3, _F4, _F5, _F6, _F7, _F8, _F9, _F10, _F11, _F12, _F13 = (1.0 / math.factorial(k) for k in range(2, 14))
+
+
+@INSIDE
+def small_phasor(angle):
+    """Cosine and sine of an angle (rad) of at most SMALL to either side of zero, in less than half of the time."""
+    z = angle * angle
+    c = 1.0 - z * (_F2 - z * (_F4 - z * (_F6 - z * (_F8 - z * (_F10 - z * _F12)))))
+    s = 1.0 - z * (_F3 - z * (_F5 - z * (_F7 - z * (_F9 - z * (_F11 - z * _F13)))))
+    return c, s * angle
+
+
 @LOOPS
 def phasors(angle, out):
     """Fill out (K,) complex128 with exp(j angle), angle (K,) rad."""

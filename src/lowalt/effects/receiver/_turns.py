@@ -6,10 +6,10 @@ carry them, which are not.
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.common.jit import INLINED, LEAN
 from lowalt.common.memory import aligned
 from lowalt.effects import transforms, waveform
-from lowalt.effects.phasors import phasor
+from lowalt.effects.phasors import SMALL, phasor, small_phasor
 from lowalt.effects.receiver import _toeplitz
 from lowalt.effects.tone_loops import apart
 from lowalt.effects.transform_loops import transformed
@@ -70,6 +70,17 @@ def _turned(given, between, within, out):
             new[i] = complex(x * c - y * s, x * s + y * c)
 
 
+@INLINED
+def _joined(even, odd, out):
+    """Fill out (256,) with the angles (rad) of even and odd part (128,) and return whether all are small."""
+    large = np.int64(0)
+    for i in range(128):
+        later, earlier = even[i] + odd[i], even[i] - odd[i]
+        out[128 + i], out[127 - i] = later, earlier
+        large += np.int64(max(abs(later), abs(earlier)) > SMALL)
+    return large == 0
+
+
 @LEAN
 def _turned_tones(given, data, turns, angles, table, work, out):
     """Turn the samples of given (N, 256) as `_turned` does, or by angles (rad) where these have rows.
@@ -84,12 +95,14 @@ def _turned_tones(given, data, turns, angles, table, work, out):
         row = out[n]
         apart(given, data, n, re, im)
         if len(even) > 0:
-            sums, differences = even[n], odd[n]
-            for i in range(128):
-                c[128 + i], c[127 - i] = sums[i] + differences[i], sums[i] - differences[i]
-            for i in range(count):
-                x, y = phasor(c[i])
-                c[i], s[i] = x * scale, y * scale
+            if _joined(even[n], odd[n], c):
+                for i in range(count):
+                    x, y = small_phasor(c[i])
+                    c[i], s[i] = x * scale, y * scale
+            else:
+                for i in range(count):
+                    x, y = phasor(c[i])
+                    c[i], s[i] = x * scale, y * scale
         else:
             turn, factor = between[n] * scale, within[n % len(within)]
             for i in range(count):

@@ -84,7 +84,12 @@ def phase(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
 
 
 def _parts(settings: dict, frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """The `_toeplitz.parts` of what `phase` returns."""
+    """The `_toeplitz.parts` of what `phase` returns, kept for a look that is computed again."""
+    return frame.once("phase_noise", lambda: _drawn(settings, frame, rng))
+
+
+def _drawn(settings: dict, frame: Frame, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """The parts of `_parts`, drawn."""
     points = disciplined(settings)
     look = (*frame.sent.shape, frame.network.symbol_interval_s, frame.sample_s)
     if frame.station.transmitter is None:
@@ -100,7 +105,7 @@ def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Ge
     the target's reference point; all echoes are taken to have it. Noise beyond half the sample rate is filtered out.
     Source: Petrovic et al. 2007 (within a symbol); Budge and Burt 1993 (range correlation).
     """
-    return _turns.samples(samples, _ones(frame), _phasors(settings, frame, rng))
+    return _turns.samples(samples, np.ones(len(samples), np.complex128), turned(phase(settings, frame, rng)))
 
 
 def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
@@ -117,17 +122,4 @@ def _retoned(
     settings: dict, given: np.ndarray, data: np.ndarray | None, frame: Frame, rng: np.random.Generator
 ) -> np.ndarray:  # fmt: skip
     """The tones of `retoned`, or with `data` those of `retoned_responses`."""
-    if frame.drawn is None:
-        return _turns.phased_tones(given, *_parts(settings, frame, rng), data)
-    # Turns are kept for a look that is computed again.
-    return _turns.tones(given, _ones(frame), _phasors(settings, frame, rng), data)
-
-
-def _ones(frame: Frame) -> np.ndarray:
-    """Turns (N,) at the symbols' starts: none."""
-    return np.ones(len(frame.sent), np.complex128)
-
-
-def _phasors(settings: dict, frame: Frame, rng: np.random.Generator) -> np.ndarray:
-    """The turn (N, M) of every sample."""
-    return frame.once("phase_noise", lambda: turned(phase(settings, frame, rng)))
+    return _turns.phased_tones(given, *_parts(settings, frame, rng), data)
