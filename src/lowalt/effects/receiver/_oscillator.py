@@ -8,6 +8,7 @@ Source: D. B. Percival, A. T. Walden, Spectral Analysis for Univariate Time Seri
 """
 
 import math
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -33,33 +34,42 @@ def density(points: tuple, frequency_hz: np.ndarray) -> np.ndarray:
     return 10 ** (np.interp(np.log(frequency_hz), np.log(offset), level) / 10)
 
 
+@dataclass(frozen=True, eq=False)
+class _Amounts:
+    """What a spectrum amounts to on a grid; told apart by identity, since points are many numbers to compare."""
+
+    low: np.ndarray
+    high: np.ndarray
+    """(K,), (H,) rad^2, the density at the fast part's nodes times their weights."""
+    lines: np.ndarray
+    """(J,) rad, amplitudes of the slow part's lines."""
+
+
 @lru_cache(maxsize=4)
-def _weighted(points: tuple, at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
-    """The density at the fast part's nodes, low and high, times their weights."""
+def _amounts(points: tuple, at_key: tuple) -> _Amounts:
+    """The amounts of a spectrum on `grid(*at_key)`."""
     at = grid(*at_key)
-    return density(points, at.low_hz) * at.low_weight, density(points, at.high_hz) * at.high_weight
+    low, high = density(points, at.low_hz) * at.low_weight, density(points, at.high_hz) * at.high_weight
+    return _Amounts(low, high, np.sqrt(2 * density(points, at.slow_hz) * at.slow_weight))
 
 
 def covariance(points: tuple, at_key: tuple, delay_s: float | None) -> np.ndarray:
     """Return the covariance (M,) in rad^2 of the fast part at lags 0 .. M - 1 samples; `at_key` as in `slow_phase`."""
-    at = grid(*at_key)
-    low, high = _weighted(points, at_key)
+    return _covariance(_amounts(points, at_key), at_key, delay_s)
+
+
+def _covariance(amounts: _Amounts, at_key: tuple, delay_s: float | None) -> np.ndarray:
+    """The result of `covariance`."""
+    at, low, high = grid(*at_key), amounts.low, amounts.high
     spectrum = np.zeros(len(high) + 1)
     if delay_s is None:
         spectrum[1:] = high
     else:
-        low, given = np.empty(len(low)), low
-        range_correlated(given, at.low_hz, at.low_width, delay_s, low)
+        low = np.empty(len(low))
+        range_correlated(amounts.low, at.low_hz, at.low_width, delay_s, low)
         range_correlated(high, at.high_hz, at.high_width, delay_s, spectrum[1:])
     fast = np.fft.irfft(spectrum, 2 * len(high), norm="forward")[: at.low_blend.shape[1]]
     return low @ at.low_cosine @ at.low_blend + fast
-
-
-@lru_cache(maxsize=2)
-def _lines(points: tuple, at_key: tuple) -> np.ndarray:
-    """Amplitudes (J,) in rad of the slow part's lines."""
-    at = grid(*at_key)
-    return np.sqrt(2 * density(points, at.slow_hz) * at.slow_weight)
 
 
 @lru_cache(maxsize=4)
@@ -88,35 +98,34 @@ def _blends(at_key: tuple) -> tuple[np.ndarray, np.ndarray]:
 
 
 @lru_cache(maxsize=4)
-def _weights(points: tuple, at_key: tuple, delay_s: float | None) -> list[np.ndarray]:
+def _weights(amounts: _Amounts, at_key: tuple, delay_s: float | None) -> list[np.ndarray]:
     """Rows that drawn numbers weigh, of the even part (:, ceil(M / 2)) and of the odd part (:, M // 2).
 
-    Those of `_blends` come first, then a square root of the fast part's covariance; where it is zero, there is none.
+    Those of `_blends` come first, then a square root of the fast part's covariance.
     """
-    blends, lags = _blends(at_key), covariance(points, at_key, delay_s)
-    if lags[0] <= 0:
-        return list(blends)
-    # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
-    lags[0] *= 1 + 4 * np.finfo(float).eps * len(lags) ** 2
+    blends, lags = _blends(at_key), _covariance(amounts, at_key, delay_s)
     weights = [np.empty((sum(blend.shape), blend.shape[1])) for blend in blends]
     for rows, blend in zip(weights, blends, strict=True):
         rows[: len(blend)] = blend
-    _toeplitz.roots(lags, *(rows[len(blend) :] for rows, blend in zip(weights, blends, strict=True)))
+    even, odd = (rows[len(blend) :] for rows, blend in zip(weights, blends, strict=True))
+    if lags[0] > 0:
+        # A noise floor far below that of any oscillator keeps the matrix positive definite where a spectrum has none.
+        lags[0] *= 1 + 4 * np.finfo(float).eps * len(lags) ** 2
+        _toeplitz.roots(lags, even, odd)
+    else:
+        even[:], odd[:] = 0.0, 0.0
     return weights
 
 
 def _slow_at_nodes(
-    points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator
+    amplitude: np.ndarray, at_key: tuple, delay_s: float | None, drawn: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return even (N, ceil(Q / 2)) and odd part (N, Q // 2) in rad of the slow part of a drawn phase, at the nodes.
 
-    Numbers drawn for the lines are their amplitudes at the middle of the first symbol.
+    amplitude (J,) rad of the lines; drawn (2, J): real and imaginary parts of the lines, over their amplitudes, at the
+    middle of the first symbol.
     """
-    at, symbols, amplitude = grid(*at_key), at_key[0], _lines(points, at_key)
-    if isinstance(rng, Draws):
-        drawn = normals.circular(rng.words(2 * len(amplitude)))
-    else:
-        drawn = np.ascontiguousarray(rng.standard_normal((len(amplitude), 2)).T)
+    at, symbols = grid(*at_key), at_key[0]
     # Lines 2 N apart have equal phases at the symbols' middles: add them, then do one short transform a node.
     every, between = _waves(at_key)
     nodes, turns = len(every), 2 * symbols
@@ -142,7 +151,8 @@ def _delays(step: float | None, rows: int, turns: int) -> tuple[np.ndarray, np.n
 
 def slow_phase(points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator) -> np.ndarray:
     """Return the slow part (N, M) in rad of a drawn phase; `at_key` are the arguments of `grid`."""
-    slow = _slow_at_nodes(points, at_key, delay_s, rng)
+    amplitude = _amounts(points, at_key).lines
+    slow = _slow_at_nodes(amplitude, at_key, delay_s, np.array(rng.standard_normal((len(amplitude), 2)).T, order="C"))
     return _toeplitz.joined(*(nodes @ blend for nodes, blend in zip(slow, _blends(at_key), strict=True)))
 
 
@@ -161,20 +171,22 @@ def parts(
     points: tuple, at_key: tuple, delay_s: float | None, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return even (N, ceil(M / 2)) and odd part (N, M // 2) in rad of what `phase` returns (`_toeplitz.parts`)."""
-    slow = _slow_at_nodes(points, at_key, delay_s, rng)
-    weights = _weights(points, at_key, delay_s)
-    if len(weights[0]) == slow[0].shape[1]:
-        return slow[0] @ weights[0], slow[1] @ weights[1]
-    even, odd = drawn = [np.empty((len(slow[0]), len(rows))) for rows in weights]
-    for numbers, nodes in zip(drawn, slow, strict=True):
-        numbers[:, : nodes.shape[1]] = nodes
-    shape = at_key[:2]
+    amounts, shape = _amounts(points, at_key), at_key[:2]
+    weights, amplitude = _weights(amounts, at_key, delay_s), amounts.lines
+    even, odd = drawn = [np.empty((shape[0], len(rows))) for rows in weights]
+    first = len(even[0]) - weights[0].shape[1], len(odd[0]) - weights[1].shape[1]
     if isinstance(rng, Draws) and shape[1] % 2 == 0:
-        normals.apart(rng.words(math.prod(shape)), even, odd)
+        # All words at once, and each part of the numbers where it is asked for.
+        words = rng.words(2 * len(amplitude) + math.prod(shape))
+        lines = normals.circular(words[: 2 * len(amplitude)])
+        normals.apart(words[2 * len(amplitude) :], even, odd)
     else:
+        lines = np.array(rng.standard_normal((len(amplitude), 2)).T, order="C")
         numbers = rng.standard_normal(shape)
-        even[:, slow[0].shape[1] :], odd[:, slow[1].shape[1] :] = numbers[:, ::2], numbers[:, 1::2]
-    # Both parts are products of drawn numbers and rows of samples, so one product adds slow and fast part.
+        even[:, first[0] :], odd[:, first[1] :] = numbers[:, ::2], numbers[:, 1::2]
+    for numbers, nodes in zip(drawn, _slow_at_nodes(amplitude, at_key, delay_s, lines), strict=True):
+        numbers[:, : nodes.shape[1]] = nodes
+    # Slow and fast part are products of drawn numbers and rows of samples, so one product adds them.
     return _weighed(even, weights[0]), _weighed(odd, weights[1])
 
 
