@@ -111,9 +111,9 @@ def _resampled(
     early = -rate / (1 + rate)
     count, baseband = given.shape[1], np.fft.ifftshift(frame.baseband_hz)
     middle = count // 2
-    at_middle = turned(2 * np.pi * early * middle * frame.sample_s * baseband)
-    turns = _turns(len(given), early * frame.network.symbol_interval_s * baseband, at_middle)
-    weights, columns = _series(2 * np.pi * early * frame.sample_s * baseband, np.arange(count) - middle)
+    rates = 2 * np.pi * early * baseband
+    turns = _turns(len(given), frame.network.symbol_interval_s, middle * frame.sample_s, rates)
+    weights, columns = _series(frame.sample_s * rates, np.arange(count) - middle)
     if count == transforms.LENGTH:
         columns /= count
         out = given if data is None else np.empty(given.shape, np.complex128)
@@ -144,14 +144,14 @@ def _series(rates: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.array(weights), np.array(columns)
 
 
-def _turns(symbols: int, turns: np.ndarray, first: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (K, M) and (S, M) whose products at the quotient and the rest of n over S are first exp(j 2 pi n turns).
+def _turns(symbols: int, interval_s: float, first_s: float, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return unit phasors (K, M) and (S, M) whose products, at quotient and rest of n over S, are those of symbol n.
 
-    first, turns: (M,), of symbols n from 0 on.
+    They turn by rates (M,), rad/s, from time 0 to first_s + n interval_s, for symbols n from 0 on.
     """
     step = math.isqrt(symbols) + 1
-    fine = turned(2 * np.pi * np.outer(np.arange(step), turns)) * first
-    return turned(2 * np.pi * np.outer(np.arange(0, symbols, step), turns)), fine
+    coarse, fine = interval_s * np.arange(0, symbols, step), first_s + interval_s * np.arange(step)
+    return turned(np.outer(coarse, rates)), turned(np.outer(fine, rates))
 
 
 @LEAN
