@@ -7,7 +7,7 @@ scene names: no waveform without a receiver effect, no frequency response where 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,8 +19,9 @@ from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.effects import need, sent_alone
-from lowalt.effects.catalogue import BY_NEED, LOOK_WIDE, PAIR_WIDE, NamedEffect, placed, providing
+from lowalt.effects.catalogue import BY_NEED, NamedEffect, placed, providing
 from lowalt.effects.chain import EXACT, Chain
+from lowalt.effects.effect_streams import drawn
 from lowalt.effects.interface import (
     AddsEchoes,
     AddsPaths,
@@ -33,6 +34,7 @@ from lowalt.effects.interface import (
 )
 from lowalt.effects.need import Decision
 from lowalt.effects.outcome import Outcome, largest_of
+from lowalt.effects.receiving import DrawsNothing
 from lowalt.effects.steps import SHARE, error_before, steps_alone
 from lowalt.effects.target_echo import TargetEcho
 from lowalt.effects.view import View
@@ -52,6 +54,11 @@ class Scene:
     seed: int
     tolerance: float | None
     effects: tuple[NamedEffect, ...]
+
+    @cached_property
+    def still(self) -> frozenset[str]:
+        """Names of the effects that draw nothing."""
+        return frozenset(effect.name for effect in providing(self.effects, DrawsNothing))
 
     def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
         """Return the stream of an effect for the motion model `row`, from its start at every call."""
@@ -105,7 +112,7 @@ def received_signal(
         own = echo_signal(scene.network, station, view.motion, cloud.rcs_m2, view.aim_m, share, sample=sample)
         return Received(own.signal, own.cell, arriving(own.signal), [])
     keep_freed_arrays()
-    chain = Chain(beyond, view, partial(_drawn, scene, row, station))
+    chain = Chain(beyond, view, partial(drawn, scene, row, station))
     # Bounds and the engine are those of a station that receives its own signal. Where no physics can be left out, one
     # exact run takes less time than finding out what error is allowed.
     exact = share is None or not asked or math.isinf(chain.amplification) or link
@@ -175,23 +182,9 @@ def others(scene: Scene, chain: Chain, cloud: Cloud, row: dict, clouds: Mapping[
             seen = observe(scene, view.station, own, at, view.occluders if given is cloud else None)
             beams = {end.name: view.beams_of(end) for end in _ends(scene.network, view.station)}
             seen = replace(seen, times_s=view.times_s, sampling=view.sampling, beams=beams)
-            draws = partial(_drawn, scene, at, view.station)
+            draws = partial(drawn, scene, at, view.station)
             result.append(TargetEcho(mine, seen, draws, chain.sending))
     return result
-
-
-def _drawn(scene: Scene, row: dict, station: Station, name: str, end: Station | None = None) -> np.random.Generator:
-    """Return an effect's stream: one for all stations if its draws belong to the whole look, else one a station.
-
-    Both directions of a link share the stream of an effect whose draws belong to the pair. end: the station whose
-    stream is asked for, None for `station`.
-    """
-    station = end or station
-    if name in LOOK_WIDE:
-        return scene.stream(name, row)
-    if name in PAIR_WIDE and station.transmitter is not None:
-        return scene.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
-    return scene.stream(name, row, station.name)
 
 
 def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:

@@ -193,7 +193,7 @@ class TargetEcho:
 
         dark: points (N, L) whose factor does not matter, None for no such.
         """
-        if dark is not None and isinstance(effect.module, SkipsDarkPoints):
+        if dark is not None and providing([effect], SkipsDarkPoints):
             return effect.module.visible_of(effect.settings, view, dark)
         if view is self.view and effect.name in self._seen:
             return self._seen[effect.name]

@@ -26,6 +26,7 @@ SOURCE = (
     "IEEE 53(8), 1965; blade flash: Chen, The Micro-Doppler Effect in Radar, 2011, chapter 3"
 )
 DEFAULTS = {"strength": 1.0, "power": 1.0, "blades": "facet"}
+DRAWS_NOTHING = True
 
 _FACETS = KeptByArrays()
 """Points and facets of the blades of each target."""

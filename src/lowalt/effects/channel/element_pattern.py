@@ -10,6 +10,7 @@ from lowalt.effects.view import View
 
 SOURCE = "3GPP TR 38.901, section 7.3, Table 7.3-1 (element of 8 dBi, 65 degrees wide, 30 dB front to back)"
 DEFAULTS = Element()._asdict()
+DRAWS_NOTHING = True
 
 
 def idle(settings: dict) -> bool:

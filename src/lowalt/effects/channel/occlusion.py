@@ -24,6 +24,7 @@ SOURCE = (
     "rays and triangles: Moeller & Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2, 1997"
 )
 DEFAULTS = {"strength": 1.0, "blades": "bent"}
+DRAWS_NOTHING = True
 
 _BLADES = KeptByArrays()
 """Widths and radii of the blades of each target."""

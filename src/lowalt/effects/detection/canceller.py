@@ -16,6 +16,7 @@ SOURCE = (
     "noise gain); M. I. Skolnik, Radar Handbook, 3rd ed. 2008, ch. 2 (recursive MTI filters)"
 )
 DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95}
+DRAWS_NOTHING = True
 ALONG_SYMBOLS = True
 """Every cell is filtered alike, so responses are too (`chain.FiltersSymbols`)."""
 

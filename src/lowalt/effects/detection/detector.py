@@ -23,6 +23,7 @@ DEFAULTS = {
     "cfar": "ca", "false_alarm": 1e-3, "guard": 2, "training": 16, "rank": 0.75, "gate_cells": 3, "acquire": 32,
     "gain": 0.1,
 }  # fmt: skip
+DRAWS_NOTHING = True
 
 
 def idle(settings: dict) -> bool:
