@@ -7,8 +7,9 @@ import pytest
 
 import reference_effects
 from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import moment_loops, response_tables, spread_loops
-from lowalt.effects.response import OneWayFactors, response
+from lowalt.effects.response import ImagePath, OneWayFactors, response
 from test_effects import network
 
 
@@ -81,6 +82,54 @@ def test_spans_hold_every_range_and_little_more(squint, away_m, spread_m):
     assert truth <= longest < truth + 0.5 + 9.0 * (away_m[0] < 50) if squint else longest == 0.0
     if away_m[0] > 50 and spread_m > 0.1:
         assert (high - low <= 1.05 * np.ptp(excess, axis=1)).all()
+
+
+@pytest.mark.parametrize("wavefront", [False, True])
+@pytest.mark.parametrize("away_m", [(300.0, 20.0, 15.0), (60.0, 200.0, -10.0), (0.5, 0.2, 0.1)])
+@pytest.mark.parametrize("moved_m", [0.0, 0.2])
+def test_no_element_has_a_longer_path_than_the_bound_and_most_bounds_are_near(wavefront, away_m, moved_m):
+    shape, rng = (16, 4), np.random.default_rng(4)
+    radio = network(transmit=shape, receive=shape)
+    station, places = radio.stations[0], places_of(rng, away_m, spread_m=0.3)
+    given = radio, station, places, np.array([60.0, 25.0, 30.0])
+    rays = OneWayFactors(*given, squint=True, wavefront=False, error=1e-6)
+    bound = rays.direct.longest(shape, wavefront, moved_m)
+    step = rng.normal(size=places.shape)
+    later = places + moved_m * step / np.linalg.norm(step, axis=2, keepdims=True)
+    spacing = SPEED_OF_LIGHT / (2 * radio.carrier_hz)
+    across, up = np.meshgrid(np.arange(16) - 7.5, np.arange(4) - 1.5, indexing="ij")
+    offsets = spacing * (across[..., None] * np.array(station.horizontal) + up[..., None] * [0.0, 0.0, 1.0])
+    corner = np.array(station.position_m)
+    middle = corner - offsets[0, 0]
+    paths = []
+    for here in (places, later):
+        if wavefront:
+            ways = np.linalg.norm(here[..., None, None, :] - middle - offsets, axis=-1)
+            ways = ways - np.linalg.norm(here - middle, axis=-1)[..., None, None]
+        else:
+            toward = (here - corner) / np.linalg.norm(here - corner, axis=-1, keepdims=True)
+            ways = -np.einsum("nli,abi->nlab", toward, offsets)
+        paths.append(abs(ways).max() / spacing)
+    half = response_tables.half_diagonal(shape)
+    assert max(paths) <= bound <= half
+    if away_m[0] > 1:
+        assert bound < 1.03 * paths[0] + 0.02 * half and bound < 0.9 * half
+
+
+@pytest.mark.parametrize("wavefront", [False, True])
+def test_frequencies_follow_from_the_directions_to_all_paths(wavefront):
+    radio, rng = network(transmit=(16, 4), receive=(16, 4), subcarriers=64), np.random.default_rng(5)
+    ahead = np.array([np.cos(radio.stations[0].normal_rad), np.sin(radio.stations[0].normal_rad), 0.0])
+    side, counts = np.array(radio.stations[0].horizontal), []
+    for toward in (ahead, side):
+        places = np.array([0.0, 0.0, 10.0]) + 300.0 * ahead + rng.uniform(-0.5, 0.5, (3, 9, 3))
+        image = np.array([0.0, 0.0, 10.0]) + 300.0 * toward + rng.uniform(-0.5, 0.5, (3, 9, 3))
+        given = radio, radio.stations[0], places, np.array([60.0, 25.0, 30.0]), [ImagePath(image)]
+        asked = {"squint": True, "wavefront": wavefront, "error": 1e-6}
+        counts.append(len(OneWayFactors(*given, **asked).nodes))
+        later = OneWayFactors(*given, **asked, farther_m=1.0)
+        assert len(OneWayFactors(*given, **asked, farther_m=1.0, like=later).nodes) == len(later.nodes)
+    assert counts[0] < counts[1]
 
 
 @pytest.mark.parametrize("point", [0, 7, 18])

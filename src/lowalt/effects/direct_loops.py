@@ -47,6 +47,26 @@ def spans(places, refs, origin, half_m, low, high, turn):
         high[n] = (e if near else most + away / (2.0 * (r + least))) + room
 
 
+@ORDERED
+def slants(places, station, axes, wide, tall):
+    """Return the largest of (wide |side| + tall |up|)^2 / r^2 over places (N, 3, L), and the least r^2 (m^2).
+
+    axes: as in `response_loops.one_way`; side, up: a place's coordinates along the array as seen from the station, r
+    its range. A place in the station counts as none.
+    """
+    sine, cosine = axes
+    s0, s1, s2 = station[0], station[1], station[2]
+    most, least = 0.0, np.inf
+    for n in range(len(places)):
+        x, y, z = places[n, 0], places[n, 1], places[n, 2]
+        for i in range(np.uint64(places.shape[2])):
+            across, along, up = x[i] - s0, y[i] - s1, z[i] - s2
+            square = across * across + along * along + up * up
+            slant = wide * abs(cosine * along - sine * across) + tall * abs(up)
+            most, least = max(most, slant * slant / max(square, 1e-300)), min(least, square)
+    return most, least
+
+
 PLACES = 14
 """Row of work space of `moments` in which the points' places begin."""
 ROWS = 20

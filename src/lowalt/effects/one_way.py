@@ -142,6 +142,22 @@ class PathFactors:
         longest = np.nan_to_num(longest, nan=np.inf).max()
         return low - ahead, high - ahead, float(min(longest, tables.half_diagonal(shape)))
 
+    def longest(self, shape: tuple[int, int], wavefront: bool, moved_m: float) -> float:
+        """Return a bound of how much longer an element's path to a point is than the middle's, in spacings.
+
+        moved_m: how far points move at most from where they are. Paths to an element at e from the middle differ by
+        -e u, where the direction u changes by at most 2 `moved_m` / r. A spherical wave's direction to any place of the
+        array differs from that to its corner by at most 2 d / r, d the array's diagonal.
+        """
+        spacing, half = SPEED_OF_LIGHT / (2 * self.network.carrier_hz), tables.half_diagonal(shape)
+        wide, tall = 0.5 * (shape[0] - 1), 0.5 * (shape[1] - 1)
+        most, least = direct_loops.slants(self._planes, *self._axes, wide, tall)
+        room = np.sqrt(least) - moved_m
+        if not room > 0.0:
+            return half
+        turn = 2.0 * moved_m + (4.0 * half * spacing if wavefront else 0.0)
+        return min(half, (1.0 + 1e-12) * float(np.sqrt(most) + half * turn / room))
+
     def moments(
         self, shape: tuple[int, int], kappas: np.ndarray, squint: bool, strength: np.ndarray, middle: np.ndarray,
         half_cells: float, reach: float, result: np.ndarray,

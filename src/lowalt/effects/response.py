@@ -87,18 +87,24 @@ class OneWayFactors:
         self.pairs = _pairs(len(chosen), symmetric)
         self.direct = chosen[0] if once and symmetric and not paths and not wavefront else None
         if self.direct is not None:
-            self.out, self.back, longest = [], [], None
+            self.out, self.back = [], []
             if like is None:
                 *ends, longest = self.direct.spans(network.transmit, squint)
+                if squint and farther_m > 0.0:
+                    longest = self.direct.longest(network.transmit, False, farther_m)
                 self.frames = self._frame(*ends)
+                self.nodes = tables.frequencies(network, radio, squint, error / 2, longest)
             else:
-                self.frames = like.frames
-            # Instants that share moments share frequencies, and their points are elsewhere.
-            longest = longest if like is None and farther_m == 0.0 else None
-            self.nodes = tables.frequencies(network, radio, squint, error / 2, longest)
+                self.frames, self.nodes = like.frames, like.nodes
             self.asked = network.transmit, self.nodes, squint
             return
-        self.nodes = kappas = tables.frequencies(network, radio, squint, error / 2)
+        longest = None
+        # Polynomials are kept for equal frequencies, so instants that share them without `like` need the same.
+        if squint and symmetric and like is None and (kept is None or farther_m > 0.0):
+            # Instants that are alike differ by less than `farther_m`, in places as in ranges.
+            longest = max(path.longest(network.transmit, wavefront, farther_m) for path in chosen)
+        self.nodes = like.nodes if like else tables.frequencies(network, radio, squint, error / 2, longest)
+        kappas = self.nodes
         asked = kappas, squint, wavefront, self.rest
         self.out = [
             path.one_way(network.transmit, *asked, _own(kept, "out", number), instant)
