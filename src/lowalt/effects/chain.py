@@ -3,13 +3,13 @@
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from lowalt.effects import need, strongest_cell, waveform
+from lowalt.effects import detecting, strongest_cell, waveform
 from lowalt.effects.catalogue import ON_ALL_ECHOES, NamedEffect, placed, providing
-from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, ChoosesCells, FiltersCells, SamplesTime
+from lowalt.effects.detecting import FiltersSymbols
+from lowalt.effects.interface import AddsEchoes, AddsSignals, Amplifies, SamplesTime
 from lowalt.effects.listening import Listening
 from lowalt.effects.outcome import Outcome
 from lowalt.effects.receiving import Heard, Receiving
@@ -19,13 +19,6 @@ from lowalt.effects.view import View
 
 COARSEST = 0.1
 """Largest error of interpolation, relative to the sum of peak amplitudes."""
-
-
-@runtime_checkable
-class FiltersSymbols(Protocol):
-    """Optional, detection: a filter over symbols, alike in all cells, that does to responses what it does to cells."""
-
-    ALONG_SYMBOLS: bool
 
 
 class Chain:
@@ -131,14 +124,16 @@ class Chain:
                 spectrum = spectrum if one is None else spectrum + one[rows]
         if plain:
             return Heard(spectrum, noise=noise)
-        spectrum = spectrum if noise is None else spectrum + noise.response
+        if noise is not None:
+            # Only the arrays of `_moving` are its own and may be overwritten.
+            spectrum = np.add(spectrum, noise.response, out=None if samples is None else spectrum)
         if samples is None and self._unknown is None:
             spectrum, left = self.receiving.responded(spectrum, left)
             done = not left and not self.sending.distorts
             return Heard(spectrum) if done else self.receiving.aired(spectrum, left, rows)
         heard = waveform.transmit(spectrum, self.sending.aired[rows])
         for one in (samples, None if self._unknown is None else self._unknown[rows]):
-            heard = heard if one is None else heard + one
+            heard = heard if one is None else np.add(heard, one, out=heard)
         return self.receiving.sampled(heard, left, rows)
 
     def _moving(
@@ -150,7 +145,7 @@ class Chain:
             samples += other.own_samples[rows]
         if self._clutter is not None:
             cut = self.target.by_need["cyclic_prefix"] if "cyclic_prefix" in on else None
-            samples = samples + self._still(cut)[rows]
+            samples += self._still(cut)[rows]
         return still, samples
 
     @property
@@ -169,12 +164,8 @@ class Chain:
         cells = heard.cells(self.sending)
         if self.timing is not None:
             cells = cells[self.view.sampling.present]
-        for effect in providing(self.detection, FiltersCells):
-            cells = effect.module.process(effect.settings, cells, self.receiving.bare, self.draws(effect.name))
-        size = abs(cells)
-        best, lead = size.argmax(axis=1), need.gap(size) if leads else np.full(len(cells), np.nan)
-        for effect in providing(self.detection, ChoosesCells):
-            best = effect.module.choose(effect.settings, best, cells, self.draws(effect.name))
+        cells = detecting.filtered(self.detection, cells, self.receiving.bare, self.draws)
+        best, lead = detecting.chosen(self.detection, cells, self.draws, leads)
         outcome = Outcome(cells[np.arange(len(cells)), best], best, lead)
         return outcome if self.timing is None else self._evenly(outcome)
 
@@ -182,9 +173,7 @@ class Chain:
         """The strongest range cells of what is heard, behind filters over symbols; of the direct echo they are kept."""
         if self.detection or self.timing is not None:
             responses = heard.responses if self.timing is None else heard.responses[self.view.sampling.present]
-            for effect in self.detection:
-                draws = self.draws(effect.name)
-                responses = effect.module.process(effect.settings, responses, self.receiving.bare, draws)
+            responses = detecting.filtered(self.detection, responses, self.receiving.bare, self.draws)
             return strongest_cell.strongest(responses)
         if heard.noise is None and heard.given is self.target.__dict__.get("direct"):
             return self.target.strongest

@@ -5,7 +5,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.optimize import brentq
 
-from lowalt.common.jit import kernel
+from lowalt.common.jit import LEAN, kernel
 
 LOOPS = kernel(error_model="numpy")
 
@@ -83,3 +83,12 @@ def follow(power, start, gate, gain, scale, guard, training, rank, chosen, found
             off -= count * np.floor(off / count + 0.5)
             place += gain * off
             rate += second * off
+
+
+@LEAN
+def powers(cells, out):
+    """Fill out (N, M) with the power |Y|^2 of range cells (N, M) complex."""
+    for n in range(len(cells)):
+        given, row = cells[n], out[n]
+        for m in range(np.uint64(len(row))):
+            row[m] = given[m].real * given[m].real + given[m].imag * given[m].imag

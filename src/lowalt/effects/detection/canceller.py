@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from lowalt.common.jit import LEAN
 from lowalt.effects.waveform import Frame
 
 SOURCE = (
@@ -18,7 +19,7 @@ SOURCE = (
 DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95}
 DRAWS_NOTHING = True
 ALONG_SYMBOLS = True
-"""Every cell is filtered alike, so responses are too (`chain.FiltersSymbols`)."""
+"""Every cell is filtered alike, so responses are too (`detecting.FiltersSymbols`)."""
 
 
 def idle(settings: dict) -> bool:
@@ -74,9 +75,9 @@ def process(settings: dict, cells: np.ndarray, frame: Frame, rng: np.random.Gene
     zero, and clutter leaves no transient, though a moving target does. Source: Richards 2014, 5.2; nothing is drawn.
     """
     if settings["kind"] == "mean":
-        # Subtract the first symbol before the mean: an echo that stands still then cancels to the last bit.
-        moved = cells - cells[:1]
-        moved -= moved.mean(axis=0)
+        given = np.ascontiguousarray(cells, np.complex128)
+        moved = np.empty(given.shape, np.complex128)
+        _without_mean(given.view(np.float64), np.zeros(2 * given.shape[1]), moved.view(np.float64))
         return moved
     if settings["kind"] == "pulse":
         for _ in range(settings["order"]):
@@ -93,3 +94,22 @@ def _step(cells: np.ndarray) -> np.ndarray:
     result = np.zeros_like(cells)
     np.subtract(cells[1:], cells[:-1], out=result[1:])
     return result
+
+
+@LEAN
+def _without_mean(cells, sums, out):
+    """Fill out (N, K) with cells (N, K) less their mean over symbols; sums (K,): work space, zeros."""
+    first = cells[0]
+    for n in range(len(cells)):
+        given, row = cells[n], out[n]
+        # Subtract the first symbol before the mean: an echo that stands still then cancels to the last bit.
+        for i in range(np.uint64(len(sums))):
+            row[i] = given[i] - first[i]
+            sums[i] += row[i]
+    share = 1.0 / len(cells)
+    for i in range(np.uint64(len(sums))):
+        sums[i] *= share
+    for n in range(len(out)):
+        row = out[n]
+        for i in range(np.uint64(len(sums))):
+            row[i] -= sums[i]

@@ -24,6 +24,8 @@ DEFAULTS = {
     "gain": 0.1,
 }  # fmt: skip
 DRAWS_NOTHING = True
+CHOOSES_AFRESH = True
+"""What was chosen before does not matter (`detecting.ChoosesAfresh`)."""
 
 
 def idle(settings: dict) -> bool:
@@ -77,4 +79,6 @@ def detect(settings: dict, power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def choose(settings: dict, chosen: np.ndarray, cells: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Return the detected cells (N,) int64 of range cells (N, M); nothing is drawn."""
-    return detect(settings, cells.real**2 + cells.imag**2)[0]
+    power = np.empty(cells.shape)
+    _threshold.powers(np.ascontiguousarray(cells, np.complex128), power)
+    return detect(settings, power)[0]
