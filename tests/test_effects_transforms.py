@@ -38,3 +38,15 @@ def test_a_row_does_not_depend_on_the_rows_beside_it():
     given = numbers(5, 256)
     np.testing.assert_array_equal(transforms.inverse(given)[3:4], transforms.inverse(given[3:4]))
     np.testing.assert_array_equal(transforms.inverse(given[::2]), transforms.inverse(given)[::2])
+
+
+@pytest.mark.parametrize("count", [256, 13])
+def test_samples_of_turned_tones_are_sums_over_subcarriers_about_the_oscillator(count):
+    given, turns = numbers(3, count), numbers(7, count)[6]
+    kept, number = given.copy(), np.arange(count)
+    wave = np.exp(2j * np.pi * (np.outer(number - count // 2, number) % count) / count)
+    truth = (given * turns) @ wave / count
+    np.testing.assert_allclose(transforms.turned(given, turns), truth, rtol=0, atol=1e-14 * abs(truth).max())
+    np.testing.assert_array_equal(given, kept)
+    one = np.broadcast_to(given[:1], given.shape)
+    np.testing.assert_array_equal(transforms.turned(one, turns), transforms.turned(given[[0, 0, 0]], turns))

@@ -92,11 +92,10 @@ class Sending:
         if prefix is None:
             return waveform.transmit(spectrum, self.aired)
         later = np.exp(-2j * np.pi * offset_cells * np.arange(spectrum.shape[1]) / spectrum.shape[1])
-        whole, spectrum = np.broadcast_to(later, self.aired.shape), spectrum * later.conj()
-        symbols = waveform.transmit(whole, self.aired), waveform.transmit(whole, self.aired_before)
+        symbols = transforms.turned(self.aired, later), transforms.turned(self.aired_before, later)
         # Frequencies count from the lowest subcarrier in range cells, from the oscillator's, M // 2 higher, in samples:
         # the phase turns by pi from cell to cell.
-        cells = transforms.inverse(np.fft.ifftshift(spectrum, axes=1))
+        cells = transforms.turned(spectrum, later.conj())
         return prefix.module.convolved(prefix.settings, self.network, cells, symbols)
 
     def _drawn(self, name: str) -> np.ndarray:

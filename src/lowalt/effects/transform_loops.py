@@ -130,3 +130,25 @@ def sampled(response, data, table, work, out):
         transformed(im, re, new_im, new_re, table)
         for m in range(np.uint64(LENGTH)):
             row[m] = complex(scale * new_re[m], scale * new_im[m])
+
+
+@LEAN
+def turned(given, turns, table, work, out):
+    """Fill out (N, 256) with the samples of given (N, 256) times turns (256,) complex; work: (4, 256).
+
+    Both begin at the lowest subcarrier; tones are never held together. table: `turns`.
+    """
+    half, scale = np.uint64(HALF), 1.0 / LENGTH
+    re, im, new_re, new_im = work[0], work[1], work[2], work[3]
+    high, low, last_re, last_im = turns[half:], turns[:half], re[half:], im[half:]
+    for n in range(len(given)):
+        above, below, row = given[n, half:], given[n, :half], out[n]
+        for m in range(half):
+            a, b, c, d = above[m].real, above[m].imag, high[m].real, high[m].imag
+            re[m], im[m] = a * c - b * d, a * d + b * c
+        for m in range(half):
+            a, b, c, d = below[m].real, below[m].imag, low[m].real, low[m].imag
+            last_re[m], last_im[m] = a * c - b * d, a * d + b * c
+        transformed(im, re, new_im, new_re, table)
+        for m in range(np.uint64(LENGTH)):
+            row[m] = complex(scale * new_re[m], scale * new_im[m])

@@ -39,6 +39,16 @@ def samples(response: np.ndarray, data: np.ndarray) -> np.ndarray:
     return result
 
 
+def turned(given: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Return the time samples (N, M) of tones given (N, M) times turns (M,), both from the lowest subcarrier on."""
+    if given.shape[1] != LENGTH:
+        return np.fft.ifft(np.fft.ifftshift(given * turns, axes=1), axis=1)
+    result = np.empty(given.shape, np.complex128)
+    given, turns = (np.ascontiguousarray(one, np.complex128) for one in (given, turns))
+    transform_loops.turned(given, turns, table(), work(), result)
+    return result
+
+
 def _rows(given: np.ndarray, back: bool, scale: float, out: np.ndarray | None) -> np.ndarray:
     """The transforms of `forward`, or with `back` those of `inverse`; scale: of the latter's sums."""
     if given.ndim != 2 or given.shape[1] != LENGTH:
