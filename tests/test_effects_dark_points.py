@@ -10,6 +10,7 @@ from lowalt.effects.catalogue import called
 from lowalt.effects.channel import cross_sections, occlusion
 from lowalt.effects.interface import WeighsPoints
 from lowalt.effects.kept_by_arrays import KeptByArrays
+from lowalt.effects.response import OneWayFactors
 from lowalt.effects.sending import Sending
 from lowalt.effects.target_echo import TargetEcho
 from test_effects_occlusion import NETWORK, built
@@ -76,3 +77,31 @@ def test_a_value_is_made_once_as_long_as_its_arrays_live():
     gc.collect()
     assert not kept._values
     assert kept.of([one, np.ones(3)], make) == 4
+
+
+@pytest.mark.parametrize("effects", [BOTH, BOTH | {"reflected_aspect": {}}, {"ground_reflection": {}}])
+def test_a_known_direct_echo_serves_the_echo_over_all_paths(effects):
+    view = seen("DJI Mini 2")
+    one, other = echo(view, effects), echo(view, effects)
+    truth = one.subcarriers(view, frozenset(), one.routes)
+    direct = other.direct.copy()
+    found = other.subcarriers(view, frozenset(), other.routes)
+    np.testing.assert_array_equal(other.direct, direct)
+    np.testing.assert_allclose(found, truth, rtol=0, atol=1e-12 * abs(truth).max())
+    assert abs(found - direct).max() > 1e-3 * abs(truth).max()
+    # With squint the direct path's own echo is another.
+    squinted = other.subcarriers(view, frozenset({"squint"}), other.routes)
+    np.testing.assert_array_equal(squinted, one.subcarriers(view, frozenset({"squint"}), one.routes))
+
+
+def test_a_known_direct_echo_is_not_worked_out_again(monkeypatch):
+    view, pairs = seen("DJI Mini 2"), []
+    spectrum = OneWayFactors.spectrum
+    monkeypatch.setattr(
+        OneWayFactors, "spectrum", lambda own, *given: pairs.append(len(own.pairs)) or spectrum(own, *given)
+    )
+    known = echo(view, BOTH)
+    assert known.direct.any() and known.subcarriers(view, frozenset(), known.routes).any()
+    other = echo(view, BOTH)
+    assert other.subcarriers(view, frozenset(), other.routes).any()
+    assert pairs == [1, 2, 3]

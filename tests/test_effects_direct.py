@@ -165,3 +165,20 @@ def test_peaks_are_the_largest_values_of_the_functions_in_use(nodes):
     functions = response_tables.table(reach, *given) if nodes == 1 else response_tables.joined(reach, nodes, *given)[1]
     found = response_tables.peaks(reach, nodes, *given)
     np.testing.assert_array_equal(found, np.maximum(functions.max(axis=1), -functions.min(axis=1)))
+
+
+@pytest.mark.parametrize("lit", [0.55, 0.65, 1.0])
+def test_moments_of_few_and_of_many_points_with_strength_are_sums_over_all_points(lit):
+    rng, nodes, symbols, count, orders = np.random.default_rng(6), 2, 3, 33, 8
+    strength = rng.uniform(0.5, 2.0, (symbols, count)) * (rng.permuted(np.arange(count) < lit * count))
+    out, back = rng.normal(size=(2, 2, nodes, symbols, count))
+    ranges, middle, found = rng.uniform(-0.4, 0.4, (2, symbols, count)), np.zeros(symbols), np.empty((3, 2, 2, orders))
+    rows = np.empty((moment_loops.SUM_ROWS + orders, moment_loops.padded(count)))
+    moment_loops.moments(
+        strength, out, back, 2.0, *ranges, middle, 1.0, 0.9, rows, np.empty(count, np.int64), found
+    )  # fmt: skip
+    z = 2.0 * strength * (out[0] + 1j * out[1]) * (back[0] + 1j * back[1])
+    order = np.arange(orders)
+    waves = (-1j) ** order[:, None, None] * np.cos(order[:, None, None] * np.arccos(ranges.sum(axis=0) / 0.9))
+    truth = np.einsum("qnl,pnl->nqp", z, waves)
+    np.testing.assert_allclose(found[:, 0] + 1j * found[:, 1], truth, rtol=0, atol=1e-13 * abs(truth).max())

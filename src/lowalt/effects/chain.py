@@ -121,7 +121,8 @@ class Chain:
         else:
             spectrum = self.target.subcarriers(view, on, factor)
             for one in [*(other.own_response for other in self.others), self._clutter]:
-                spectrum = spectrum if one is None else spectrum + one[rows]
+                own = one is not None and spectrum is not self.target.__dict__.get("direct")
+                spectrum = spectrum if one is None else np.add(spectrum, one[rows], out=spectrum if own else None)
         if plain:
             return Heard(spectrum, noise=noise)
         if noise is not None:

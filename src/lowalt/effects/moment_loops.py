@@ -8,6 +8,8 @@ BLOCK = 4
 """Orders that share a pass over the points."""
 LANES = 16
 """Points whose loops the compiler joins; those left over would pass one by one, so rows are filled up."""
+DENSE = 0.6
+"""Least share of points with strength at which all points are taken as they stand, those without any as zeros."""
 SUM_ROWS = 5
 """Rows of work space of `moments` at one frequency."""
 
@@ -157,8 +159,10 @@ def moments(strength, out, back, times, excess_a, excess_b, middle, half_cells, 
     u, real, imag, before, last, table = work[0], work[1], work[2], work[3], work[4], work[SUM_ROWS:]
     for n in range(symbols):
         own = strength[n % strength.shape[0]]
-        # Points without strength are left out: of a group of points, all others.
+        # Points without strength are left out: of a group of points, all others. Gathering a point takes longer than
+        # its sums.
         count = lit_points(own, lit)
+        count = len(own) if count > DENSE * len(own) else count
         size = min(-(-count // LANES) * LANES, work.shape[1])
         for q in range(nodes):
             for p in range(result.shape[3]):

@@ -163,9 +163,16 @@ class OneWayFactors:
             result.append(planes.reshape(len(self.refs), 2, -1))
         return result
 
-    def spectrum(self, moments: list[np.ndarray]) -> np.ndarray:
-        """Return the subcarriers (N, M) of each pair of paths' `moments`, or of sums of such of instants alike."""
-        return self._spread(moments, np.empty((0, self.radio.subcarriers), np.complex128))
+    def leave_out_direct(self) -> None:
+        """Leave the way there and back by the direct path out of all that follows, as its echo is known."""
+        self.pairs, self.frames = self.pairs[1:], self.frames[1:]
+
+    def spectrum(self, moments: list[np.ndarray], onto: np.ndarray | None = None) -> np.ndarray:
+        """Return the subcarriers (N, M) of each pair of paths' `moments`, or of sums of such of instants alike.
+
+        onto: subcarriers (N, M) to which they are added, None for none.
+        """
+        return self._spread(moments, np.empty((0, self.radio.subcarriers), np.complex128), onto)
 
     def tones(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
         """Return the tones (N, M) (`waveform.tones_of`) of symbols that carry data (N, M), of these `moments`."""
@@ -180,15 +187,15 @@ class OneWayFactors:
         given = moments[0], self.functions(self.frames[0][1]), *self.delays(0)
         return spread_search.spread_and_search(given, self.radio.subcarriers, signs)
 
-    def _spread(self, moments: list[np.ndarray], data: np.ndarray) -> np.ndarray:
-        """The subcarriers (N, M) of moments, or with data (N, M) the tones of those of one pair."""
+    def _spread(self, moments: list[np.ndarray], data: np.ndarray, onto: np.ndarray | None = None) -> np.ndarray:
+        """The subcarriers (N, M) of moments, added to `onto`, or with data (N, M) the tones of those of one pair."""
         count = self.radio.subcarriers
         half = (count + 1) // 2
         work = aligned(4, half), aligned(2, half), aligned(2, count)
-        result = aligned_complex(len(self.refs), count)
+        result = aligned_complex(len(self.refs), count) if onto is None else onto
         for number, (planes, (_, reach)) in enumerate(zip(moments, self.frames, strict=True)):
             given = planes, self.functions(reach), *self.delays(number)
-            spread_loops.spread(*given, *work, number == 0, data, result)
+            spread_loops.spread(*given, *work, number == 0 and onto is None, data, result)
         return result
 
     def delays(self, number: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

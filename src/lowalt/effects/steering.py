@@ -14,12 +14,17 @@ from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.view import View
 
 
-def echo(view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float = 1.0, **asked) -> np.ndarray:
+def echo(
+    view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float = 1.0, direct: np.ndarray | None = None,
+    **asked,
+) -> np.ndarray:  # fmt: skip
     """Return the subcarriers (N, M) of the view's target; paths, factor and others as in `response`.
 
-    Where beams are turned, the arrays' weights keep the phase of the arrays' middles.
+    direct: those of the direct path alone where they are known, which are not changed. Where beams are turned, the
+    arrays' weights keep the phase of the arrays' middles.
     """
-    return Steered(view, paths, **asked, lit=lit_points.lit(factor)).echo(factor)
+    rays = Steered(view, paths, **asked, lit=lit_points.lit(factor))
+    return rays.echo(factor) if direct is None or not rays.steady else rays.echo_beside(direct, factor)
 
 
 class SameSymbols(NamedTuple):
@@ -74,6 +79,12 @@ class Steered:
         Symbols in which the factor is zero for all points are zero.
         """
         return self.spectrum(self.moments(self.paired(factor)))
+
+    def echo_beside(self, direct: np.ndarray, factor: np.ndarray | float = 1.0) -> np.ndarray:
+        """Return what `echo` does, where the direct path's subcarriers (N, M) are known and beams are not turned."""
+        rays = self.beams[0][2]
+        rays.leave_out_direct()
+        return rays.spectrum(self.moments(self.paired(factor))[0], direct.copy())
 
     def paired(self, factor: np.ndarray | float = 1.0) -> list[list[np.ndarray]]:
         """Return every beam's amplitudes (`response.OneWayFactors.paired`), with `factor` on every point's amplitude.

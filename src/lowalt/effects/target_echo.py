@@ -120,10 +120,14 @@ class TargetEcho:
     def subcarriers(self, view: View, on: frozenset[str], factor: np.ndarray | float) -> np.ndarray:
         """Return the subcarriers (N, M) with the physics `on`, summed over all paths."""
         paths = self.paths if view is self.view else self.paths_of(view)
-        if view is self.view and factor is self.factor and not paths and not on & {"squint", "wavefront"}:
+        plain, known = view is self.view and not on & {"squint", "wavefront"}, None
+        if plain and factor is self.factor and not paths:
             return self.direct
+        if plain and factor is self.routes and paths and view.station.transmitter is None:
+            # The way there and back by the direct path has the same factors.
+            known = self.__dict__.get("direct")
         return steering.echo(
-            view, paths, factor, squint="squint" in on, wavefront="wavefront" in on, error=self.error
+            view, paths, factor, known, squint="squint" in on, wavefront="wavefront" in on, error=self.error
         )  # fmt: skip
 
     def samples(
