@@ -9,6 +9,7 @@ import reference_effects
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.effects import moment_loops, response_tables, spread_loops
+from lowalt.effects.one_way import OneWay
 from lowalt.effects.response import ImagePath, OneWayFactors, response
 from test_effects import network
 
@@ -182,3 +183,9 @@ def test_moments_of_few_and_of_many_points_with_strength_are_sums_over_all_point
     waves = (-1j) ** order[:, None, None] * np.cos(order[:, None, None] * np.arccos(ranges.sum(axis=0) / 0.9))
     truth = np.einsum("qnl,pnl->nqp", z, waves)
     np.testing.assert_allclose(found[:, 0] + 1j * found[:, 1], truth, rtol=0, atol=1e-13 * abs(truth).max())
+
+
+def test_a_span_holds_all_excess_ranges_of_a_symbol():
+    excess = np.array([[1.0, 4.0, 2.0], [-3.0, -1.0, 5.0]])
+    middle, reach = OneWay(np.empty((2, 1, 2, 3)), excess).span()
+    assert middle.tolist() == [2.5, 1.0] and reach == 4.0

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from lowalt.effects import lit_points, steering
+from lowalt.effects import arrivals, lit_points, steering
 from lowalt.effects.catalogue import called
 from lowalt.effects.received import Scene, observe
+from lowalt.effects.sending import Sending
+from lowalt.effects.target_echo import TargetEcho
 from test_effects import network, target
 
 RADIO = network(transmit=(16, 4), receive=(8, 2), symbols=40)
@@ -70,18 +72,37 @@ def test_a_symbol_in_which_no_point_echoes_is_zero():
     assert found[:20].all()
 
 
-def test_a_coefficient_that_instants_share_is_gathered_once():
+def test_a_path_to_some_points_has_their_places_and_coefficients_at_both_ends():
     rng = np.random.default_rng(1)
     numbers = rng.integers(0, POINTS, (40, 16))
     coefficient = rng.random((40, POINTS)) + 0j
     sender = lit_points.ImagePath(rng.random((40, POINTS, 3)), 2.0 * coefficient)
     path = lit_points.ImagePath(rng.random((40, POINTS, 3)), coefficient, sender=sender)
-    known = lit_points.paths_at([path], numbers)
-    later = path._replace(places=path.places + 1.0)
-    (found,) = lit_points.paths_at([later], numbers, known)
-    assert found.lit.coefficient is known[0].lit.coefficient
-    assert found.lit.sender.coefficient is known[0].lit.sender.coefficient
-    np.testing.assert_array_equal(found.lit.coefficient, np.take_along_axis(coefficient, numbers, 1))
-    np.testing.assert_array_equal(found.lit.places, known[0].lit.places + 1.0)
-    (other,) = lit_points.paths_at([path._replace(coefficient=-coefficient)], numbers, known)
-    np.testing.assert_array_equal(other.lit.coefficient, -known[0].lit.coefficient)
+    found = lit_points.path_at(path, numbers)
+    for one, whole in ((found, path), (found.sender, sender)):
+        np.testing.assert_array_equal(one.coefficient, np.take_along_axis(whole.coefficient, numbers, 1))
+        np.testing.assert_array_equal(one.places, np.take_along_axis(whole.places, numbers[..., None], 1))
+    assert lit_points.path_at(path._replace(coefficient=0.5), numbers).coefficient == 0.5
+
+
+@pytest.mark.parametrize("effects", [{}, {"walls": {"facades": [[30.0, 60.0, -90.0, 400.0, 300.0]]}}])
+def test_later_instants_of_a_symbol_have_moments_of_the_same_points(effects):
+    cloud, row = target(np.random.default_rng(4), points=POINTS)
+    named = tuple(called({"ground_reflection": {}, "symbol_motion": {}, "wavefront": {}, **effects}))
+    view = observe(Scene(RADIO, 5, None, named), RADIO.stations[0], cloud, row)
+
+    def draws(*_):
+        return np.random.default_rng(1)
+
+    echo = TargetEcho(list(named), view, draws, Sending([], RADIO, draws))
+    factor = np.random.default_rng(1).random((40, POINTS))
+    factor[:, :38] = 0.0
+    on, lit = frozenset({"symbol_motion", "wavefront"}), lit_points.lit(factor)
+    within = arrivals._within(echo, view, on, 3)
+    assert lit.shape[1] < POINTS and len(echo.paths) > len(effects)
+    some, whole = (list(arrivals._rays(echo, view, echo.paths, on, within, one)) for one in (lit, None))
+    given, every = (rays[0].paired(factor) for rays in (some, whole))
+    for one, other in zip(some, whole, strict=True):
+        spectrum, truth = some[0].spectrum(one.moments(given)), whole[0].spectrum(other.moments(every))
+        np.testing.assert_allclose(spectrum, truth, rtol=0, atol=1e-12 * abs(truth).max())
+    assert some[1].view.places.shape == (40, 16, 3) and len(some) == 3

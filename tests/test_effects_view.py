@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lowalt.effects.received import Scene, observe
-from test_effects import target
+from test_effects import network, target
 from test_effects_links import B, link, linked
 
 
@@ -18,3 +18,12 @@ def test_no_point_is_nearer_to_any_end_than_the_bound_of_its_part(station):
     assert (bound[:, cloud.part] <= ranges + 1e-9).all()
     # The middle of a part lies at most a radius behind its nearest point, so the bound is not far below.
     assert (bound.min(axis=1) >= ranges.min(axis=1) - 2 * view.radii.max()).all()
+
+
+def test_other_points_places_are_all_that_is_known_of_them():
+    cloud, row = target(np.random.default_rng(4))
+    view = observe(Scene(network(), 5, None, ()), network().stations[0], cloud, row)
+    some = view.places[:, 2:5]
+    assert view.normals.shape[1] == 9
+    other = view.with_places(some)
+    assert other.places is some and other.station is view.station and "normals" not in other.__dict__

@@ -179,10 +179,14 @@ def _rays(
     delays = within.delays_s[[number for number, _ in within.order]]
     each = view.at_each(view.times_s + delays.reshape(len(delays), -1)) if "symbol_motion" in on else [view]
     for later, (_, instant) in zip(each, within.order, strict=True):
-        paths = held
+        paths, own = held, lit
+        if first is not None and lit is not None:
+            # The first instant has gathered all that stays during a symbol.
+            later, own = later.with_places(lit_points.places_at(later.places, lit)), None
+            paths = first.paths
         if held and later is not view:
-            paths = echo.moved(later, held)
-        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant, lit=lit, once=once)
+            paths = echo.moved(later, paths)
+        rays = Steered(later, paths, **asked, like=first, span=span, instant=instant, lit=own, once=once)
         if span is not None:
             first = first or rays
         yield rays

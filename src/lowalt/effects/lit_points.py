@@ -4,8 +4,7 @@ Surfaces hide half of a target's points or more. A symbol's points with any stre
 without as fill the table, so that all symbols have equally many.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -103,32 +102,8 @@ def places_at(places: np.ndarray, numbers: np.ndarray) -> np.ndarray:
     return out.swapaxes(1, 2)
 
 
-class Gathered(NamedTuple):
-    """A path to all points, and the same to each symbol's lit points alone."""
-
-    path: ImagePath
-    lit: ImagePath
-
-
-def path_at(path: ImagePath, numbers: np.ndarray, known: Gathered | None = None) -> ImagePath:
-    """Return a path to each symbol's points `numbers` (N, W) alone.
-
-    known: a path of the same points `numbers` at another instant; where both have one coefficient, it serves again.
-    """
-    sender = None
-    if path.sender is not None:
-        once = known is not None and known.path.sender is not None
-        sender = path_at(path.sender, numbers, Gathered(known.path.sender, known.lit.sender) if once else None)
-    if known is not None and known.path.coefficient is path.coefficient:
-        coefficient = known.lit.coefficient
-    else:
-        coefficient = at_points(path.coefficient, numbers)
-    return ImagePath(places_at(path.places, numbers), coefficient, path.station_m, sender)
-
-
-def paths_at(
-    paths: Sequence[ImagePath], numbers: np.ndarray, known: Sequence[Gathered] | None = None
-) -> list[Gathered]:  # fmt: skip
-    """Return each path with the same to the points `numbers` (N, W) alone; known: as in `path_at`, for every path."""
-    known = known or [None] * len(paths)
-    return [Gathered(path, path_at(path, numbers, own)) for path, own in zip(paths, known, strict=True)]
+def path_at(path: ImagePath, numbers: np.ndarray) -> ImagePath:
+    """Return a path, and its sender's, to each symbol's points `numbers` (N, W) alone."""
+    sender = None if path.sender is None else path_at(path.sender, numbers)
+    places, coefficient = places_at(path.places, numbers), at_points(path.coefficient, numbers)
+    return ImagePath(places, coefficient, path.station_m, sender)

@@ -33,13 +33,16 @@ class ImagePath(NamedTuple):
 
 
 class OneWay(NamedTuple):
-    """One array over one path: factors (2, Q, N, L), real and imaginary, excess range (N, L), its middle (N,) and reach
-    to either side (m)."""
+    """One array over one path: factors (2, Q, N, L), real and imaginary, and excess range (N, L) (m)."""
 
     factors: np.ndarray
     excess: np.ndarray
-    middle: np.ndarray
-    reach: float
+
+    def span(self) -> tuple[np.ndarray, float]:
+        """Return the middle (N,) of each symbol's excess ranges, and their largest reach to either side (m)."""
+        low, high = np.empty((2, len(self.excess)))
+        extremes(self.excess, low, high)
+        return 0.5 * (low + high), float(0.5 * (high - low).max())
 
 
 def end(
@@ -117,9 +120,7 @@ class PathFactors:
             np.empty(count[1], np.complex128), out, excess,
         )  # fmt: skip
         self._check(fault)
-        low, high = np.empty((2, count[0]))
-        extremes(excess, low, high)
-        return OneWay(out, excess, 0.5 * (low + high), float(0.5 * (high - low).max()))
+        return OneWay(out, excess)
 
     def spans(self, shape: tuple[int, int], squint: bool) -> tuple[np.ndarray, np.ndarray, float]:
         """Return bounds of each symbol's least and largest excess range (N,) of the points (m), as `one_way` counts.

@@ -228,10 +228,12 @@ class OneWayFactors:
     def _frames(self) -> list[tuple[np.ndarray, float]]:
         """Middle (N,) and reach of each pair's ranges (cells). Few orders matter where a pair has its own middle."""
         half_cells, result = 0.5 * self.radio.cells, []
+        out = [one.span() for one in self.out]
+        back = out if self.back is self.out else [one.span() for one in self.back]
         for a, b, _ in self.pairs:
-            there, home = self.out[a], self.back[b]
-            reach = half_cells * (there.reach + home.reach + 2.0 * self.farther_m)
-            result.append((half_cells * (there.middle + home.middle), tables.round_up(reach)))
+            (there, far), (home, near) = out[a], back[b]
+            reach = half_cells * (far + near + 2.0 * self.farther_m)
+            result.append((half_cells * (there + home), tables.round_up(reach)))
         return result
 
 

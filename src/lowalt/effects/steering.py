@@ -49,11 +49,10 @@ class Steered:
         """
         self.view, self.lit = view, lit
         places = view.places
-        self.gathered: list[lit_points.Gathered] = []
         if lit is not None:
-            known = like.gathered if like is not None and like.lit is lit else None
-            places, self.gathered = lit_points.places_at(places, lit), lit_points.paths_at(paths, lit, known)
-            paths = [gathered.lit for gathered in self.gathered]
+            places, paths = lit_points.places_at(places, lit), [lit_points.path_at(path, lit) for path in paths]
+        self.paths = paths
+        """The paths to the points that have strength, except the direct one."""
         asked = {"squint": squint, "wavefront": wavefront, "error": error, "instant": instant, "once": once}
         asked["farther_m"] = 0.0 if span is None else span.farther_m
         given, self.steady = (view.network, view.station), not view.turning

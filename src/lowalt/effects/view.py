@@ -166,6 +166,10 @@ class View:
         known |= {"places": self.places[rows]} if "places" in self.__dict__ else {}
         return self.at(self.times_s[rows])._knowing(**known)
 
+    def with_places(self, places: np.ndarray) -> "View":
+        """Return the same target with places (N, W, 3) m of other points, and nothing else known of these."""
+        return replace(self)._knowing(places=places)
+
     def _motion_at(self, rows: np.ndarray | slice) -> Rigid:
         """The poses of some symbols."""
         return self.motion._replace(rotation=self.motion.rotation[rows], translation=self.motion.translation[rows])

@@ -87,9 +87,7 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
 
 def images(settings: dict, view: View) -> list[np.ndarray]:
     """Return the points' images (N, L, 3) m below the ground."""
-    planes = np.swapaxes(view.places, 1, 2).copy()
-    np.negative(planes[:, 2], out=planes[:, 2])
-    return [np.swapaxes(planes, 1, 2)]
+    return [np.swapaxes(np.swapaxes(view.places, 1, 2) * [[1.0], [1.0], [-1.0]], 1, 2)]
 
 
 def _mirrored(view: View) -> tuple[np.ndarray, np.ndarray]:
