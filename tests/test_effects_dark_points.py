@@ -6,11 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from lowalt.effects import target_echo
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import cross_sections, occlusion
 from lowalt.effects.interface import WeighsPoints
 from lowalt.effects.kept_by_arrays import KeptByArrays
-from lowalt.effects.response import OneWayFactors
+from lowalt.effects.response import ImagePath, OneWayFactors
 from lowalt.effects.sending import Sending
 from lowalt.effects.target_echo import TargetEcho
 from test_effects_occlusion import NETWORK, built
@@ -105,3 +106,9 @@ def test_a_known_direct_echo_is_not_worked_out_again(monkeypatch):
     other = echo(view, BOTH)
     assert other.subcarriers(view, frozenset(), other.routes).any()
     assert pairs == [1, 2, 3]
+
+
+def test_the_largest_amplitude_of_a_path_is_that_of_its_coefficients():
+    values = np.array([[3.0 + 4.0j, -1.0], [0.5j, 2.0 - 2.0j]])
+    assert target_echo._largest(values) == 5.0 and target_echo._largest(np.asarray(-2.0 + 0j)) == 2.0
+    assert target_echo._amplitude([ImagePath(values, values), ImagePath(values, 0.5)]) == 6.5

@@ -98,7 +98,7 @@ def test_later_instants_of_a_symbol_have_moments_of_the_same_points(effects):
     factor = np.random.default_rng(1).random((40, POINTS))
     factor[:, :38] = 0.0
     on, lit = frozenset({"symbol_motion", "wavefront"}), lit_points.lit(factor)
-    within = arrivals._within(echo, view, on, 3)
+    within = arrivals._within(echo, view, on, 3, echo.by_need["symbol_motion"].module.complex_motion(view))
     assert lit.shape[1] < POINTS and len(echo.paths) > len(effects)
     some, whole = (list(arrivals._rays(echo, view, echo.paths, on, within, one)) for one in (lit, None))
     given, every = (rays[0].paired(factor) for rays in (some, whole))

@@ -172,13 +172,18 @@ def test_the_number_of_instants_counts_a_part_by_its_share_of_the_amplitudes(mon
     assert [count(view, error, alone) for error in errors] == [count(view, error) for error in errors]
     assert [count(view, error, 0.01 * alone) for error in errors] == [count(view, 100 * error) for error in errors]
     assert count(view, 1e-9, 1.0 - alone) < count(view, 1e-9)
-    monkeypatch.setattr(symbol_motion, "count", lambda *asked: (given.append(asked[2]), count(*asked))[1])
+    count_of, motions = symbol_motion.count_of, []
+    monkeypatch.setattr(symbol_motion, "count_of", lambda *asked: (given.append(asked[3]), count_of(*asked))[1])
+    complex_motion = symbol_motion.complex_motion
+    monkeypatch.setattr(symbol_motion, "complex_motion", lambda one: motions.append(one) or complex_motion(one))
     strengths = chain.target.strengths * np.linspace([1.0, 3.0], [2.0, 1.0], len(view.times_s)) + 1e-9
     chain.target.__dict__["strengths"] = strengths
     chain.cells(on)
     # A part's share is that of its largest amplitude in the look.
     assert (given[0] * strengths.sum(axis=1).max() >= (1 - 1e-12) * strengths).all()
     assert given[0].sum() < 2
+    # The motion is bounded once for the instants of positions and of array sums.
+    assert len(motions) == 1
 
 
 @pytest.mark.parametrize("physics", [{}, {"squint": {}}])

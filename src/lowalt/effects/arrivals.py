@@ -41,7 +41,9 @@ def arriving(
     # Half of the error is for the instants, the other half for the orders that are left out.
     allowed = 0.5 * max(echo.error, moving.rounding(view))
     strengths = echo.strengths
-    count = moving.count(view, allowed, strengths.max(axis=0) / max(float(strengths.sum(axis=1).max()), 1e-300))
+    shares = strengths.max(axis=0) / max(float(strengths.sum(axis=1).max()), 1e-300)
+    motion = moving.complex_motion(view)
+    count = moving.count_of(view, motion, allowed, shares)
     farther_m = moving.farther_m(view)
     if (
         1 < count < view.network.subcarriers
@@ -54,7 +56,7 @@ def arriving(
             allowed * float(strengths.sum(axis=1).max()), farther_m, squint="squint" in on, error=echo.error,
         )  # fmt: skip
     elif count < view.network.subcarriers and np.isfinite(farther_m):
-        within = _within(echo, view, on, count)
+        within = _within(echo, view, on, count, motion)
         numbers, found = np.arange(len(echo.view.times_s))[rows], []
         together = SYMBOLS * max(1, TOGETHER // (SYMBOLS * view.places.shape[1]))
         for first in range(0, len(numbers), together):
@@ -88,12 +90,12 @@ class Within(NamedTuple):
     farther_m: float | None
 
 
-def _within(echo: TargetEcho, view: View, on: frozenset[str], count: int) -> Within:
-    """A symbol's `count` Chebyshev points."""
+def _within(echo: TargetEcho, view: View, on: frozenset[str], count: int, motion: tuple | None) -> Within:
+    """A symbol's `count` Chebyshev points; motion: as `symbol_motion.complex_motion` returns it."""
     moving = echo.by_need["symbol_motion"].module
     order = [(number, None) for number in range(count)]
     if "wavefront" in on:
-        order = gain_times.order(view, moving.complex_motion(view), count, echo.error / 10)
+        order = gain_times.order(view, motion, count, echo.error / 10)
     return Within(order, moving.nodes_s(view, count), moving.farther_m(view))
 
 

@@ -163,8 +163,12 @@ def count(view: View, error: float, shares: np.ndarray | None = None) -> int:
     errs by up to twice as much where some of a symbol's samples carry another symbol, or where the symbol is
     interpolated in two pieces.
     """
+    return count_of(view, complex_motion(view), error, shares)
+
+
+def count_of(view: View, found: tuple | None, error: float, shares: np.ndarray | None = None) -> int:
+    """Return what `count` does; found: as `complex_motion` returns it, which also bounds other series in time."""
     samples, radio = view.network.subcarriers, radar(view.network, view.station)
-    found = complex_motion(view)
     if found is None:
         return samples
     rho, near, moved, beyond = found
