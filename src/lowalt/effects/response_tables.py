@@ -88,16 +88,32 @@ def joined(reach: float, nodes: int, count: int, error: float) -> tuple[np.ndarr
     sum of their coefficients, which is below `error`.
     """
     band = np.pi * reach * (count - 1) / count
-    orders = _orders(reach, error)
-    # The products are entire functions: four times as many points as orders fold nothing above rounding.
-    fine = 4 * (nodes + orders)
-    x = interpolation.points(fine)
-    weights, bessel = interpolation.weights(nodes, x), _bessel(orders, band * x)
-    values = (weights.T[:, None] * bessel).reshape(nodes * orders, fine)
-    mix = values @ interpolation.coefficients(fine).T
+    mix = _products(nodes, _orders(reach, error), band)
     kept = 1 + int(np.flatnonzero(abs(mix).sum(axis=0)[::-1].cumsum()[::-1] > error)[-1])
     place = np.arccos(np.linspace(-1.0, 1.0, count))
     return np.ascontiguousarray(mix[:, :kept]), aligned_copy(np.cos(np.arange(kept)[:, None] * place))
+
+
+def _products(nodes: int, orders: int, band: float) -> np.ndarray:
+    """Chebyshev coefficients (nodes x P, K) in x of w_q(x) eps_p J_p(band x), w_q the Lagrange weight of frequency q.
+
+    exp(-j B x u) is the sum over k and p of eps_k eps_p (-j)^k J_((k + p) / 2)(B / 2) J_((k - p) / 2)(B / 2) T_k(x)
+    T_p(u) with k - p even. Each coefficient is a product, so small ones are not lost in the rounding of large ones.
+    """
+    # From twice the orders on, a coefficient holds a function whose order is P at least, at half the argument.
+    last = 2 * (orders + nodes)
+    p, k = np.arange(orders)[:, None], np.arange(last)
+    half, values = (k - p) // 2, jv(np.arange(last), 0.5 * band)
+    sign = np.where((half > 0) & (half % 2 == 1), -1.0, 1.0) * np.where(p == 0, 1.0, 2.0) * ((k - p) % 2 == 0)
+    bessel = sign * values[abs(half)] * values[(k + p) // 2]
+    # T_i T_k = (T_(i + k) + T_(i - k)) / 2: a product's coefficients are a convolution, orders below zero counting too.
+    both = np.concatenate([bessel[:, :0:-1], bessel], axis=1)
+    weights, result = interpolation.coefficients(nodes), np.zeros((nodes, orders, last - nodes))
+    for i in range(1 - nodes, nodes):
+        share = (1.0 if i == 0 else 0.5) * weights[abs(i)]
+        result += share[:, None, None] * both[:, last - 1 - i : 2 * last - 1 - i - nodes]
+    result[..., 1:] *= 2.0
+    return result.reshape(nodes * orders, -1)
 
 
 @lru_cache(maxsize=64)
