@@ -53,8 +53,10 @@ def test_moments_of_places_are_those_of_kept_factors(shape, squint, kind, away_m
 @pytest.mark.parametrize(
     "away_m, aim_m", [((40, 10, 5), (42, 9, 16)), ((40, 10, 5), (42, 25, 30)), ((5, 40, 5), (7, 39, 16))]
 )
-def test_a_direct_echo_is_the_sum_over_elements_and_points(squint, away_m, aim_m):
-    radio, rng = network(subcarriers=8, subcarrier_spacing_hz=2e7, transmit=(16, 4)), np.random.default_rng(2)
+@pytest.mark.parametrize("spacing_hz", [2e7, 3e6])
+@pytest.mark.parametrize("shape", [(16, 4), (32, 2), (8, 1)])
+def test_a_direct_echo_is_the_sum_over_elements_and_points(squint, away_m, aim_m, spacing_hz, shape):
+    radio, rng = network(subcarriers=8, subcarrier_spacing_hz=spacing_hz, transmit=shape), np.random.default_rng(2)
     radio = replace(radio, receive=radio.transmit)
     places, rcs = places_of(rng, np.array(away_m, float)), rng.uniform(0.1, 2.0, 19)
     given = radio, radio.stations[0], places, rcs, np.array(aim_m, float)

@@ -10,6 +10,8 @@ from lowalt.effects.waves import COSINE, DEGREE, SINE, WAVE
 NARROW = 1.0 / 16
 """Largest half of x in `cosines` at which polynomials of degree FEW are exact to rounding, and x' is x."""
 FEW = 7
+FEWEST = 3
+"""Degree of the polynomials of the steps between frequencies of a band below 1 % of the carrier."""
 
 
 @INNER_VECTOR
@@ -39,9 +41,20 @@ def doublings(count, c, out, size):
         for i in range(np.uint64(size)):
             out[i] = 1.0
         return
+    if count == 2:
+        for i in range(np.uint64(size)):
+            out[i] *= 2.0 * c[i]
+        return
+    if count == 4:
+        for i in range(np.uint64(size)):
+            out[i] = out[i] * (2.0 * c[i]) * (4.0 * c[i] * c[i] - 2.0)
+        return
     for i in range(np.uint64(size)):
-        out[i] *= 2.0 * c[i]
-    doubled = 2
+        one = 2.0 * c[i] * c[i] - 1.0
+        two = 2.0 * one * one - 1.0
+        out[i] = out[i] * (2.0 * c[i]) * (4.0 * one * two)
+        c[i] = two
+    doubled = 8
     while 2 * doubled < count:
         for i in range(np.uint64(size)):
             one = 2.0 * c[i] * c[i] - 1.0
@@ -66,32 +79,56 @@ def array_sum(x, count, square, c, out, size):
 
 
 @INNER_VECTOR
+def turned(c, s, seen, step, rows, plus, minus, first, last):
+    """Fill plus and minus (L,) with the cosines of angles, c and s their cosines and sines, and step seen more or less.
+
+    Angles in half turns. rows: `waves_within` half of the largest step; first, last: (L,) work space.
+    """
+    half, size, degree = 0.5 * step, len(c), rows.shape[1] - 1
+    if degree == FEWEST:
+        a, b, d, e = rows[COSINE, 3], rows[COSINE, 2], rows[COSINE, 1], rows[COSINE, 0]
+        f, g, h, j = rows[SINE, 3], rows[SINE, 2], rows[SINE, 1], rows[SINE, 0]
+        for i in range(np.uint64(size)):
+            turn = half * seen[i]
+            x = turn * turn
+            one, two = c[i] * (((a * x + b) * x + d) * x + e), s[i] * ((((f * x + g) * x + h) * x + j) * turn)
+            plus[i], minus[i] = one - two, one + two
+        return
+    for i in range(np.uint64(size)):
+        turn = half * seen[i]
+        plus[i] = turn * turn
+    horner(plus, rows, COSINE, degree, first, size)
+    horner(plus, rows, SINE, degree, last, size)
+    for i in range(np.uint64(size)):
+        one, two = c[i] * first[i], s[i] * (last[i] * (half * seen[i]))
+        plus[i], minus[i] = one - two, one + two
+
+
+@INNER_VECTOR
 def turned_sums(x, seen, steps, rows, count, square, c, work, out):
     """Fill out (Q, L) with the array sums of `count` elements, a power of two, at x + steps[q] seen; x, seen (L,).
 
-    The cosine of a sum of angles follows from those of both; rows: `waves_within` half of the largest step; work: (3,
-    L) work space.
+    Q is two at least, and the last step is the first with the other sign, and so on, so that both share what follows
+    from the step. rows: `waves_within` half of the largest step; work: (3, L) work space.
     """
-    size, last = len(x), rows.shape[1] - 1
+    size, pairs = len(x), len(steps) // 2
     sign, s, turn = work[0], work[1], work[2]
     cosines(x, square, sign, c, size)
     horner(square, WAVE, SINE, DEGREE, s, size)
     for i in range(np.uint64(size)):
         s[i] *= 0.5 * (x[i] - np.rint(x[i]))
-    for q in range(len(steps)):
-        own, step = out[q], steps[q]
+    for q in range(pairs):
+        one, two = out[q], out[len(steps) - 1 - q]
+        turned(c, s, seen, steps[q], rows, turn, square, one, two)
         for i in range(np.uint64(size)):
-            half = 0.5 * step * seen[i]
-            turn[i] = half * half
-        # The step's sine, then its cosine, and from both the cosine of the whole angle.
-        horner(turn, rows, SINE, last, own, size)
+            one[i], two[i] = sign[i], sign[i]
+        doublings(count, turn, one, size)
+        doublings(count, square, two, size)
+    if 2 * pairs < len(steps):
+        # In the middle of the band the step is zero.
         for i in range(np.uint64(size)):
-            own[i] *= 0.5 * step * seen[i] * s[i]
-        horner(turn, rows, COSINE, last, square, size)
-        for i in range(np.uint64(size)):
-            turn[i] = c[i] * square[i] - own[i]
-            own[i] = sign[i]
-        doublings(count, turn, own, size)
+            out[pairs, i] = sign[i]
+        doublings(count, c, out[pairs], size)
 
 
 @INNER_VECTOR
