@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lowalt.common.memory import aligned
 from lowalt.effects import interpolation, near_field_loops, response_loops
 from lowalt.effects.near_field_loops import directions, evaluated, held
 from lowalt.effects.near_field_terms import MOST, Aperture, chosen, orders
@@ -88,7 +89,7 @@ def sums(
         if kept is not None:
             kept[first] = box
         rows_of = (2, *box.counts, len(box.pairs), 2 * box.mix.shape[1])
-        work = [np.empty((size, POINTS)) for size in rows_of]
+        work = [aligned(size, POINTS) for size in rows_of]
         evaluated(
             at.reshape(3, -1), first * count, rows.stop * count, *box[:2], *box[3:], *work[:-1],
             work[-1].reshape(-1, 2, POINTS), out.reshape(len(out), -1),

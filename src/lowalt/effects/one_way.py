@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.common.memory import aligned
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid
 from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN, reference
@@ -203,7 +204,7 @@ class PathFactors:
             *self._axes, self.refs, self.origin, 0.5 * radio.turns, SPEED_OF_LIGHT / (2 * self.network.carrier_hz),
             self.aims, radio.kappa, kappas, *_stepped(kappas), squint, shape,
         )  # fmt: skip
-        return given, (np.empty((rows, size)), *np.empty((2, len(kappas), size)))
+        return given, (aligned(rows, size), *aligned(2, len(kappas), size))
 
     @property
     def _axes(self) -> tuple[np.ndarray, tuple[float, float]]:
