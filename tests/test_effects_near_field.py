@@ -164,14 +164,26 @@ def test_terms_that_are_left_out_sum_to_no_more_than_is_allowed(allowed):
     matters = decay[0] > 1e-7
     pairs, terms, names, ends = near_field_terms.chosen(found, matters, allowed)
     kept = np.zeros_like(found)
+    # Rows of the table: five orders across, four up, three in inverse range, then products of the last two.
+    rows = {5 + b: (b, 0) for b in range(4)} | {9 + c: (0, c) for c in range(3)}
+    rows |= {12 + k: (up - 5, near - 9) for k, (up, near) in enumerate(pairs)}
+    rows[0] = 0, 0
     for order, (first, last) in enumerate(pairwise(ends)):
-        for (real, imag), (across, pair) in zip(terms[first:last], names[first:last], strict=True):
-            kept[order, across, *pairs[pair]] += complex(real, imag)
+        for (real, imag), (across, row) in zip(terms[first:last], names[first:last], strict=True):
+            kept[order, across, *rows[row]] += complex(real, imag)
     wanted = found * matters
     assert ((kept == 0) | (kept == wanted)).all() and abs(wanted - kept).sum() <= allowed
     # A quarter of what is allowed would not do for many fewer.
     assert (kept != 0).sum() <= (abs(wanted) > 0.01 * allowed).sum() or allowed == 0.0
     assert allowed > 0.0 or (kept == wanted).all()
+
+
+@pytest.mark.parametrize("allowed", [1e-9, 1e-5, 3e-4, 0.02])
+def test_the_least_size_that_counts_leaves_out_nearly_as_much_as_may(allowed):
+    sizes = np.exp(np.random.default_rng(9).uniform(-25.0, 0.0, 900))
+    least = near_field_loops.least_of(sizes, allowed)
+    assert sizes[sizes < least].sum() <= allowed < sizes[sizes < 1.13 * least].sum()
+    assert near_field_loops.least_of(sizes, 0.0) == 0.0 and near_field_loops.least_of(sizes, 1e9) > sizes.max()
 
 
 def test_directions_of_some_symbols_are_held_against_a_box_together():

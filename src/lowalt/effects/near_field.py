@@ -88,11 +88,10 @@ def sums(
             continue
         if kept is not None:
             kept[first] = box
-        rows_of = (2, *box.counts, len(box.pairs), 2 * box.mix.shape[1])
-        work = [aligned(size, POINTS) for size in rows_of]
+        work = [aligned(height, POINTS) for height in (2, sum(box.counts) + len(box.pairs), 2 * box.mix.shape[1])]
         evaluated(
-            at.reshape(3, -1), first * count, rows.stop * count, *box[:2], *box[3:], *work[:-1],
-            work[-1].reshape(-1, 2, POINTS), out.reshape(len(out), -1),
+            at.reshape(3, -1), first * count, rows.stop * count, *box, *work[:2], work[2].reshape(-1, 2, POINTS),
+            out.reshape(len(out), -1),
         )  # fmt: skip
 
 

@@ -4,11 +4,15 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, LEAN, ORDERED, VECTOR
+from lowalt.common.jit import INNER_VECTOR, LEAN, ORDERED, VECTOR, kernel
 from lowalt.effects.moment_loops import filled
 
 TOGETHER = 4
 """Terms that share a pass over the points."""
+INLINED_VECTOR = kernel(
+    inner=True, forceinline=True, error_model="numpy", _nrt=False, fastmath={"contract", "reassoc", "nsz"}
+)
+"""As INNER_VECTOR, and copied into its callers, since a pass over few points takes little longer than a call."""
 
 
 @ORDERED
@@ -75,14 +79,37 @@ def nodes(across, up, near, station, axes, out):
 
 
 @LEAN
+def least_of(size, allowed):
+    """Return the least of the sizes (K,) that counts: those below it sum to at most `allowed`, nearly as many as may.
+
+    It is a multiple of twice the mean share of what is allowed, found within an eighth.
+    """
+    most, least, higher, total = 0.0, 0.0, allowed / len(size), 0.0
+    for i in range(len(size)):
+        most = max(most, size[i])
+    while allowed > 0.0 and total <= allowed and least <= most:
+        least, higher, total = higher, 2.0 * higher, 0.0
+        for i in range(len(size)):
+            total += size[i] if size[i] < higher else 0.0
+    step = 0.5 * least
+    for _ in range(3):
+        total = 0.0
+        for i in range(len(size)):
+            total += size[i] if size[i] < least + step else 0.0
+        least += step if total <= allowed else 0.0
+        step *= 0.5
+    return least
+
+
+@LEAN
 def listed(found, matters, allowed, size, place, pairs, terms, names, ends):
     """Fill pairs, terms, names and ends as `evaluated` takes them; return how many pairs and orders there are.
 
     found: (D, A, B, C) complex terms, of which at most matters (A, B, C) are used; smaller ones that sum to at most
-    `allowed` are left out. size (D, A, B, C), place (B, C) int64: work space. Those of an order fill whole passes.
+    `allowed` are left out. size (D, A, B, C), place (B, C) int64: work space. Those of an order fill whole passes,
+    first passes of one order across each, then those left over.
     """
     orders, wide, high, deep = found.shape
-    count, most, least = 0, 0.0, 0.0
     for d in range(orders):
         for a in range(wide):
             for b in range(high):
@@ -90,30 +117,39 @@ def listed(found, matters, allowed, size, place, pairs, terms, names, ends):
                     one = found[d, a, b, c]
                     own = math.sqrt(one.real * one.real + one.imag * one.imag) if matters[a, b, c] else 0.0
                     size[d, a, b, c] = own
-                    most = max(most, own)
-                    count += 1
-    # The least size that counts: as many times twice the mean share of what is allowed as this holds.
-    flat, higher, total = size.reshape(size.size), allowed / count, 0.0
-    while allowed > 0.0 and total <= allowed and least <= most:
-        least, higher, total = higher, 2.0 * higher, 0.0
-        for i in range(count):
-            total += flat[i] if flat[i] < higher else 0.0
-    place[:] = -1
+    least = least_of(size.reshape(size.size), allowed)
+    for b in range(high):
+        for c in range(deep):
+            # The polynomials of order zero are one, so their products stand in the table already.
+            place[b, c] = wide + b if c == 0 else wide + high + c if b == 0 else -1
     used, at, last = 0, 0, 0
     ends[0] = 0
     for d in range(orders):
         first = at
-        for a in range(wide):
-            for b in range(high):
-                for c in range(deep):
-                    if size[d, a, b, c] < least or size[d, a, b, c] == 0.0:
-                        continue
-                    if place[b, c] < 0:
-                        place[b, c], pairs[used, 0], pairs[used, 1] = used, b, c
-                        used += 1
-                    terms[at, 0], terms[at, 1] = found[d, a, b, c].real, found[d, a, b, c].imag
-                    names[at, 0], names[at, 1] = a, place[b, c]
-                    at += 1
+        for rest in range(2):
+            for a in range(wide):
+                count = 0
+                for b in range(high):
+                    for c in range(deep):
+                        count += size[d, a, b, c] >= least and size[d, a, b, c] > 0.0
+                whole, number = count - count % TOGETHER, 0
+                for b in range(high):
+                    for c in range(deep):
+                        if size[d, a, b, c] < least or size[d, a, b, c] == 0.0:
+                            continue
+                        number += 1
+                        if (number > whole) != (rest == 1):
+                            continue
+                        if place[b, c] < 0:
+                            place[b, c], pairs[used, 0], pairs[used, 1] = (
+                                wide + high + deep + used,
+                                wide + b,
+                                wide + high + c,
+                            )
+                            used += 1
+                        terms[at, 0], terms[at, 1] = found[d, a, b, c].real, found[d, a, b, c].imag
+                        names[at, 0], names[at, 1] = a, place[b, c]
+                        at += 1
         last = d if at > first else last
         while at % TOGETHER:
             terms[at, 0], terms[at, 1], names[at, 0], names[at, 1] = 0.0, 0.0, 0, 0
@@ -124,31 +160,48 @@ def listed(found, matters, allowed, size, place, pairs, terms, names, ends):
 
 @INNER_VECTOR
 def chebyshev(at, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,)."""
-    scale, own = 1.0 / half, table[0]
-    for i in range(np.uint64(len(at))):
-        own[i] = 1.0
-    if len(table) > 1:
-        own = table[1]
-        for i in range(np.uint64(len(at))):
-            own[i] = (at[i] - middle) * scale
-    for k in range(2, len(table)):
-        x, older, old, own = table[1], table[k - 2], table[k - 1], table[k]
-        for i in range(np.uint64(len(at))):
-            own[i] = 2.0 * x[i] * old[i] - older[i]
+    """Fill table (K, L) with the Chebyshev polynomials of (at - middle) / half, at (L,), except order zero, ones."""
+    scale, size, k = 1.0 / half, np.uint64(len(at)), 2
+    if len(table) == 1:
+        return
+    one = table[1]
+    for i in range(size):
+        one[i] = (at[i] - middle) * scale
+    # Four orders a pass while there are so many.
+    while k + 3 < len(table):
+        older, old, a, b, c, d = table[k - 2], table[k - 1], table[k], table[k + 1], table[k + 2], table[k + 3]
+        for i in range(size):
+            x = 2.0 * one[i]
+            e = x * old[i] - older[i]
+            f = x * e - old[i]
+            g = x * f - e
+            a[i], b[i], c[i], d[i] = e, f, g, x * g - f
+        k += 4
+    while k < len(table):
+        older, old, own = table[k - 2], table[k - 1], table[k]
+        for i in range(size):
+            own[i] = 2.0 * one[i] * old[i] - older[i]
+        k += 1
 
 
-@INNER_VECTOR
-def added(terms, names, first, across, rest, re, im):
-    """Add to re and im (L,) the TOGETHER terms (T, 2) from `first`: each times its rows of across and rest.
+@INLINED_VECTOR
+def added(terms, names, first, table, re, im):
+    """Add to re and im (L,) the TOGETHER terms (T, 2) from `first`: each times its two rows of table (R, L).
 
-    names: (T, 2), numbers of rows of across (A, L) and of rest (P, L).
+    names: (T, 2), numbers of rows, in the order of the first.
     """
     k, l, m, n = first, first + 1, first + 2, first + 3  # noqa: E741
     t, u, v, w = terms[k, 0], terms[l, 0], terms[m, 0], terms[n, 0]
     a, b, c, d = terms[k, 1], terms[l, 1], terms[m, 1], terms[n, 1]
-    one, two, three, four = across[names[k, 0]], across[names[l, 0]], across[names[m, 0]], across[names[n, 0]]
-    five, six, seven, eight = rest[names[k, 1]], rest[names[l, 1]], rest[names[m, 1]], rest[names[n, 1]]
+    five, six, seven, eight = table[names[k, 1]], table[names[l, 1]], table[names[m, 1]], table[names[n, 1]]
+    one = table[names[k, 0]]
+    if names[k, 0] == names[l, 0] and names[k, 0] == names[m, 0] and names[k, 0] == names[n, 0]:
+        for i in range(np.uint64(len(re))):
+            e, f, g, h = five[i], six[i], seven[i], eight[i]
+            re[i] += one[i] * ((t * e + u * f) + (v * g + w * h))
+            im[i] += one[i] * ((a * e + b * f) + (c * g + d * h))
+        return
+    two, three, four = table[names[l, 0]], table[names[m, 0]], table[names[n, 0]]
     for i in range(np.uint64(len(re))):
         e, f, g, h = one[i] * five[i], two[i] * six[i], three[i] * seven[i], four[i] * eight[i]
         re[i] += (t * e + u * f) + (v * g + w * h)
@@ -174,22 +227,25 @@ def joined(mix, orders, re, im):
 
 
 @VECTOR
-def evaluated(at, start, stop, middle, half, pairs, terms, names, ends, mix, spot, across, up, near, rest, orders, out):
+def evaluated(at, start, stop, middle, half, counts, pairs, terms, names, ends, mix, spot, table, orders, out):
     """Fill out (Q, K) from start to stop with a box's polynomials at directions (3, K), of all its points.
 
-    Chebyshev polynomials of (at - middle) / half: A across, B up, C inverse range. pairs: (P, 2), numbers of the
-    polynomials up and in inverse range whose products the terms have; terms, names: as in `added`, those of the d-th
-    order in frequency from ends[d] to ends[d + 1]; mix: (Q, D), values of these orders at the frequencies. Work space
-    for S points at a time: spot (2, S), across (A, S), up (B, S), near (C, S), rest (P, S), orders (D, 2, S).
+    Chebyshev polynomials of (at - middle) / half: counts (A, B, C) of them across, up and in inverse range. pairs: (P,
+    2), numbers of the rows of the table whose products the terms have too; terms, names: as in `added`, those of the
+    d-th order in frequency from ends[d] to ends[d + 1]; mix: (Q, D), values of these orders at the frequencies. Work
+    space for S points at a time: spot (2, S), table (A + B + C + P, S), orders (D, 2, S).
     """
-    size = across.shape[1]
+    size, products = table.shape[1], counts[0] + counts[1] + counts[2]
+    for k in range(np.uint64(size)):
+        table[0, k], table[counts[0], k], table[counts[0] + counts[1], k] = 1.0, 1.0, 1.0
     for first in range(start, stop, size):
-        width = min(size, stop - first)
+        width, row = min(size, stop - first), 0
         for k in range(3):
             filled(at[k, first : first + width], size, spot[0])
-            chebyshev(spot[0], middle[k], half[k], across if k == 0 else up if k == 1 else near)
+            chebyshev(spot[0], middle[k], half[k], table[row : row + counts[k]])
+            row += counts[k]
         for k in range(len(pairs)):
-            one, two, own = up[pairs[k, 0]], near[pairs[k, 1]], rest[k]
+            one, two, own = table[pairs[k, 0]], table[pairs[k, 1]], table[products + k]
             for i in range(np.uint64(size)):
                 own[i] = one[i] * two[i]
         for d in range(len(orders)):
@@ -197,7 +253,7 @@ def evaluated(at, start, stop, middle, half, pairs, terms, names, ends, mix, spo
             for i in range(np.uint64(size)):
                 re[i], im[i] = 0.0, 0.0
             for k in range(ends[d], ends[d + 1], TOGETHER):
-                added(terms, names, k, across, rest, re, im)
+                added(terms, names, k, table, re, im)
         for q in range(len(mix)):
             own, re, im = out[q, first : first + width], orders[0, 0], orders[0, 1]
             if len(mix) > 1:
