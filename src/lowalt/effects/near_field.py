@@ -15,7 +15,7 @@ from lowalt.effects import interpolation, near_field_loops, response_loops
 from lowalt.effects.near_field_loops import directions, evaluated, held
 from lowalt.effects.near_field_terms import MOST, Aperture, chosen, orders
 
-SYMBOLS = 100
+SYMBOLS = 200
 """Symbols that share a box."""
 POINTS = 192
 """Points whose polynomials are evaluated together, so that these stay in the nearest cache; whole vectors."""
