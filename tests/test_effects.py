@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.special import jv
 
 import reference_effects
 from lowalt.common.config import faults, load, plain
@@ -18,7 +17,7 @@ from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
 from lowalt.echo import echo_matrix, echo_signal
 from lowalt.echo.radar import radar
-from lowalt.effects import interface, interpolation, waveform
+from lowalt.effects import interface, waveform
 from lowalt.effects import response_tables as tables
 from lowalt.effects.catalogue import BY_NEED, ORDER, PLACES, called, dotted
 from lowalt.effects.checks import check
@@ -120,17 +119,6 @@ def test_a_table_keeps_no_order_that_its_error_allows_to_leave_out():
         assert mix.shape[1] == len(values) and 0.1 * error < abs(mix[:, -1]).sum()
     kept = [tables.joined(2.0, 5, 64, error)[0].shape[1] for error in (1e-3, 1e-6, 1e-9)]
     assert kept[0] < kept[1] < kept[2] < 60
-
-
-@pytest.mark.parametrize("reach, nodes", [(0.04, 7), (0.7, 2), (20.0, 5), (0.03, 30)])
-def test_a_table_joins_frequencies_by_its_least_orders_even_at_rounding(reach, nodes):
-    mix, values = tables.joined(reach, nodes, 64, 1e-14)
-    orders, x = mix.shape[0] // nodes, np.linspace(-1.0, 1.0, 64)
-    bessel = np.array([(1 + (p > 0)) * jv(p, np.pi * reach * 63 / 64 * x) for p in range(orders)])
-    expected = interpolation.weights(nodes, x).T[:, None] * bessel
-    assert abs(mix @ values - expected.reshape(mix.shape[0], -1)).max() < 1e-13
-    # The orders of a product of functions of so many orders.
-    assert mix.shape[1] <= nodes + orders
 
 
 @settings(max_examples=20, deadline=None)

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.special import jv
 
 import reference_effects
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.effects import moment_loops, response_tables, spread_loops
+from lowalt.effects import interpolation, moment_loops, response_tables, spread_loops
 from lowalt.effects.one_way import OneWay
 from lowalt.effects.response import ImagePath, OneWayFactors, response
 from test_effects import network
@@ -191,3 +192,14 @@ def test_a_span_holds_all_excess_ranges_of_a_symbol():
     excess = np.array([[1.0, 4.0, 2.0], [-3.0, -1.0, 5.0]])
     middle, reach = OneWay(np.empty((2, 1, 2, 3)), excess).span()
     assert middle.tolist() == [2.5, 1.0] and reach == 4.0
+
+
+@pytest.mark.parametrize("reach, nodes", [(0.04, 7), (0.7, 2), (20.0, 5), (0.03, 30)])
+def test_a_table_joins_frequencies_by_its_least_orders_even_at_rounding(reach, nodes):
+    mix, values = response_tables.joined(reach, nodes, 64, 1e-14)
+    orders, x = mix.shape[0] // nodes, np.linspace(-1.0, 1.0, 64)
+    bessel = np.array([(1 + (p > 0)) * jv(p, np.pi * reach * 63 / 64 * x) for p in range(orders)])
+    expected = interpolation.weights(nodes, x).T[:, None] * bessel
+    assert abs(mix @ values - expected.reshape(mix.shape[0], -1)).max() < 1e-13
+    # The orders of a product of functions of so many orders.
+    assert mix.shape[1] <= nodes + orders

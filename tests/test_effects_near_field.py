@@ -7,7 +7,7 @@ import pytest
 
 from lowalt.common.config import load_yaml
 from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.effects import near_field, near_field_loops, near_field_terms, waves
+from lowalt.effects import near_field, near_field_loops, near_field_sizes, near_field_terms, waves
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 SPACING = SPEED_OF_LIGHT / (2 * NETWORK.carrier_hz)
@@ -183,9 +183,9 @@ def test_terms_that_are_left_out_sum_to_no_more_than_is_allowed(allowed):
 @pytest.mark.parametrize("allowed", [1e-9, 1e-5, 3e-4, 0.02])
 def test_the_least_size_that_counts_leaves_out_nearly_as_much_as_may(allowed):
     sizes = np.exp(np.random.default_rng(9).uniform(-25.0, 0.0, 900))
-    least = near_field_loops.least_of(sizes, allowed)
+    least = near_field_sizes.least_of(sizes, allowed)
     assert sizes[sizes < least].sum() <= allowed < sizes[sizes < 1.13 * least].sum()
-    assert near_field_loops.least_of(sizes, 0.0) == 0.0 and near_field_loops.least_of(sizes, 1e9) > sizes.max()
+    assert near_field_sizes.least_of(sizes, 0.0) == 0.0 and near_field_sizes.least_of(sizes, 1e9) > sizes.max()
 
 
 def test_directions_of_some_symbols_are_held_against_a_box_together():
