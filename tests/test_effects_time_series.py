@@ -116,7 +116,7 @@ def test_no_range_differs_within_a_symbol_by_more_than_its_bound():
 
 @pytest.mark.parametrize(("first", "more"), [(0, {"ground_reflection": {}}), (7, {})])
 def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(first, more, monkeypatch):
-    radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=130, transmit=(4, 2), receive=(4, 2))
+    radio = network(subcarrier_spacing_hz=15e3, subcarriers=32, symbols=230, transmit=(4, 2), receive=(4, 2))
     cloud, row = target([[0.1, 0, 0], [-0.1, 0.02, 0]], rotor=True, x_m=120.0, vx_mps=40.0, rate_hz=60.0)
     # The target crosses the range that the prefix covers at the fiftieth symbol.
     settings = {"symbol_motion": {}, "cyclic_prefix": {"prefix_s": 2 * 125.0 / SPEED_OF_LIGHT}} | more
@@ -125,8 +125,8 @@ def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(f
     chain = Chain(list(scene.effects), view, lambda name: scene.stream(name, row, "A"), 1.0)
     rows = slice(first, None)
     part = view.at(view.times_s[rows]) if first else view
-    assert len(part.motion.rotation) == 130 - first
-    factor = np.random.default_rng(3).uniform(0.2, 1.0, (130, 2))[rows]
+    assert len(part.motion.rotation) == 230 - first
+    factor = np.random.default_rng(3).uniform(0.2, 1.0, (230, 2))[rows]
     given = chain.target, part, frozenset(("symbol_motion", "cyclic_prefix")), factor, rows
     still, samples = arrivals.arriving(*given)
     monkeypatch.setattr(arrivals, "TOGETHER", 1)
@@ -134,7 +134,7 @@ def test_symbols_that_go_through_all_instants_in_two_groups_have_the_same_echo(f
     monkeypatch.setattr(arrivals, "_in_orders", lambda *now: (groups.append(len(now[1].times_s)), in_orders(*now))[1])
     for one, other in zip(arrivals.arriving(*given), (still, samples), strict=True):
         assert abs(other).max() > 0 and abs(one - other).max() < 1e-10 * abs(still).max()
-    assert groups == [100, len(part.times_s) - 100]
+    assert groups == [200, len(part.times_s) - 200]
 
 
 def test_a_view_at_some_symbols_has_the_motion_and_the_places_of_these():
