@@ -104,8 +104,7 @@ class OneWayFactors:
             # Instants that are alike differ by less than `farther_m`, in places as in ranges.
             longest = max(path.longest(network.transmit, wavefront, farther_m) for path in chosen)
         self.nodes = like.nodes if like else tables.frequencies(network, radio, squint, error / 2, longest)
-        kappas = self.nodes
-        asked = kappas, squint, wavefront, self.rest
+        asked = self.nodes, squint, wavefront, self.rest
         self.out = [
             path.one_way(network.transmit, *asked, _own(kept, "out", number), instant)
             for number, path in enumerate(sending)
@@ -180,17 +179,14 @@ class OneWayFactors:
             return waveform.tones_of(self.spectrum(moments), data)
         return self._spread(moments, np.ascontiguousarray(data))
 
-    def searched(
-        self, moments: list[np.ndarray], signs: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    def searched(self, moments: list[np.ndarray], signs: np.ndarray | None) -> tuple[np.ndarray, ...]:
         """Return what `spread_search.spread_and_search` does of the `moments` of the only pair of paths."""
         given = moments[0], self.functions(self.frames[0][1]), *self.delays(0)
         return spread_search.spread_and_search(given, self.radio.subcarriers, signs)
 
     def _spread(self, moments: list[np.ndarray], data: np.ndarray, onto: np.ndarray | None = None) -> np.ndarray:
         """The subcarriers (N, M) of moments, added to `onto`, or with data (N, M) the tones of those of one pair."""
-        count = self.radio.subcarriers
-        half = (count + 1) // 2
+        count, half = self.radio.subcarriers, (self.radio.subcarriers + 1) // 2
         work = aligned(4, half), aligned(2, half), aligned(2, count)
         result = aligned_complex(len(self.refs), count) if onto is None else onto
         for number, (planes, (_, reach)) in enumerate(zip(moments, self.frames, strict=True)):
