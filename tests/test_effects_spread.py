@@ -87,6 +87,18 @@ def test_only_symbols_that_are_not_certain_are_transformed(monkeypatch):
     np.testing.assert_allclose(abs(value), abs(np.fft.ifft(result, axis=1)).max(axis=1), rtol=1e-12)
 
 
+@pytest.mark.parametrize("near", [0, 40, 41, 63])
+def test_a_guess_of_the_first_cell_changes_no_answer_and_a_good_one_saves_a_transform(near, monkeypatch):
+    cells = np.random.default_rng(4).normal(size=(40, 64)) * 0.01 + 0j
+    cells[:, 40] = 1.0
+    responses, transformed, plain = np.fft.fft(cells, axis=1), [], strongest_cell._cells
+    monkeypatch.setattr(strongest_cell, "_cells", lambda *given: transformed.append(1) or plain(*given))
+    value, cell = strongest_cell.strongest(responses, near=near)
+    np.testing.assert_array_equal(cell, 40)
+    np.testing.assert_allclose(value, cells[:, 40], rtol=0, atol=1e-14)
+    assert len(transformed) == (0 if near == 40 else 1)
+
+
 RECEIVERS = {
     "one": {"iq_imbalance": {"gain_db": 3.0}},
     "several": {"carrier_offset": {"fixed_hz": 900.0}, "iq_imbalance": {"gain_db": 3.0}, "adc": {"bits": 6}},

@@ -175,10 +175,10 @@ class Chain:
         if self.detection or self.timing is not None:
             responses = heard.responses if self.timing is None else heard.responses[self.view.sampling.present]
             responses = detecting.filtered(self.detection, responses, self.receiving.bare, self.draws)
-            return strongest_cell.strongest(responses)
+            return strongest_cell.strongest(responses, near=self.target.near)
         if heard.noise is None and heard.given is self.target.__dict__.get("direct"):
             return self.target.strongest
-        return heard.strongest()
+        return heard.strongest(self.target.near)
 
     def _evenly(self, outcome: Outcome) -> Outcome:
         """The received symbols' outcome at N evenly spaced symbols; the cell is -1 where none was received."""

@@ -94,11 +94,14 @@ class Heard:
         cells += self.noise.cells()
         return cells
 
-    def strongest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the strongest range cells of all symbols, values (N,) and numbers (N,), from no response at all."""
+    def strongest(self, near: int | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return the strongest range cells of all symbols, values (N,) and numbers (N,), from no response at all.
+
+        near: as in `strongest_cell.strongest`.
+        """
         if self.noise is not None:
             return self.noise.strongest(self.given)
-        return strongest_cell.strongest(self.given, self.signs)
+        return strongest_cell.strongest(self.given, self.signs, near)
 
 
 class Receiving:

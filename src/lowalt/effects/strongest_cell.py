@@ -121,12 +121,13 @@ def walked(parts, near, n, total, clear, wave, held, rows, seen):
 
 
 @VECTOR
-def found(responses, signs, start, space, value, cell):
+def found(responses, signs, start, guessed, space, value, cell):
     """Fill value and cell (N,) with the strongest range cells of responses (N, M); return whether few are left.
 
     signs: (2, N, M) where `responses` are tones, as in `taken_without`, else (2, 0, M); start: a cell near the first
     symbol's; space: of `space`. Symbols whose strongest cell is not certain after MOST cells are left, with cell -1;
-    once more than a quarter of the look and 16 are left, the loop gives up.
+    once more than a quarter of the look and 16 are left, or the first one where its start is `guessed`, the loop gives
+    up.
     """
     symbols, count = responses.shape
     wave, parts, held, rows, seen = space
@@ -141,7 +142,7 @@ def found(responses, signs, start, space, value, cell):
         if total > 0.0 and not top > rest:
             cell[n] = -1
             left += 1
-            if 4 * left > symbols + 64:
+            if 4 * left > symbols + 64 or (guessed and n == 0):
                 return False
     return True
 
@@ -153,18 +154,25 @@ def space(count: int) -> tuple[np.ndarray, ...]:
     return _wave(count), aligned(2, count), held, rows, np.empty(SLOTS, np.complex128)
 
 
-def strongest(responses: np.ndarray, signs: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+def strongest(
+    responses: np.ndarray, signs: np.ndarray | None = None, near: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Return the strongest range cells of responses (N, M): their values (N,) and numbers (N,).
 
-    signs: (2, N, M) int8, where `responses` are the tones (`waveform.tones_of`) of symbols that carried such QPSK data.
-    Source: Parseval's theorem.
+    signs: (2, N, M) int8, where `responses` are the tones (`waveform.tones_of`) of symbols that carried such QPSK data;
+    near: a cell that is probably near the first symbol's, None where none is known. Source: Parseval's theorem.
     """
     symbols, count = responses.shape
     value, cell = np.empty(symbols, np.complex128), np.full(symbols, -1)
     given = np.empty((2, 0, count), np.int8) if signs is None else np.ascontiguousarray(signs)
     if count >= FEWEST and symbols > 0:
-        start = int(abs(_cells(responses[:1], given[:, :1])).argmax())
-        found(np.ascontiguousarray(responses), given, start, space(count), value, cell)
+        whole, work = np.ascontiguousarray(responses), space(count)
+        if near is not None:
+            found(whole, given, near, True, work, value, cell)
+        # Far from the strongest cell, a search of the first symbol settles nothing.
+        if near is None or cell[0] < 0:
+            start = int(abs(_cells(responses[:1], given[:, :1])).argmax())
+            found(whole, given, start, False, work, value, cell)
     rest = np.flatnonzero(cell < 0)
     if len(rest):
         rows = slice(None) if len(rest) == symbols else rest

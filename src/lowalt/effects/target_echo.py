@@ -97,6 +97,11 @@ class TargetEcho:
         value, cell = self._strongest or strongest_cell.strongest(self.direct)
         return value, cell
 
+    @property
+    def near(self) -> int | None:
+        """The first symbol's strongest range cell of `direct`, None where it is not known."""
+        return None if self._strongest is None or not len(self._strongest[1]) else int(self._strongest[1][0])
+
     def send(self) -> None:
         """Make the tones of `direct` in the pass that finds its strongest cells, for `sent`; the data are QPSK."""
         rays, moments = self._alone
