@@ -97,9 +97,9 @@ def test_a_known_direct_echo_serves_the_echo_over_all_paths(effects):
 
 def test_a_known_direct_echo_is_not_worked_out_again(monkeypatch):
     view, pairs = seen("DJI Mini 2"), []
-    spectrum = OneWayFactors.spectrum
+    moments = OneWayFactors.moments
     monkeypatch.setattr(
-        OneWayFactors, "spectrum", lambda own, *given: pairs.append(len(own.pairs)) or spectrum(own, *given)
+        OneWayFactors, "moments", lambda own, *given: pairs.append(len(own.pairs)) or moments(own, *given)
     )
     known = echo(view, BOTH)
     assert known.direct.any() and known.subcarriers(view, frozenset(), known.routes).any()

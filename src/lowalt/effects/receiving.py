@@ -53,7 +53,7 @@ class GivesTones(Protocol):
 
 @runtime_checkable
 class DrawsNothing(Protocol):
-    """Optional, receiver: an effect without random numbers. No stream is made for it; its generator is UNUSED."""
+    """Optional: an effect without random numbers. No stream is made for it; its generator is UNUSED."""
 
     DRAWS_NOTHING: bool
 
@@ -159,9 +159,8 @@ class Receiving:
         A transform takes longer than most effects, so tones are kept while no effect asks for samples.
         """
         for place, effect in enumerate(left):
-            still = providing([effect], DrawsNothing)
             frame = self.bare if providing([effect], NeedsNoData) else self.frame
-            given = frame, UNUSED if still else self.draws(stream_name(effect.name))
+            given = frame, self.draws(stream_name(effect.name))
             takes = bool(providing([effect], TakesTones))
             if tones is None and takes:
                 tones = transforms.forward(samples)
