@@ -31,7 +31,7 @@ def book(made, page):
 @pytest.fixture
 def checkout(tmp_path, monkeypatch):
     """A folder with links to the contents of a checkout and to the environment of this Python."""
-    for name in ("config", "design", "examples", "workflow", "src"):
+    for name in ("Snakefile", "config", "design", "envs", "examples", "profiles", "src", "workflow"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / ".venv").symlink_to(sys.prefix)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
