@@ -1,6 +1,7 @@
 """Random streams of effects: those that draw nothing get none, and questions about modules are asked once."""
 
 import importlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -35,6 +36,32 @@ def test_streams_of_effects_that_draw_do_not_depend_on_others(rng):
     alone, beside = (drawn(scene(names), row, station, "cell_error") for names in (BESIDE, BESIDE | {"detector": {}}))
     np.testing.assert_array_equal(alone.random(5), beside.random(5))
     assert drawn(scene(BESIDE | {"detector": {}}), row, station, "detector") is receiving.UNUSED
+
+
+@pytest.mark.parametrize(
+    ("name", "ends", "alike"),
+    [
+        ("link_offset", "AB BA AC A", {"AB", "BA", "AC", "A"}), ("fluctuation", "AB BA AC A", {"AB", "BA"}),
+        ("cell_error", "AB BA AC A", {"AB"}),
+    ],
+)  # fmt: skip
+def test_stations_of_a_look_share_draws_that_belong_to_all_of_them_and_both_ways_those_of_their_pair(
+    name, ends, alike, rng
+):
+    (_, row), (plain,) = target(rng), network().stations
+    one = {station: replace(plain, name=station) for station in "ABC"}
+    found = {}
+    for both in ends.split():
+        hears = (
+            one[both] if len(both) == 1 else replace(plain, name=both, transmitter=one[both[0]], receiver=one[both[1]])
+        )
+        found[both] = float(drawn(scene({name: {}}), row, hears, name).random())
+    assert {both for both in found if found[both] == found["AB"]} == alike
+    # The stream of another station of the look is asked for by name.
+    assert (
+        drawn(scene({name: {}}), row, one["A"], name, one["B"]).random()
+        == drawn(scene({name: {}}), row, one["B"], name).random()
+    )
 
 
 def test_every_answer_of_every_effect_is_kept():
