@@ -33,7 +33,8 @@ def test_an_effect_that_draws_nothing_gets_no_stream_and_leaves_its_generator_as
 
 def test_streams_of_effects_that_draw_do_not_depend_on_others(rng):
     (_, row), station = target(rng), network().stations[0]
-    alone, beside = (drawn(scene(names), row, station, "cell_error") for names in (BESIDE, BESIDE | {"detector": {}}))
+    alone = drawn(scene(BESIDE), row, station, "cell_error")
+    beside = drawn(scene(BESIDE | {"detector": {}}), row, station, "cell_error")
     np.testing.assert_array_equal(alone.random(5), beside.random(5))
     assert drawn(scene(BESIDE | {"detector": {}}), row, station, "detector") is receiving.UNUSED
 

@@ -245,6 +245,6 @@ def _stepped_at(given: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
     """What `_stepped` returns for these frequencies, which must not be changed."""
     kappas = np.array(given)
     steps = 0.5 * (kappas - 0.5 * (kappas[0] + kappas[-1]))
-    # Chebyshev points lie evenly about their middle, but for rounding.
+    # Every Chebyshev point has a mirror image about the middle; rounding may part the two in the last digit.
     steps = 0.5 * (steps - steps[::-1])
     return steps, waves.waves_within(0.5 * float(abs(steps).max()))

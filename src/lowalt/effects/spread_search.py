@@ -9,7 +9,7 @@ from lowalt.common.jit import INNER_VECTOR, VECTOR
 from lowalt.common.memory import aligned, aligned_complex
 from lowalt.effects import strongest_cell
 from lowalt.effects.spread_loops import spread_symbol
-from lowalt.effects.strongest_cell import SLOTS, power, walked
+from lowalt.effects.strongest_cell import power, settled
 from lowalt.effects.tone_loops import HALF
 
 
@@ -30,8 +30,7 @@ def _spread_and_found(planes, table, own, whole, cells, work, turn, signs, space
     once more than a quarter of the look and 16 are left, no more are searched.
     """
     symbols, count = result.shape
-    wave, parts, held, rows, seen = space
-    low, left, near = count // 2, 0, 0
+    parts, low, left, near = space[1], count // 2, 0, 0
     re, im = parts[0], parts[1]
     for n in range(symbols):
         row = result[n]
@@ -52,12 +51,8 @@ def _spread_and_found(planes, table, own, whole, cells, work, turn, signs, space
         if 4 * left > symbols + 64:
             continue
         total = power(parts) / count
-        _, _, best, top, rest = walked(parts, near, n, total, 0.0, wave, held, rows, seen)
-        value[n], near = seen[best % SLOTS], best % count
-        cell[n] = near if total > 0.0 else 0
-        if total > 0.0 and not top > rest:
-            cell[n] = -1
-            left += 1
+        near, uncertain = settled(parts, near, n, total, space, value, cell)
+        left += uncertain
 
 
 def spread_and_search(

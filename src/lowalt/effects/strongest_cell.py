@@ -120,6 +120,22 @@ def walked(parts, near, n, total, clear, wave, held, rows, seen):
     return first, last, best, top, rest
 
 
+@INNER_VECTOR
+def settled(parts, near, n, total, space, value, cell):
+    """Set value and cell, (N,), of symbol n to its strongest range cell, -1 where it is not certain; see `walked`.
+
+    parts, near, total: as in `walked`; space: of `space`. Returns a cell near the next symbol's, and 1 if not certain.
+    """
+    wave, _, held, rows, seen = space
+    _, _, best, top, rest = walked(parts, near, n, total, 0.0, wave, held, rows, seen)
+    value[n], near = seen[best % SLOTS], best % parts.shape[1]
+    cell[n] = near if total > 0.0 else 0
+    if total > 0.0 and not top > rest:
+        cell[n] = -1
+        return near, 1
+    return near, 0
+
+
 @VECTOR
 def found(responses, signs, start, guessed, space, value, cell):
     """Fill value and cell (N,) with the strongest range cells of responses (N, M); return whether few are left.
@@ -130,20 +146,15 @@ def found(responses, signs, start, guessed, space, value, cell):
     up.
     """
     symbols, count = responses.shape
-    wave, parts, held, rows, seen = space
-    left, near = 0, start
+    parts, left, near = space[1], 0, start
     for n in range(symbols):
         row = responses[n]
         total = taken_without(row, signs[0, n], signs[1, n], parts) if signs.shape[1] > 0 else taken(row, parts)
         total /= count
-        _, _, best, top, rest = walked(parts, near, n, total, 0.0, wave, held, rows, seen)
-        value[n], near = seen[best % SLOTS], best % count
-        cell[n] = near if total > 0.0 else 0
-        if total > 0.0 and not top > rest:
-            cell[n] = -1
-            left += 1
-            if 4 * left > symbols + 64 or (guessed and n == 0):
-                return False
+        near, uncertain = settled(parts, near, n, total, space, value, cell)
+        left += uncertain
+        if uncertain and (4 * left > symbols + 64 or (guessed and n == 0)):
+            return False
     return True
 
 

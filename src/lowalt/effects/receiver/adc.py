@@ -36,8 +36,13 @@ def quantise(samples: np.ndarray, bits: int, full_scale: float, clip: bool = Tru
     parts = np.ascontiguousarray(samples, np.complex128).view(np.float64).reshape(-1)
     out = np.empty_like(parts)
     most = _most(bits, clip)
-    clipped = _steps(parts, full_scale * 2.0 ** (1 - bits), most, full_scale, out)
+    clipped = _steps(parts, _height(full_scale, bits), most, full_scale, out)
     return out.view(np.complex128).reshape(samples.shape), int(clipped)
+
+
+def _height(full_scale: float, bits: int) -> float:
+    """The height of each of the 2^bits steps that fill twice the range."""
+    return full_scale * 2.0 ** (1 - bits)
 
 
 def _most(bits: int, clip: bool) -> float:
@@ -100,7 +105,7 @@ def full_scale(samples: np.ndarray, backoff_db: float) -> float:
 
 def step(settings: dict, samples: np.ndarray) -> float:
     """Return the height of a step for these samples, zero for a look of zeros."""
-    return full_scale(samples, settings["backoff_db"]) * 2.0 ** (1 - settings["bits"])
+    return _height(full_scale(samples, settings["backoff_db"]), settings["bits"])
 
 
 def receive(settings: dict, samples: np.ndarray, frame: Frame, rng: np.random.Generator) -> np.ndarray:
@@ -134,6 +139,6 @@ def retoned(settings: dict, tones: np.ndarray, frame: Frame, rng: np.random.Gene
 
 def _converted(settings: dict, given: np.ndarray, back: bool, scale: float, out: np.ndarray) -> np.ndarray:
     """The tones (N, M) of the converter's output, in `out`; given, back: as in `_stepped_tones`."""
-    height, most = scale * 2.0 ** (1 - settings["bits"]), _most(settings["bits"], settings["clip"])
+    height, most = _height(scale, settings["bits"]), _most(settings["bits"], settings["clip"])
     _stepped_tones(given, back, height, most, transforms.table(), transforms.work(), out)
     return out
