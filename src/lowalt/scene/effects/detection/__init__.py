@@ -1,0 +1,1 @@
+"""Effects on range cells: filters before one is chosen, and the choice."""

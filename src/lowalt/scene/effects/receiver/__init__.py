@@ -1,0 +1,1 @@
+"""Effects on the time samples that a station receives."""

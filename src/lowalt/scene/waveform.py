@@ -1,0 +1,94 @@
+"""The OFDM waveform of a look: the data sent, the samples received, and the receiver's view of both.
+
+Samples are the complex baseband around the station's local oscillator, which stands at subcarrier M // 2 as in NR
+(3GPP TS 38.211, 5.3.1 and 5.4): subcarrier m lies at (m - M // 2) df. Only the useful part of each symbol is kept.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import fft
+
+from lowalt.common.network import Network, Station
+
+QPSK = np.sqrt(0.5) * np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j])
+"""The four data symbols, of unit modulus."""
+
+
+def qpsk(rng: np.random.Generator, symbols: int, subcarriers: int) -> np.ndarray:
+    """Return random QPSK data (symbols, subcarriers) complex128 of unit modulus, all four values equally likely.
+
+    Source: paper, Eq. 5, whose data symbols have unit power; 3GPP TS 38.211, 5.1.3 (QPSK).
+    """
+    count = symbols * subcarriers
+    # The upper two bits of each byte choose a symbol; the lowest byte of a word comes first.
+    words = rng.bit_generator.random_raw(-(-count // 8)).astype("<u8", copy=False)
+    return QPSK[words.view(np.uint8)[:count] >> 6].reshape(symbols, subcarriers)
+
+
+def transmit(response: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the received time samples (N, M) of frequency responses (N, M) that carried `data` (N, M).
+
+    Sample i is (1/M) sum_m response[m] data[m] exp(j 2 pi (m - M // 2) i / M), so its 2-norm is 1 / sqrt(M) of the
+    response's. Source: 3GPP TS 38.211, 5.3.1.
+    """
+    return fft.ifft(fft.ifftshift(response * data, axes=-1), axis=-1, overwrite_x=True)
+
+
+def demodulate(samples: np.ndarray, data: np.ndarray) -> np.ndarray:
+    """Return the responses (N, M) of time samples (N, M) that carried `data` (N, M): the inverse of `transmit`.
+
+    The division is by the sent symbol s; the paper's Eq. 24 would need its conjugate. The response alone remains.
+    """
+    return fft.fftshift(fft.fft(samples, axis=-1), axes=-1) / data
+
+
+def range_cells(response: np.ndarray) -> np.ndarray:
+    """Return the range cells (N, M) of frequency responses (N, M), the inverse transform over subcarriers."""
+    return fft.ifft(response, axis=-1)
+
+
+@dataclass(frozen=True)
+class Look:
+    """One look (coherent processing interval) as the receiver of one station knows it."""
+
+    network: Network
+    station: Station
+    data: np.ndarray
+    """(N, M) complex128, the data, of mean power one."""
+    aired: np.ndarray
+    """(N, M) subcarriers on the air: the data, as an amplifier distorts them."""
+    times_s: np.ndarray
+    """(N,) s, start of each symbol's useful part."""
+    reference: float
+    """The target echo's mean |Y_bin|^2 (W), to which set SNRs refer."""
+    delay_s: float
+    """Two-way delay of the target's reference point at n = 0, 2 r / c (s): where the beam was pointed."""
+
+    @property
+    def sample_s(self) -> float:
+        """Time between two samples, 1 / (M df) (s)."""
+        return 1 / (self.network.subcarriers * self.network.subcarrier_spacing_hz)
+
+    @cached_property
+    def within_s(self) -> np.ndarray:
+        """Time i / (M df) of each sample in its symbol (s), shape (M,)."""
+        return np.arange(self.network.subcarriers) * self.sample_s
+
+    @cached_property
+    def sample_times_s(self) -> np.ndarray:
+        """Absolute time of every sample (s), shape (N, M)."""
+        return self.times_s[:, None] + self.within_s
+
+    @cached_property
+    def baseband_hz(self) -> np.ndarray:
+        """Frequency of each subcarrier from the local oscillator, (m - M // 2) df (Hz), shape (M,)."""
+        count = self.network.subcarriers
+        return (np.arange(count) - count // 2) * self.network.subcarrier_spacing_hz
+
+    @property
+    def oscillator_hz(self) -> float:
+        """Frequency of the local oscillator, f_k + (M // 2) df (Hz)."""
+        count = self.network.subcarriers
+        return self.station.frequency_hz + count // 2 * self.network.subcarrier_spacing_hz
