@@ -1,0 +1,200 @@
+"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths, with squint and spherical waves on request.
+
+Over the few range cells of a target the response is a smooth function of frequency. Each symbol is summed into Chebyshev
+moments of the points' excess ranges, at one frequency of the band or, where array sums depend on it, at a few; two
+matrix products turn moments into all M subcarriers: exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),
+|u| <= 1. No array of symbols x points x subcarriers exists.
+"""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import jv
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.scene import response_loops, spherical
+from lowalt.scene.view import View
+
+ERROR = 1e-12
+"""Largest error of the expansions in frequency, relative to the sum of the points' amplitudes."""
+
+
+class Path(NamedTuple):
+    """A one-way propagation path between a station and every point, given by the points' images.
+
+    places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's complex factor in
+    addition to 1/r, a number or (N, L); station_m: (3,) m, the station's image, where the points see the station;
+    sender: on a link, the path of the same kind between the sender and the points, None where both are alike.
+    """
+
+    places: np.ndarray
+    coefficient: np.ndarray | complex = 1.0
+    station_m: np.ndarray | None = None
+    sender: "Path | None" = None
+
+
+def response(
+    view: View, paths: Sequence[Path] = (), factor: np.ndarray | float = 1.0, *, squint: bool = False,
+    wavefront: bool = False,
+) -> np.ndarray:  # fmt: skip
+    """Return the subcarriers Y (N, M) complex128 of a view's target, the known symbol removed.
+
+    paths: all but the direct one; waves go out by any path and come back by any; factor: real, on every point's two-way
+    amplitude, (N, L), or (R, R, N, L) by the way out and the way back, the direct path first; squint: the arrays'
+    phases follow each subcarrier's frequency while the beams' weights do not; wavefront: elements see spherical waves.
+    A link goes out by its transmitter's array and paths, and comes back by its receiver's.
+    Raises: InputError for a point in the station. Source: paper Eqs. 4, 7 and 24; Jacobi-Anger expansion; Willis,
+    Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
+    """
+    network, station = view.network, view.station
+    seen = [Path(view.places), *paths]
+    ends = [(station, network.receive, seen)]
+    same = station.transmitter is None and network.transmit == network.receive
+    if not same:
+        sender = station.transmitter or station
+        ends.insert(0, (sender, network.transmit, [path.sender or path for path in seen]))
+    middle, radius = _middle(view.places)
+    arrays = [_end(view, *end, (squint, wavefront)) for end in ends]
+    aperture = max(array.spacing * _half_diagonal(array.counts) for array in arrays)
+    nearest = min(float(array.centre.min()) for array in arrays) - radius.max()
+    reach = radius * (1.0 + 2.0 * aperture / nearest) if squint and nearest > 0 else radius + 2.0 * aperture * squint
+    # One table serves all symbols, and a power of sqrt(2) lets a few serve all samples.
+    largest = 2.0 ** (np.ceil(2 * np.log2(max(float(reach.max()), 1e-3))) / 2)
+    band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
+    to_nodes, to_band = tables(len(arrays[0].kappas), float(2.0 * largest * band_m), network.subcarriers)
+    out, back = arrays[0], arrays[-1]
+    nodes, orders = len(out.kappas), len(to_nodes) // len(out.kappas)
+    result = np.empty((len(out.places), len(back.places), len(middle), nodes, 2, orders))
+    strength = _amplitudes(view, factor)
+    fault = response_loops.moments(out, back, same, strength, largest, result)
+    if fault:
+        raise InputError(
+            f"position of a point at symbol {fault - 1} is that of station {station.name} (r = 0), expected r > 0"
+        )
+    total = np.zeros((len(middle), network.subcarriers), np.complex128)
+    for a, b in np.ndindex(result.shape[:2]):
+        if same and b < a:
+            continue
+        weight = 2.0 if same and a != b else 1.0
+        own = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(middle), -1)
+        range_m = out.centre[a] + back.centre[b]
+        spectrum = np.ascontiguousarray((own @ to_nodes) @ to_band)
+        response_loops.add_turned(spectrum, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
+    return total
+
+
+def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
+    """Real amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance: a0 lambda sqrt(sigma) / (4 pi)^1.5."""
+    network = view.network
+    elements = float(np.prod(network.transmit) * np.prod(network.receive))
+    wavelength = SPEED_OF_LIGHT / network.carrier_hz
+    scale = np.sqrt(network.power / elements) * wavelength / (4.0 * np.pi) ** 1.5
+    strength = scale * np.sqrt(view.cloud.rcs_m2) * np.asarray(factor, np.float64)
+    strength = strength.reshape((1,) * (4 - strength.ndim) + strength.shape)
+    return np.ascontiguousarray(np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2])))
+
+
+def _middle(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The mean (N, 3) of places (N, L, 3) m, and the distance (N,) of the farthest place from it."""
+    middle = places.mean(axis=1)
+    return middle, np.sqrt(((places - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
+
+
+def _half_diagonal(counts: np.ndarray) -> float:
+    """Distance of an array's corner from its middle, in spacings."""
+    return 0.5 * float(np.hypot(counts[0] - 1, counts[1] - 1))
+
+
+def cosines(station: Station, places: np.ndarray) -> np.ndarray:
+    """Return the direction cosines (..., 2), across and up, of places (..., 3) m as a station's array sees them."""
+    away = places - np.asarray(station.position_m)
+    return np.stack([away @ station.horizontal, away[..., 2]], axis=-1) / np.linalg.norm(away, axis=-1)[..., None]
+
+
+def _end(
+    view: View, station: Station, counts: tuple[int, int], paths: Sequence[Path],
+    physics: tuple[bool, bool],
+) -> response_loops.End:  # fmt: skip
+    """One end's array and paths as the loops take them; physics: squint and wavefront."""
+    network, (squint, wavefront) = view.network, physics
+    # On a link, all frequencies are those of the signal, which is the transmitter's.
+    carrier, lowest = network.carrier_hz, view.station.frequency_hz
+    centre_hz = lowest + 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz
+    beams = view.beams_of(station)
+    # An instant that is a multiple of the update must not fall before it by rounding.
+    current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
+    images = np.stack([np.ascontiguousarray(np.swapaxes(path.places, 1, 2)) for path in paths])
+    coefficient = np.stack([
+        np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths
+    ])  # fmt: skip
+    # An image keeps all distances, so the mean of the images is as far from them as the points' mean is from these.
+    centres = np.stack([path.places.mean(axis=1) for path in paths])
+    end = response_loops.End(
+        np.array(station.position_m, np.float64), station.horizontal[:2].copy(), np.array(counts),
+        SPEED_OF_LIGHT / (2.0 * carrier), lowest / carrier, frequencies(network, view.station, squint), squint,
+        centre_hz / SPEED_OF_LIGHT, cosines(station, beams.aims_m)[current], images, coefficient,
+        np.linalg.norm(centres - np.asarray(station.position_m), axis=2), np.empty((0, 0, 0, 0), np.complex128),
+    )  # fmt: skip
+    return end._replace(gains=spherical.gains(end, ERROR)) if wavefront else end
+
+
+def frequencies(network: Network, station: Station, squint: bool) -> np.ndarray:
+    """Return the frequencies (Q,) over the carrier at which array sums are taken: Chebyshev points of the band.
+
+    Elements' paths relative to the array's middle decide how many are needed. Without squint, arrays work at the lowest
+    subcarrier's frequency alone.
+    """
+    lowest = station.frequency_hz / network.carrier_hz
+    half = 0.5 * (network.subcarriers - 1) * network.subcarrier_spacing_hz / network.carrier_hz
+    if not squint or half == 0.0:
+        return np.array([lowest])
+    spread = np.pi * half * (_half_diagonal(np.array(network.transmit)) + _half_diagonal(np.array(network.receive)))
+    return lowest + half + half * chebyshev_points(orders_of(spread))
+
+
+def orders_of(argument: float, error: float = ERROR) -> int:
+    """Return how many Chebyshev polynomials hold exp(j argument x), |x| <= 1, within `error`.
+
+    From an order above the argument on, each Bessel function is below half the one before it.
+    """
+    order = int(argument) + 1
+    while 4.0 * abs(jv(order, argument)) > error:
+        order += 1
+    return order
+
+
+def chebyshev_points(count: int) -> np.ndarray:
+    """Return the Chebyshev points (count,) of the first kind on [-1, 1], from 1 downwards."""
+    return np.cos(np.pi * (np.arange(count) + 0.5) / count)
+
+
+def interpolation(count: int, at: np.ndarray) -> np.ndarray:
+    """Return the Lagrange weights (count, K) from values at `chebyshev_points(count)` to those at `at` (K,).
+
+    Source: Trefethen, Approximation Theory and Approximation Practice, 2013, chapters 2 to 5.
+    """
+    order = np.arange(count)
+    values = np.cos(np.outer(order, np.arccos(np.clip(at, -1.0, 1.0))))
+    values[1:] *= 2.0
+    return np.cos(np.outer(np.pi * (order + 0.5) / count, order)) @ values / count
+
+
+@lru_cache(maxsize=64)
+def tables(nodes: int, spread: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the matrices (Q P, K) from moments to K frequencies of the band, and (K, M) from these to all subcarriers.
+
+    spread: largest |u| = 1 times the band, in turns: the phase of subcarrier m is 2 pi spread x u / 2,
+    x = (2 m - M + 1) / M. Both must not be changed.
+    """
+    argument = np.pi * spread * max(count - 1, 1) / count
+    orders, kept = orders_of(argument), orders_of(argument) + nodes
+    band = np.linspace(-1.0, 1.0, count) if count > 1 else np.zeros(1)
+    points = chebyshev_points(kept)
+    p = np.arange(orders)
+    bessel = np.where(p == 0, 1.0, 2.0) * (-1j) ** (p % 4) * jv(p, argument * points[:, None])
+    weights = interpolation(nodes, points)
+    to_nodes = (weights[:, None, :] * bessel.T[None]).reshape(nodes * orders, kept)
+    return np.ascontiguousarray(to_nodes), interpolation(kept, band).astype(np.complex128)

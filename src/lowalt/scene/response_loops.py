@@ -1,0 +1,166 @@
+"""The compiled loops from a target's points to moments of their ranges, symbol by symbol."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.jit import INNER_VECTOR, kernel
+from lowalt.scene.phasor import phasor
+
+CHUNK = 128
+"""Points whose polynomials are held together, so that they stay in the nearest cache."""
+LOOPS = kernel(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+
+
+class End(NamedTuple):
+    """One station's array and its R paths to L points at N symbols.
+
+    station: (3,) m; axes: (2,) horizontal axis (-sin Theta, cos Theta); counts: (2,) elements across and up;
+    spacing: between elements (m); beam: f_k / f0; kappas: (Q,) frequencies over the carrier at which array sums are
+    taken; squint: whether they also set the phase of the array's middle; turns: f_c / c, turns a metre of one way;
+    aims: (N, 2) direction cosines of the beam; places: (R, N, 3, L) m, images of the points; coefficient:
+    (R, N, L) complex; centre: (R, N) m, range to which excess ranges refer; gains: (R, N, Q, L) complex array sums of
+    spherical waves, without any entry for plane waves.
+    """
+
+    station: np.ndarray
+    axes: np.ndarray
+    counts: np.ndarray
+    spacing: float
+    beam: float
+    kappas: np.ndarray
+    squint: bool
+    turns: float
+    aims: np.ndarray
+    places: np.ndarray
+    coefficient: np.ndarray
+    centre: np.ndarray
+    gains: np.ndarray
+
+
+@INNER_VECTOR
+def _row_sum(cosine, kappa, beam, aim, count, gain):
+    """Multiply gain (L,) by U_{N-1}(cos(pi (kappa x - beam x0) / 2)), the sum of N elements about their middle."""
+    for i in range(np.uint64(len(gain))):
+        c, _ = phasor(0.25 * (kappa * cosine[i] - beam * aim))
+        older, total = 0.0, 1.0
+        for _ in range(count - 1):
+            older, total = total, 2.0 * c * total - older
+        gain[i] *= total
+
+
+@INNER_VECTOR
+def _one_way(end, path, n, work, factors, excess):
+    """Fill factors (Q, 2, L) with coefficient, array sum, 1/r and half the two-way phase, and excess (L,) with metres.
+
+    work: (3, L). Returns whether every point stands away from the station.
+    """
+    at, h, v = end.places[path, n], 0.5 * (end.counts[0] - 1), 0.5 * (end.counts[1] - 1)
+    first, aims, clear = end.aims[0], end.aims[n], True
+    across, up, weight = work[0], work[1], end.coefficient[path, n]
+    for i in range(np.uint64(at.shape[1])):
+        x, y, z = at[0, i] - end.station[0], at[1, i] - end.station[1], at[2, i] - end.station[2]
+        r = np.sqrt(x * x + y * y + z * z)
+        clear &= r > 0.0
+        inverse = 1.0 / r
+        across[i], up[i] = (end.axes[0] * x + end.axes[1] * y) * inverse, z * inverse
+        ahead = h * across[i] + v * up[i]
+        excess[i] = r - end.centre[path, n]
+        turns = 0.5 * end.beam * (ahead - h * first[0] - v * first[1])
+        if end.squint:
+            excess[i] -= end.spacing * ahead
+            turns = -0.5 * end.beam * (h * first[0] + v * first[1])
+        c, s = phasor(turns - end.turns * excess[i])
+        re, im = weight[i].real * inverse, weight[i].imag * inverse
+        factors[0, 0, i], factors[0, 1, i] = re * c - im * s, re * s + im * c
+    # Entry 0 holds the factor that all frequencies share, so it is overwritten last.
+    for q in range(len(end.kappas) - 1, -1, -1):
+        real, imag, gain = factors[q, 0], factors[q, 1], work[2]
+        if len(end.gains) > 0:
+            sums = end.gains[path, n, q]
+            for i in range(np.uint64(len(gain))):
+                re, im = factors[0, 0, i], factors[0, 1, i]
+                real[i] = re * sums[i].real - im * sums[i].imag
+                imag[i] = re * sums[i].imag + im * sums[i].real
+            continue
+        for i in range(np.uint64(len(gain))):
+            gain[i] = 1.0
+        _row_sum(across, end.kappas[q], end.beam, aims[0], end.counts[0], gain)
+        _row_sum(up, end.kappas[q], end.beam, aims[1], end.counts[1], gain)
+        for i in range(np.uint64(len(gain))):
+            real[i], imag[i] = factors[0, 0, i] * gain[i], factors[0, 1, i] * gain[i]
+    return clear
+
+
+@INNER_VECTOR
+def _add_moments(out, back, strength, excess_out, excess_back, reach, table, parts, result):
+    """Add to result (Q, 2, P) the sums over points of strength out back T_p(u), u = (excess out + back) / (2 reach).
+
+    out, back: (Q, 2, L); table (P, CHUNK) and parts (3, CHUNK): work space.
+    """
+    orders, scale = result.shape[2], 0.5 / reach
+    for first in range(0, len(strength), CHUNK):
+        count = min(CHUNK, len(strength) - first)
+        u, real, imag = parts[0], parts[1], parts[2]
+        zero, linear = table[0], table[1]
+        for i in range(np.uint64(count)):
+            u[i] = scale * (excess_out[first + i] + excess_back[first + i])
+            zero[i], linear[i] = 1.0, u[i]
+        for p in range(2, orders):
+            older, old, new = table[p - 2], table[p - 1], table[p]
+            for i in range(np.uint64(count)):
+                new[i] = 2.0 * u[i] * old[i] - older[i]
+        for q in range(len(out)):
+            out_re, out_im, back_re, back_im = out[q, 0], out[q, 1], back[q, 0], back[q, 1]
+            for i in range(np.uint64(count)):
+                a, b, c, d = out_re[first + i], out_im[first + i], back_re[first + i], back_im[first + i]
+                real[i], imag[i] = strength[first + i] * (a * c - b * d), strength[first + i] * (a * d + b * c)
+            for p in range(orders):
+                row, re, im = table[p], 0.0, 0.0
+                for i in range(np.uint64(count)):
+                    re += row[i] * real[i]
+                    im += row[i] * imag[i]
+                result[q, 0, p] += re
+                result[q, 1, p] += im
+
+
+@LOOPS
+def moments(out, back, same, strength, reach, result):
+    """Fill result (A, B, N, Q, 2, P) with the moments of every way out by path a and back by path b.
+
+    out, back: `End`; same: whether both are one array, so that a, b holds b, a too and only b >= a is filled; strength:
+    (A, B, N, L), real amplitudes; reach: m, bound of half the two-way excess ranges. Returns the number of the
+    first symbol with a point in a station plus one, 0 for none.
+    """
+    ways_out, ways_back, symbols, nodes, _, orders = result.shape
+    points = strength.shape[3]
+    there, home = np.empty((ways_out, nodes, 2, points)), np.empty((ways_back, nodes, 2, points))
+    excess_there, excess_home = np.empty((ways_out, points)), np.empty((ways_back, points))
+    work, table, parts = np.empty((3, points)), np.empty((max(orders, 2), CHUNK)), np.empty((3, CHUNK))
+    for n in range(symbols):
+        for a in range(ways_out):
+            if not _one_way(out, a, n, work, there[a], excess_there[a]):
+                return n + 1
+        for b in range(ways_back):
+            if not same and not _one_way(back, b, n, work, home[b], excess_home[b]):
+                return n + 1
+        for a in range(ways_out):
+            for b in range(a if same else 0, ways_back):
+                homeward, excess = (there[b], excess_there[b]) if same else (home[b], excess_home[b])
+                result[a, b, n] = 0.0
+                _add_moments(
+                    there[a], homeward, strength[a % strength.shape[0], b % strength.shape[1], n], excess_there[a],
+                    excess, reach, table, parts, result[a, b, n],
+                )  # fmt: skip
+    return 0
+
+
+@LOOPS
+def add_turned(values, start, step, result):
+    """Add values (N, M) exp(j 2 pi (start + (m - (M - 1) / 2) step)), start and step (N,) turns, to result (N, M)."""
+    middle = 0.5 * (values.shape[1] - 1)
+    for n in range(len(values)):
+        row, out, first = values[n], result[n], start[n] - np.rint(start[n])
+        for m in range(np.uint64(values.shape[1])):
+            c, s = phasor(first + (np.float64(m) - middle) * step[n])
+            out[m] += complex(row[m].real * c - row[m].imag * s, row[m].real * s + row[m].imag * c)

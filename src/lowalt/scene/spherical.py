@@ -1,0 +1,165 @@
+"""Array sums of spherical waves at many points, from exact sums at few nodes of the directions and ranges they fill.
+
+A target fills a small box of direction cosines and inverse ranges while a few symbols last. Over it an array's sum
+is a smooth function: a polynomial of a few dozen terms takes less time than the elements, each with its own distance.
+"""
+
+import numpy as np
+from scipy.special import jv
+
+from lowalt.common.jit import INNER_VECTOR
+from lowalt.scene.phasor import phasor
+from lowalt.scene.response_loops import LOOPS, End
+
+SYMBOLS = 40
+"""Symbols that share a box."""
+
+
+def gains(end: End, error: float) -> np.ndarray:
+    """Return the array sums (R, N, Q, L) of spherical waves, less what `response_loops` adds: r, and middle phases.
+
+    error: largest error relative to the number of elements. Source: Balanis, Antenna Theory, 4th ed. 2016, 4.4.1.
+    """
+    paths, symbols, _, points = end.places.shape
+    result = np.empty((paths, symbols, len(end.kappas), points), np.complex128)
+    turned = np.flatnonzero(np.any(np.diff(end.aims, axis=0) != 0.0, axis=1)) + 1
+    edges = np.unique(np.concatenate([np.arange(0, symbols, SYMBOLS), turned, [symbols]]))
+    for path in range(paths):
+        for first, last in zip(edges[:-1], edges[1:], strict=True):
+            at = np.empty((last - first, 3, points))
+            low, high = np.empty((2, 3))
+            _directions(end, end.places[path, first:last], at, low, high)
+            middle, half = 0.5 * (low + high), np.maximum(0.5 * (high - low), 1e-12 * np.array([1.0, 1.0, high[2]]))
+            counts = _orders(end, middle, half, error)
+            out = result[path, first:last]
+            if counts is None or np.prod(counts) > at[:, 0].size:
+                _sums(end, first, at, out)
+                continue
+            nodes = np.stack(np.meshgrid(*(np.cos(np.pi * (np.arange(k) + 0.5) / k) for k in counts), indexing="ij"))
+            grid = middle[:, None] + half[:, None] * nodes.reshape(3, -1)
+            values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
+            _sums(end, first, grid[None], values)
+            terms = values.reshape(-1, *counts)
+            for axis, count in enumerate(counts):
+                terms = np.moveaxis(np.tensordot(_coefficients(count), terms, (1, axis + 1)), 0, axis + 1)
+            # Terms that are small together are left out.
+            size = abs(terms).sum(axis=0)
+            order = np.argsort(size, axis=None)
+            small = order[np.cumsum(size.ravel()[order]) < error * np.prod(end.counts)]
+            kept = np.setdiff1d(np.arange(size.size), small)
+            if len(kept) == 0:
+                out[:] = 0.0
+                continue
+            powers = np.stack(np.unravel_index(kept, counts), axis=1)
+            chosen = np.ascontiguousarray(terms.reshape(len(terms), -1)[:, kept])
+            _polynomials(at, middle, half, np.array(counts), powers, chosen.real.copy(), chosen.imag.copy(), out)
+    return result
+
+
+def _coefficients(count: int) -> np.ndarray:
+    """The matrix (count, count) from values at Chebyshev points to the coefficients of Chebyshev polynomials."""
+    order = np.arange(count)
+    matrix = np.cos(np.outer(order, np.pi * (order + 0.5) / count)) * 2.0 / count
+    matrix[0] *= 0.5
+    return matrix
+
+
+def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tuple[int, int, int] | None:
+    """Numbers of polynomials (across, up, inverse range) that hold the sums over a box; None where it nears the array.
+
+    The phase of an element at distance D from the array's corner changes by k D over a direction cosine and, with the
+    inverse range, by k D^2 / 2; a third more allows for the mixed terms of waves that bend.
+    """
+    wide, tall = end.spacing * (end.counts - 1)
+    diagonal = float(np.hypot(wide, tall))
+    nearness = diagonal * (middle[2] + half[2])
+    if nearness > 0.25:
+        return None
+    wave = 2.0 * np.pi * 2.0 * end.turns
+    spread = wave * np.array([0.5 * wide + diagonal * nearness, 0.5 * tall + diagonal * nearness, 0.5 * diagonal**2])
+    counts = []
+    for argument in 1.33 * spread * half + 1e-6:
+        order = int(argument) + 1
+        while 4.0 * abs(jv(order, argument)) > 0.01 * error:
+            order += 1
+        counts.append(order + 1)
+    return tuple(counts)
+
+
+@LOOPS
+def _directions(end, places, at, low, high):
+    """Fill at (K, 3, L) with direction cosines across and up and inverse ranges of places (K, 3, L), and their bounds."""
+    low[:], high[:] = np.inf, -np.inf
+    for n in range(len(places)):
+        for i in range(places.shape[2]):
+            x, y = places[n, 0, i] - end.station[0], places[n, 1, i] - end.station[1]
+            z = places[n, 2, i] - end.station[2]
+            inverse = 1.0 / np.sqrt(x * x + y * y + z * z)
+            at[n, 0, i], at[n, 1, i] = (end.axes[0] * x + end.axes[1] * y) * inverse, z * inverse
+            at[n, 2, i] = inverse
+            for k in range(3):
+                low[k], high[k] = min(low[k], at[n, k, i]), max(high[k], at[n, k, i])
+
+
+@LOOPS
+def _sums(end, symbol, at, result):
+    """Fill result (K, Q, L) with the sums over elements at directions and inverse ranges at (K, 3, L).
+
+    An element at e from the corner is sqrt(r^2 - 2 r e.u + e^2) away. Its weight has the beam of `symbol`.
+    """
+    h, v, aims = 0.5 * (end.counts[0] - 1), 0.5 * (end.counts[1] - 1), end.aims[symbol]
+    for n in range(len(at)):
+        for q in range(len(end.kappas)):
+            for i in range(at.shape[2]):
+                across, up, inverse, total = at[n, 0, i], at[n, 1, i], at[n, 2, i], 0.0j
+                for a in range(end.counts[0]):
+                    for b in range(end.counts[1]):
+                        x, y = end.spacing * a, end.spacing * b
+                        # (distance - r) / r, without cancellation far away.
+                        square = inverse * (inverse * (x * x + y * y) - 2.0 * (x * across + y * up))
+                        longer = square / (1.0 + np.sqrt(1.0 + square))
+                        beam = (a - h) * aims[0] + (b - v) * aims[1]
+                        # In spacings, less the way of the array's middle, which `response_loops` adds.
+                        away = longer / (inverse * end.spacing) + h * across + v * up
+                        c, s = phasor(-0.5 * (end.kappas[q] * away + end.beam * beam))
+                        total += complex(c, s) / (1.0 + longer)
+                result[n, q, i] = total
+
+
+@INNER_VECTOR
+def _scaled(values, middle, half, table):
+    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half, (L,)."""
+    for i in range(np.uint64(len(values))):
+        table[0, i] = 1.0
+    if len(table) > 1:
+        for i in range(np.uint64(len(values))):
+            table[1, i] = (values[i] - middle) / half
+    for p in range(2, len(table)):
+        older, old, new, linear = table[p - 2], table[p - 1], table[p], table[1]
+        for i in range(np.uint64(len(values))):
+            new[i] = 2.0 * linear[i] * old[i] - older[i]
+
+
+@LOOPS
+def _polynomials(at, middle, half, counts, powers, real, imag, result):
+    """Fill result (K, Q, L) with the sums over terms, (Q, T) each, of products of polynomials of these powers (T, 3)."""
+    points = at.shape[2]
+    across, up, near = np.empty((counts[0], points)), np.empty((counts[1], points)), np.empty((counts[2], points))
+    re, im, term = np.empty((len(real), points)), np.empty((len(real), points)), np.empty(points)
+    for n in range(len(at)):
+        _scaled(at[n, 0], middle[0], half[0], across)
+        _scaled(at[n, 1], middle[1], half[1], up)
+        _scaled(at[n, 2], middle[2], half[2], near)
+        re[:], im[:] = 0.0, 0.0
+        for t in range(len(powers)):
+            one, two, three = across[powers[t, 0]], up[powers[t, 1]], near[powers[t, 2]]
+            for i in range(np.uint64(points)):
+                term[i] = one[i] * two[i] * three[i]
+            for q in range(len(real)):
+                a, b, row, column = real[q, t], imag[q, t], re[q], im[q]
+                for i in range(np.uint64(points)):
+                    row[i] += a * term[i]
+                    column[i] += b * term[i]
+        for q in range(len(real)):
+            for i in range(points):
+                result[n, q, i] = complex(re[q, i], im[q, i])
