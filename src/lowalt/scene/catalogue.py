@@ -6,13 +6,15 @@ folder of its place that defines DEFAULTS. One that the list below does not name
 
 import importlib
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
 from lowalt.common.errors import InputError
 
+PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
+"""The places where effects act, in the order of the chain."""
 LISTED = (
     "motion/rotor_spread",
     "motion/gusts",
@@ -58,30 +60,22 @@ LISTED = (
 
 def _every_effect() -> tuple[str, ...]:
     """LISTED, each place followed by the effects in its folder that are not listed, in alphabetical order."""
-    found = list(LISTED)
-    for place in ("motion", "transmitter", "channel", "receiver", "detection"):
-        paths = sorted((Path(__file__).parent / place).glob("*.py"))
-        last = max(index for index, entry in enumerate(found) if entry.startswith(f"{place}/"))
-        new = [f"{place}/{path.stem}" for path in paths if f"{place}/{path.stem}" not in found]
-        new = [entry for entry in new if "\nDEFAULTS" in (Path(__file__).parent / f"{entry}.py").read_text()]
-        found[last + 1 : last + 1] = new
-    return tuple(found)
+    folder, result = Path(__file__).parent / "effects", []
+    for place in PLACE_ORDER:
+        listed = [entry for entry in LISTED if entry.startswith(f"{place}/")]
+        files = sorted(f"{place}/{path.stem}" for path in (folder / place).glob("*.py"))
+        new = [entry for entry in files if entry not in listed]
+        result += listed + [entry for entry in new if "\nDEFAULTS" in (folder / f"{entry}.py").read_text()]
+    return tuple(result)
 
 
 ORDER = _every_effect()
-"""Place and name of every effect, in the order of the chain: motion, transmitter, channel, receiver, detection."""
+"""Place and name of every effect, in the order of the chain."""
 PLACES = {entry.partition("/")[2]: entry.partition("/")[0] for entry in ORDER}
 """Place of every effect by its name."""
-BY_NEED = ("squint", "wavefront", "symbol_motion", "cyclic_prefix")
-"""Physics beyond Eq. 7 that is left out where its bound allows it."""
-ON_ALL_ECHOES = ("cyclic_prefix",)
-"""Physics by need that also changes echoes that no target sends, as the land's; its bound is of targets alone."""
 
-
-ONE_OSCILLATOR = ("clock_offset", "carrier_offset")
-"""Effects that draw the same error of one oscillator, and so share a stream."""
-
-
+SHARED_STREAMS = {"clock_offset": "oscillator", "carrier_offset": "oscillator"}
+"""Random streams of effects that draw the same error of one oscillator."""
 LOOK_WIDE = ("link_offset",)
 """Effects past the motion whose draws are the same for all stations of a look."""
 PAIR_WIDE = ("fluctuation",)
@@ -91,7 +85,7 @@ BY_END = ("line_of_sight",)
 
 
 class NamedEffect(NamedTuple):
-    """An effect that a scene names: its module (`interface.Effect`), and its settings, defaults filled in."""
+    """An effect that a scene names: its module (`protocols`), and its settings, defaults filled in."""
 
     name: str
     place: str
@@ -100,13 +94,13 @@ class NamedEffect(NamedTuple):
 
 
 def dotted(name: str) -> str:
-    """Return the module of an effect, such as lowalt.effects.receiver.adc.
+    """Return the module of an effect, such as lowalt.scene.effects.receiver.adc.
 
     Raises: InputError for a name that belongs to no effect.
     """
     if name not in PLACES:
         raise InputError(f"effects: unknown effect {name!r}, expected some of {sorted(PLACES)}")
-    return f"lowalt.effects.{PLACES[name]}.{name}"
+    return f"lowalt.scene.effects.{PLACES[name]}.{name}"
 
 
 def called(block: dict[str, dict | None]) -> list[NamedEffect]:
@@ -114,28 +108,19 @@ def called(block: dict[str, dict | None]) -> list[NamedEffect]:
 
     Raises: InputError for an unknown effect or parameter.
     """
-    modules = [dotted(name) for name in block]
-    found = dict(zip(block, map(importlib.import_module, modules), strict=True))
+    modules = {name: importlib.import_module(dotted(name)) for name in block}
     result = []
-    for entry in ORDER:
-        place, _, name = entry.partition("/")
-        if name not in found:
-            continue
-        module, given = found[name], block[name] or {}
-        unknown = sorted(set(given) - set(module.DEFAULTS))
+    for name in filter(block.__contains__, PLACES):
+        module, changed = modules[name], block[name] or {}
+        unknown = sorted(set(changed) - set(module.DEFAULTS))
         if unknown:
             raise InputError(
                 f"effects.{name}: unknown parameter(s) {unknown}, expected some of {list(module.DEFAULTS)}"
             )
-        settings = {**module.DEFAULTS, **given}
+        settings = {**module.DEFAULTS, **changed}
         if not module.idle(settings):
-            result.append(NamedEffect(name, place, module, settings))
+            result.append(NamedEffect(name, PLACES[name], module, settings))
     return result
-
-
-def stream_name(name: str) -> str:
-    """Return the name of an effect's random stream: its own, or the oscillator's."""
-    return "oscillator" if name in ONE_OSCILLATOR else name
 
 
 def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:
@@ -144,14 +129,11 @@ def placed(effects: Iterable[NamedEffect], *places: str) -> list[NamedEffect]:
 
 
 def providing(effects: Iterable[NamedEffect], protocol: type) -> list[NamedEffect]:
-    """Return the effects whose modules satisfy a protocol of `effects.interface`, order kept."""
+    """Return the effects whose modules satisfy a protocol of `protocols`, order kept."""
     return [effect for effect in effects if _satisfies(effect.module, protocol)]
 
 
-@lru_cache(maxsize=8192)
+@cache
 def _satisfies(module: ModuleType, protocol: type) -> bool:
-    """Whether a module satisfies a protocol. There is room for every effect's answer to every protocol.
-
-    Python compares all names of a protocol each time it is asked, 20 us.
-    """
+    """Whether a module satisfies a protocol; Python compares all names of a protocol each time it is asked."""
     return isinstance(module, protocol)

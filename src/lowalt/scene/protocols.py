@@ -165,5 +165,3 @@ class ChoosesCells(Protocol):
 
     def choose(self, settings: dict, chosen: np.ndarray, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:  # fmt: skip  # noqa: E501
         """Return the chosen cells (N,) int64, given those chosen so far and all cells (N, M)."""
-
-

@@ -18,7 +18,7 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.scene import response_loops, spherical
 from lowalt.scene.view import View
 
-ERROR = 1e-12
+ERROR = 1e-11
 """Largest error of the expansions in frequency, relative to the sum of the points' amplitudes."""
 
 

@@ -11,7 +11,7 @@ from lowalt.common.jit import INNER_VECTOR
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response_loops import LOOPS, End
 
-SYMBOLS = 40
+SYMBOLS = 100
 """Symbols that share a box."""
 
 
@@ -80,7 +80,7 @@ def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tup
     counts = []
     for argument in 1.33 * spread * half + 1e-6:
         order = int(argument) + 1
-        while 4.0 * abs(jv(order, argument)) > 0.01 * error:
+        while 4.0 * abs(jv(order, argument)) > 0.1 * error:
             order += 1
         counts.append(order + 1)
     return tuple(counts)
@@ -108,22 +108,26 @@ def _sums(end, symbol, at, result):
     An element at e from the corner is sqrt(r^2 - 2 r e.u + e^2) away. Its weight has the beam of `symbol`.
     """
     h, v, aims = 0.5 * (end.counts[0] - 1), 0.5 * (end.counts[1] - 1), end.aims[symbol]
+    real, imag = np.empty((2, at.shape[2]))
     for n in range(len(at)):
+        across, up, inverse = at[n, 0], at[n, 1], at[n, 2]
         for q in range(len(end.kappas)):
-            for i in range(at.shape[2]):
-                across, up, inverse, total = at[n, 0, i], at[n, 1, i], at[n, 2, i], 0.0j
-                for a in range(end.counts[0]):
-                    for b in range(end.counts[1]):
-                        x, y = end.spacing * a, end.spacing * b
+            real[:], imag[:] = 0.0, 0.0
+            for a in range(end.counts[0]):
+                for b in range(end.counts[1]):
+                    x, y = end.spacing * a, end.spacing * b
+                    beam = end.beam * ((a - h) * aims[0] + (b - v) * aims[1])
+                    for i in range(np.uint64(len(real))):
                         # (distance - r) / r, without cancellation far away.
-                        square = inverse * (inverse * (x * x + y * y) - 2.0 * (x * across + y * up))
+                        square = inverse[i] * (inverse[i] * (x * x + y * y) - 2.0 * (x * across[i] + y * up[i]))
                         longer = square / (1.0 + np.sqrt(1.0 + square))
-                        beam = (a - h) * aims[0] + (b - v) * aims[1]
                         # In spacings, less the way of the array's middle, which `response_loops` adds.
-                        away = longer / (inverse * end.spacing) + h * across + v * up
-                        c, s = phasor(-0.5 * (end.kappas[q] * away + end.beam * beam))
-                        total += complex(c, s) / (1.0 + longer)
-                result[n, q, i] = total
+                        away = longer / (inverse[i] * end.spacing) + h * across[i] + v * up[i]
+                        c, s = phasor(-0.5 * (end.kappas[q] * away + beam))
+                        real[i] += c / (1.0 + longer)
+                        imag[i] += s / (1.0 + longer)
+            for i in range(len(real)):
+                result[n, q, i] = complex(real[i], imag[i])
 
 
 @INNER_VECTOR

@@ -23,7 +23,7 @@ class Beams(NamedTuple):
     aims_m: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """A target's motion as one station sees it.
 
@@ -109,12 +109,19 @@ class View:
         """Return the same target seen at other times (K,) s of the look."""
         return replace(self, times_s=times_s)
 
+    def at_rows(self, rows: np.ndarray) -> "View":
+        """Return the same target seen at the symbols `rows` (K,) alone, with what is known of its places."""
+        return self.at(self.times_s[rows])._knowing(places=self.places[rows])
+
     def of(self, station: Station) -> "View":
         """Return the same target, at the same instants and under the same beams, as another station hears it."""
-        seen = replace(self, station=station)
         # The motion does not depend on the station.
-        seen.__dict__.update({name: self.__dict__[name] for name in ("motion", "places", "normals") if name in self.__dict__})  # fmt: skip  # noqa: E501
-        return seen
+        return replace(self, station=station)._knowing(motion=self.motion, places=self.places)
+
+    def _knowing(self, **known: object) -> "View":
+        """This new view, with values of its cached properties."""
+        self.__dict__.update(known)
+        return self
 
     def seen_from(self, place_m: np.ndarray, sender_m: np.ndarray | None = None) -> "View":
         """Return the same target, at the same instants and under the same beams, seen from another place (3,) m.

@@ -1,0 +1,58 @@
+"""Command line of the echo stage in a scene with effects: motion table and clouds -> signals and reference powers."""
+
+import sys
+
+import numpy as np
+
+from lowalt.common.command import parser, pick, run
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.network import Network
+from lowalt.scene.catalogue import called
+from lowalt.scene.chunk import scene_signals
+from lowalt.scene.chain import Scene
+from lowalt.motion import read_table
+from lowalt.targets.cloud import read
+
+
+def main(arguments: list[str]) -> None:
+    """Compute one chunk's signals under the scene's effects and write two array files a station."""
+    options = parser("lowalt.scene", __doc__)
+    options.add_argument("--motion", required=True, help="the chunk's motion table")
+    options.add_argument("--clouds", nargs="+", required=True, help="cloud files of the chunk's subtypes")
+    options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes")
+    options.add_argument("--station", nargs="+", required=True, help="names of the stations that listen")
+    options.add_argument(
+        "--out",
+        nargs="+",
+        required=True,
+        help="signals to write (.npy), a file a station: complex64 (models, N), or (models, snrs, N)",
+    )
+    options.add_argument(
+        "--power", nargs="+", required=True, help="the echoes' own mean powers to write (.npy), likewise: (models,) W"
+    )
+    given = options.parse_args(arguments)
+    for name, files in (("--out", given.out), ("--power", given.power)):
+        if len(files) != len(given.station):
+            raise InputError(f"{name}: {len(files)} files, expected one for each of the stations {given.station}")
+    snrs = given.settings.pop("snr_db", None)
+    snrs = None if snrs is None else [float(snr) for snr in snrs]
+    seed, block, tolerance, effects = pick(given.settings, "seed", "network", "tolerance", "effects")
+    scene = Scene(Network.from_settings(block), seed, tolerance, tuple(called(effects)))
+    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    occluders = {}
+    if given.occluders:
+        from lowalt.targets.occluders import read_all
+
+        occluders = read_all(given.occluders)
+    rows = read_table(given.motion)
+    found = [scene_signals(scene, station, clouds, rows, occluders, snrs) for station in given.station]
+    for files in zip(zip(given.out, given.power, strict=True), found, strict=True):
+        for path, values in zip(*files, strict=True):
+            with replacing(path) as temporary:
+                np.save(temporary, values)
+            print(f"{path}: {len(values)} models", file=sys.stderr)
+
+
+if __name__ == "__main__":
+    run(main)

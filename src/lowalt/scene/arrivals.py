@@ -1,0 +1,69 @@
+"""A target's echo as time samples, with all that leaks between subcarriers: motion inside a symbol, late echoes."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.scene.catalogue import NamedEffect
+from lowalt.scene.response import Path, response
+from lowalt.scene.view import View
+from lowalt.scene.waveform import transmit
+
+
+class Physics(NamedTuple):
+    """The physics beyond Eq. 7 that a scene names: two of the response, and two that reach into a symbol's samples."""
+
+    squint: bool
+    wavefront: bool
+    symbol_motion: NamedEffect | None
+    cyclic_prefix: NamedEffect | None
+
+    @property
+    def within_symbols(self) -> bool:
+        """Whether an echo is more than a response: its subcarriers leak into each other."""
+        return self.symbol_motion is not None or self.cyclic_prefix is not None
+
+
+def arriving(
+    physics: Physics, view: View, factor: np.ndarray | float, paths_of: Callable[[View], list[Path]],
+    symbols: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """Return the time samples (N, M) of a view's target.
+
+    factor: on the points' amplitudes, as in `response`; paths_of: returns all paths but the direct one at the instants
+    of a view; symbols: subcarriers (N, M) on the air of each symbol and of the one before it.
+    """
+    count = view.network.subcarriers
+    delays_s, weights = np.zeros(1), np.ones((1, count))
+    if physics.symbol_motion is not None:
+        delays_s, weights = physics.symbol_motion.module.instants(physics.symbol_motion.settings, view)
+    late, turn = np.zeros(view.places.shape[:2], np.int64), np.ones(count)
+    if physics.cyclic_prefix is not None:
+        prefix, settings = physics.cyclic_prefix.module, physics.cyclic_prefix.settings
+        late, turn = prefix.late_samples(settings, view), prefix.turn(settings, view.network)
+    factor = np.broadcast_to(factor, (*np.shape(factor)[:-2], *late.shape))
+    samples = np.zeros((len(view.times_s), count), np.complex128)
+    for delay_s, weight in zip(delays_s, weights, strict=True):
+        moved = view if delay_s == 0.0 else view.at(view.times_s + delay_s)
+        paths = paths_of(moved)
+        # Points that lose equally many samples of the window share one response.
+        for lost in np.unique(late):
+            rows = np.flatnonzero((late == lost).any(axis=1))
+            some = [_at_rows(path, rows) for path in paths]
+            echo = response(
+                moved.at_rows(rows), some, (factor * (late == lost))[..., rows, :], squint=physics.squint,
+                wavefront=physics.wavefront,
+            )  # fmt: skip
+            now = transmit(echo, symbols[0][rows])
+            if lost:
+                now[:, :lost] = transmit(echo * turn, symbols[1][rows])[:, :lost]
+            samples[rows] += now * weight
+    return samples
+
+
+def _at_rows(path: Path, rows: np.ndarray) -> Path:
+    """A path at some symbols alone."""
+    coefficient = path.coefficient[rows] if np.ndim(path.coefficient) > 1 else path.coefficient
+    sender = None if path.sender is None else _at_rows(path.sender, rows)
+    return path._replace(places=path.places[rows], coefficient=coefficient, sender=sender)

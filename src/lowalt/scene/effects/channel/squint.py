@@ -1,0 +1,13 @@
+"""Beam squint: the arrays' phases follow each subcarrier's frequency, the beams' weights are set for the lowest one.
+
+Element i of a row then has the phase pi i (kappa_m x - kappa_k x_0) instead of pi i kappa_k (x - x_0). `scene.response`
+sums the arrays at a few frequencies of the band where a scene names this effect.
+"""
+
+SOURCE = "Mailloux, Phased Array Antenna Handbook, 3rd ed., 2018, section 1.3.4 (phase-steered arrays over a bandwidth)"
+DEFAULTS: dict[str, float] = {}
+
+
+def idle(settings: dict) -> bool:
+    """Return False: a scene that names this effect always gets it."""
+    return False

@@ -1,0 +1,35 @@
+"""Motion inside a symbol: points move while an OFDM symbol lasts, so their subcarriers leak into each other.
+
+Every time sample of a symbol sees the target where it then stands. The samples are interpolated between a few instants.
+"""
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.scene.response import chebyshev_points, interpolation, orders_of
+from lowalt.scene.view import View
+
+SOURCE = (
+    "Robertson and Kaiser, The effects of Doppler spreads in OFDM(A) mobile radio systems, Proc. IEEE VTC Fall, 1999; "
+    "number of instants: Trefethen, Approximation Theory and Approximation Practice, 2013, theorem 8.2"
+)
+DEFAULTS: dict[str, float] = {}
+
+
+def idle(settings: dict) -> bool:
+    """Return False: a scene that names this effect always gets it."""
+    return False
+
+
+def instants(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Return instants (Q,) s after a symbol's beginning, and their weights (Q, M) in each of its M samples.
+
+    Q Chebyshev points hold the phase that the fastest point gathers in a symbol, 4 pi f v / (c df) in all.
+    """
+    network = view.network
+    useful_s, count = 1.0 / network.subcarrier_spacing_hz, network.subcarriers
+    moved_m = np.linalg.norm(view.at(view.times_s + useful_s).places - view.places, axis=2).max()
+    highest_hz = view.station.frequency_hz + count * network.subcarrier_spacing_hz
+    needed = orders_of(2.0 * np.pi * highest_hz / SPEED_OF_LIGHT * float(moved_m))
+    delays_s = 0.5 * useful_s * (chebyshev_points(needed) + 1.0)
+    return delays_s, interpolation(needed, 2.0 * np.arange(count) / count - 1.0)
