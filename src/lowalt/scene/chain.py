@@ -131,7 +131,7 @@ class Sample:
         return not self.names and self.station.transmitter is None
 
     def weight(self, view: View, names: Iterable[str] | None = None) -> np.ndarray:
-        """Return the product (N, L) of the factors of effects (all, or those named) on amplitudes, as a view sees them."""
+        """Return the product (N, L) of the factors of all effects, or those named, on the points of a view."""
         result = np.ones(view.places.shape[:2])
         for effect in providing(self.channel, protocols.WeighsPoints):
             if names is None or effect.name in names:
@@ -206,21 +206,16 @@ class Sample:
 
         Where nothing acts on time samples there are none.
         """
-        added = [
-            (
-                effect.module.scatter(effect.settings, self.view, self.draws(effect.name)),
-                _offset_cells(effect, self.view),
-            )
-            for effect in providing(self.channel, protocols.AddsEchoes)
-        ]
+        adding = providing(self.channel, protocols.AddsEchoes)
+        added = [each.module.scatter(each.settings, self.view, self.draws(each.name)) for each in adding]
         unknown = self._unknown()
         if self.physics.within_symbols:
             symbols = self.aired, self._amplified(self._drawn_data("previous waveform"))
             samples = sum(self._samples(view, symbols) for view in self.targets())
-            for echo, offset in added:
-                samples += self._standing(echo, offset, symbols)
+            for effect, echo in zip(adding, added, strict=True):
+                samples += self._standing(echo, _offset_cells(effect, self.view), symbols)
         else:
-            total = sum((echo for echo, _ in added), sum(map(self.echo, self.targets())))
+            total = sum(added, sum(map(self.echo, self.targets())))
             if unknown is None and not self.receiver and not providing(self.transmitter, protocols.ChangesWaveform):
                 return total
             samples = waveform.transmit(total, self.aired)

@@ -113,9 +113,9 @@ class WeighsRoutes(Protocol):
     """Channel: tells the points' amplitudes on further paths from those on the direct one."""
 
     def routes(self, settings: dict, view: View, paths: list[Path], weight: Callable[[View, Iterable[str] | None], np.ndarray]) -> np.ndarray:  # fmt: skip  # noqa: E501
-        """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
+        """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b; direct first.
 
-        weight(view, names): product (N, L) of the amplitude factors of the named effects (None: all) as `view` sees them.
+        weight(view, names): product (N, L) of the factors of the named effects (None: all) as `view` sees them.
         """
 
 

@@ -1,9 +1,9 @@
-"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths, with squint and spherical waves on request.
+"""The frequency response Y[n, m] (Eq. 24) of a moving target over all paths, with squint and spherical waves if asked.
 
-Over the few range cells of a target the response is a smooth function of frequency. Each symbol is summed into Chebyshev
-moments of the points' excess ranges, at one frequency of the band or, where array sums depend on it, at a few; two
-matrix products turn moments into all M subcarriers: exp(-j B x u) = sum over p of eps_p (-j)^p J_p(B x) T_p(u),
-|u| <= 1. No array of symbols x points x subcarriers exists.
+Over the few range cells of a target the response is a smooth function of frequency. Each symbol is summed into
+Chebyshev moments of the points' excess ranges, at one frequency of the band or, where array sums depend on it, at a
+few; two matrix products turn moments into all M subcarriers: exp(-j B x u) = sum over p of
+eps_p (-j)^p J_p(B x) T_p(u), |u| <= 1. No array of symbols x points x subcarriers exists.
 """
 
 from collections.abc import Sequence
@@ -87,7 +87,7 @@ def response(
 
 
 def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
-    """Real amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance: a0 lambda sqrt(sigma) / (4 pi)^1.5."""
+    """Amplitudes (1 or R, 1 or R, N, L) of the points' echoes at unit distance, a0 lambda sqrt(sigma) / (4 pi)^1.5."""
     network = view.network
     elements = float(np.prod(network.transmit) * np.prod(network.receive))
     wavelength = SPEED_OF_LIGHT / network.carrier_hz

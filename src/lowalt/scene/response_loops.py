@@ -93,12 +93,13 @@ def _one_way(end, path, n, work, factors, excess):
 
 
 @INNER_VECTOR
-def _add_moments(out, back, strength, excess_out, excess_back, reach, table, parts, result):
-    """Add to result (Q, 2, P) the sums over points of strength out back T_p(u), u = (excess out + back) / (2 reach).
+def _add_moments(factors, strength, excess, reach, table, parts, result):
+    """Add to result (Q, 2, P) the sums over points of strength x factors x T_p(u), u = excess / (2 reach).
 
-    out, back: (Q, 2, L); table (P, CHUNK) and parts (3, CHUNK): work space.
+    factors, excess: of the way out and of the way back, whose factors (Q, 2, L) multiply and whose excess ranges (L,)
+    add; table (P, CHUNK) and parts (3, CHUNK): work space.
     """
-    orders, scale = result.shape[2], 0.5 / reach
+    orders, scale, (out, back), (excess_out, excess_back) = result.shape[2], 0.5 / reach, factors, excess
     for first in range(0, len(strength), CHUNK):
         count = min(CHUNK, len(strength) - first)
         u, real, imag = parts[0], parts[1], parts[2]
@@ -148,10 +149,9 @@ def moments(out, back, same, strength, reach, result):
             for b in range(a if same else 0, ways_back):
                 homeward, excess = (there[b], excess_there[b]) if same else (home[b], excess_home[b])
                 result[a, b, n] = 0.0
-                _add_moments(
-                    there[a], homeward, strength[a % strength.shape[0], b % strength.shape[1], n], excess_there[a],
-                    excess, reach, table, parts, result[a, b, n],
-                )  # fmt: skip
+                own = strength[a % strength.shape[0], b % strength.shape[1], n]
+                factors, ranges = (there[a], homeward), (excess_there[a], excess)
+                _add_moments(factors, own, ranges, reach, table, parts, result[a, b, n])
     return 0
 
 

@@ -4,6 +4,8 @@ A target fills a small box of direction cosines and inverse ranges while a few s
 is a smooth function: a polynomial of a few dozen terms takes less time than the elements, each with its own distance.
 """
 
+from itertools import pairwise
+
 import numpy as np
 from scipy.special import jv
 
@@ -25,7 +27,7 @@ def gains(end: End, error: float) -> np.ndarray:
     turned = np.flatnonzero(np.any(np.diff(end.aims, axis=0) != 0.0, axis=1)) + 1
     edges = np.unique(np.concatenate([np.arange(0, symbols, SYMBOLS), turned, [symbols]]))
     for path in range(paths):
-        for first, last in zip(edges[:-1], edges[1:], strict=True):
+        for first, last in pairwise(edges):
             at = np.empty((last - first, 3, points))
             low, high = np.empty((2, 3))
             _directions(end, end.places[path, first:last], at, low, high)
@@ -88,7 +90,7 @@ def _orders(end: End, middle: np.ndarray, half: np.ndarray, error: float) -> tup
 
 @LOOPS
 def _directions(end, places, at, low, high):
-    """Fill at (K, 3, L) with direction cosines across and up and inverse ranges of places (K, 3, L), and their bounds."""
+    """Fill at (K, 3, L) with direction cosines and inverse ranges of places (K, 3, L); low, high (3,): bounds."""
     low[:], high[:] = np.inf, -np.inf
     for n in range(len(places)):
         for i in range(places.shape[2]):
@@ -146,7 +148,7 @@ def _scaled(values, middle, half, table):
 
 @LOOPS
 def _polynomials(at, middle, half, counts, powers, real, imag, result):
-    """Fill result (K, Q, L) with the sums over terms, (Q, T) each, of products of polynomials of these powers (T, 3)."""
+    """Fill result (K, Q, L) with sums of terms (Q, T), each times the polynomials of its powers (T, 3)."""
     points = at.shape[2]
     across, up, near = np.empty((counts[0], points)), np.empty((counts[1], points)), np.empty((counts[2], points))
     re, im, term = np.empty((len(real), points)), np.empty((len(real), points)), np.empty(points)
