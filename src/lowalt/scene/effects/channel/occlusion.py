@@ -1,0 +1,115 @@
+"""Self-occlusion: points that the target's own surfaces hide from a station do not echo.
+
+Straight rays, point by point and symbol by symbol, against the surfaces of all parts as they turn; shadows are sharp.
+Waves bend around blades: a hidden point keeps the power share on the axis of the shadow of a strip of a blade's width.
+Waves on other paths (a ground reflection) are taken to be hidden where the direct one is.
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+from scipy.special import fresnel
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.scene.rays import hidden_by, hidden_by_bones
+from lowalt.scene.view import View
+from lowalt.targets.cloud import Cloud
+
+SOURCE = (
+    "blades: Born & Wolf, Principles of Optics, 7th ed. 1999, 8.3.2 (Babinet's principle) and 8.7.3 (Fresnel's "
+    "integrals); the rest, geometrical optics: Knott, Shaeffer & Tuley, Radar Cross Section, 2nd ed. 1993, chapter 5; "
+    "rays and triangles: Moeller & Trumbore, Fast, Minimum Storage Ray/Triangle Intersection, J. Graphics Tools 2, 1997"
+)
+DEFAULTS = {"strength": 1.0, "blades": "bent"}
+
+
+def idle(settings: dict) -> bool:
+    """Return whether hidden points echo as if nothing were before them."""
+    return settings["strength"] == 0
+
+
+def blades_m(cloud: Cloud, surfaces: dict) -> list[tuple[float, float]]:
+    """Return each rotor's mean blade width and its radius (m): one side's area over its diameter."""
+    part, result = surfaces["vertex_part"][surfaces["faces"][:, 0]], []
+    for rotor in cloud.parts_of("rotor"):
+        corners = surfaces["vertices"][surfaces["faces"][part == rotor]]
+        if len(corners):
+            away = corners.reshape(-1, 3) - cloud.hinges[rotor]
+            radius = float(np.linalg.norm(np.cross(away, cloud.axes[rotor]), axis=1).max())
+            across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            sides = 2.0 if surfaces["closed"][rotor] else 1.0
+            result.append((0.5 * float(np.linalg.norm(across, axis=1).sum()) / (sides * 2.0 * radius), radius))
+    return result
+
+
+def passed(width_m: float, distance_m: float, wavelength_m: float) -> float:
+    """Return the power share of a wave on the axis of the shadow of a long strip, at this distance behind it.
+
+    By Babinet's principle the strip's field is the free one less that of a slit of its width: |1 - (1 + j) F(v)|^2 with
+    the Fresnel integral F = C - jS and v = width / sqrt(2 wavelength distance). Source: Born & Wolf, 8.3.2 and 8.7.3.
+    """
+    sine, cosine = fresnel(width_m / np.sqrt(2.0 * wavelength_m * distance_m))
+    return float(abs(1.0 - (1.0 + 1j) * (cosine - 1j * sine)) ** 2)
+
+
+def through_blades(view: View) -> float:
+    """Return the factor on a two-way amplitude behind a blade: its power share, the mean over the craft's rotors.
+
+    The rotor's radius is taken as the distance behind the blade, and the phase is left out.
+    """
+    wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
+    shares = [passed(width, radius, wavelength) for width, radius in blades_m(view.cloud, view.occluders)]
+    return float(np.mean(shares)) if shares else 0.0
+
+
+def hidden(view: View, parts: Collection[int], known: np.ndarray | None = None) -> np.ndarray:
+    """Return whether the surfaces of `parts` hide each point from the station, (N, L) bool.
+
+    known: points (N, L) that other surfaces hide, and so are not asked but hidden. Bones hide a recording's nodes.
+    Raises: InputError where the target's surfaces are not given or are another target's.
+    """
+    surfaces, cloud, place_m = _surfaces(view), view.cloud, np.asarray(view.station.position_m, np.float64)
+    result = np.zeros(view.places.shape[:2], np.bool_) if known is None else known.copy()
+    if view.nodes:
+        hidden_by_bones(surfaces, place_m, view.places, result)
+        return result
+    # Rays start a little off the point's own surface: along its normal, or toward the station where it has none.
+    has_normal, offset_m = np.isfinite(cloud.normals).all(axis=1), surfaces["offset_m"]
+    start = cloud.points + np.where(has_normal[:, None], offset_m[:, None] * cloud.normals, 0.0)
+    toward = np.where(has_normal, 0.0, offset_m / np.linalg.norm(view.aim_m - place_m))
+    hidden_by(surfaces, place_m, view.motion._replace(points=start), cloud.axes, toward, parts, result)
+    return result
+
+
+def _surfaces(view: View) -> dict:
+    """The target's surfaces. Raises: InputError where they are not given or are another target's."""
+    surfaces, cloud = view.occluders, view.cloud
+    make = "make them with python -m lowalt.targets.occluders"
+    if surfaces is None:
+        raise InputError(f"effects.occlusion: {cloud.subtype} has no surfaces, {make}")
+    if surfaces["subtype"] != cloud.subtype or len(surfaces["offset_m"]) != len(cloud.points):
+        raise InputError(
+            f"effects.occlusion: surfaces of {surfaces['subtype']} with {len(surfaces['offset_m'])} points, expected "
+            f"those of {cloud.subtype} with {len(cloud.points)}; {make}"
+        )
+    return surfaces
+
+
+def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
+    """Return the factor (N, L) on every point's amplitude: 1 where the station sees it, 1 - strength where not.
+
+    Behind bent blades it is the share that goes around them instead. On a link each way has the root of the factor that
+    a station at its end has: a point hidden from either end by opaque surfaces does not echo.
+    Raises: InputError where the target's surfaces are not given or are another target's.
+    """
+    ends = view.ends()
+    if len(ends) == 2:
+        return np.sqrt(visible(settings, ends[0]) * visible(settings, ends[1]))
+    blades = [] if settings["blades"] == "opaque" else view.cloud.parts_of("rotor")
+    dark = hidden(view, [part for part in range(len(view.cloud.kinds)) if part not in blades])
+    result = np.where(dark, 1.0 - settings["strength"], 1.0)
+    if settings["blades"] == "bent" and blades:
+        behind = hidden(view, blades, dark) & ~dark
+        result[behind] = 1.0 - settings["strength"] * (1.0 - through_blades(view))
+    return result

@@ -1,0 +1,122 @@
+"""Which points of a target a station cannot see: straight rays to the station against the target's moving triangles.
+
+In a part's own frame its triangles stand still, in a tree of boxes that is made once. Rays of one point in symbols
+that follow each other differ little, so they walk the tree together (`rays_loops`). As a turning part sees it, the
+station runs around the part's axis: its symbols are sorted by azimuth first.
+"""
+
+from collections.abc import Collection
+from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.echo import Rigid
+from lowalt.scene import rays_loops
+
+LEAF = 4
+"""Most triangles of a leaf."""
+
+
+class Tree(NamedTuple):
+    """A part's triangles (F, 9), a corner and both edges, in a tree of boxes (2 B, 6) as `rays_loops` walks it."""
+
+    boxes: np.ndarray
+    triangles: np.ndarray
+    closed: bool
+
+
+class _Same(NamedTuple):
+    """A target's surfaces, told apart by which object they are."""
+
+    surfaces: dict
+
+    def __hash__(self) -> int:
+        return id(self.surfaces)
+
+    def __eq__(self, other) -> bool:
+        return self.surfaces is other.surfaces
+
+
+def tree(corners: np.ndarray, closed: bool) -> Tree:
+    """Return the tree of triangles with `corners` (F, 3, 3) m: each node is split in halves along its longest side."""
+    leaves = 1
+    while leaves * LEAF < len(corners):
+        leaves *= 2
+    # Leaves that are not full hold the last triangle several times.
+    whole = leaves * -(-len(corners) // leaves)
+    order, middles = np.minimum(np.arange(whole), len(corners) - 1)[None], corners.mean(axis=1)
+    while len(order) < leaves:
+        held = middles[order]
+        side = np.ptp(held, axis=1).argmax(axis=1)[:, None, None]
+        along = np.take_along_axis(held, side, axis=2)[..., 0]
+        order = np.take_along_axis(order, along.argsort(axis=1), axis=1).reshape(2 * len(order), -1)
+    corners = corners[order]
+    low, high = corners.min(axis=(1, 2)) - rays_loops.ROOM_M, corners.max(axis=(1, 2)) + rays_loops.ROOM_M
+    boxes = np.empty((2 * leaves, 6))
+    while leaves:
+        boxes[leaves : 2 * leaves, :3], boxes[leaves : 2 * leaves, 3:] = low, high
+        low, high, leaves = low[::2], high[::2], leaves // 2
+        if leaves:
+            low = np.minimum(low, boxes[2 * leaves + 1 : 4 * leaves : 2, :3])
+            high = np.maximum(high, boxes[2 * leaves + 1 : 4 * leaves : 2, 3:])
+    first, second, third = corners.reshape(-1, 3, 3).swapaxes(0, 1)
+    return Tree(boxes, np.concatenate([first, second - first, third - first], axis=1), closed)
+
+
+@lru_cache(maxsize=64)
+def _trees(same: _Same) -> dict[int, Tree]:
+    """The tree of each part that has triangles."""
+    surfaces = same.surfaces
+    corners = np.asarray(surfaces["vertices"], np.float64)[surfaces["faces"]]
+    owner = surfaces["vertex_part"][surfaces["faces"][:, 0]]
+    return {int(part): tree(corners[owner == part], bool(surfaces["closed"][part])) for part in np.unique(owner)}
+
+
+def _around(axis: np.ndarray, rotation: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """The symbols (N,) by the azimuth at which the station, `toward` (N, 3), runs around a part's axis (3,)."""
+    seen = np.einsum("nji,nj->ni", rotation, toward)
+    right = np.cross(axis, np.eye(3)[abs(axis).argmin()])
+    right /= np.linalg.norm(right)
+    return np.arctan2(seen @ np.cross(axis, right), seen @ right).argsort(kind="stable")
+
+
+def hidden_by(
+    surfaces: dict, place_m: np.ndarray, motion: Rigid, axes: np.ndarray, toward: np.ndarray, casts: Collection[int],
+    hidden: np.ndarray,
+) -> None:  # fmt: skip
+    """Set hidden (N, L) where a triangle of the parts `casts` stands between a point and the station at place_m (3,).
+
+    motion: poses, and points off their own surface (L, 3), in their parts' frames (m); axes (P, 3): what parts turn
+    about, in their frames, NaN for others; toward (L,): the share of the way to the station by which a point is moved
+    instead, where it has no normal. Points that are hidden already are not asked. Of a closed surface with outward
+    normals, the side turned to the station alone hides.
+    """
+    rotation, translation, points, part = map(np.ascontiguousarray, motion)
+    moved, strip = (rotation, translation, points, part.astype(np.int64)), rays_loops.STRIP
+    turns = np.isfinite(axes).all(axis=1)
+    orders = [
+        _around(axes[p], rotation[:, p], place_m - translation[:, p]) if turns[p] else np.arange(len(rotation))
+        for p in range(len(axes))
+    ]
+    # The last strip is filled up with its last symbol.
+    strips = [np.pad(order, (0, -len(order) % strip), "edge").reshape(-1, strip) for order in orders]
+    count, result = len(strips[0]), np.ascontiguousarray(hidden.T)
+    work = tuple(map(np.empty, ((count, 15, strip), (count, 15, 2), (9, strip), 12, strip)))
+    trees = {p: held for p, held in _trees(_Same(surfaces)).items() if p in casts}
+    # A point's own part, which hides it most often, comes first.
+    for p, q in sorted(product(trees, range(len(axes))), key=lambda pair: pair[0] != pair[1]):
+        rays_loops.cast(trees[p], moved, place_m, strips[p if turns[p] else q], (p, q), toward, work, result)
+    hidden[:] = result.T
+
+
+def hidden_by_bones(surfaces: dict, place_m: np.ndarray, nodes: np.ndarray, hidden: np.ndarray) -> None:
+    """Set hidden (N, L) where a capsule round a bone stands between a recording's node, nodes (N, L, 3) m, and a place.
+
+    place_m: the station's, (3,). Capsules do not hide the nodes that lie in them or end their bones.
+    """
+    result = np.ascontiguousarray(hidden.T)
+    apart = np.ascontiguousarray(nodes.transpose(1, 2, 0))
+    rays_loops.capsules(place_m, apart, surfaces["bones"], surfaces["radius_m"], result)
+    hidden[:] = result.T

@@ -1,0 +1,238 @@
+"""The compiled loops of `rays`: the rays of one point in many symbols walk a part's tree of boxes together.
+
+A bundle is the rays of one point in STRIP symbols. Boxes that none of its rays can meet are passed over; leaves and
+triangles are compared with all its rays at once, in vector instructions.
+"""
+
+import math
+
+import numpy as np
+
+from lowalt.common.jit import INNER_ORDERED, ORDERED
+
+STRIP = 16
+"""Symbols whose rays walk together."""
+ROOM_M = 1e-9
+"""Room around boxes for rounding."""
+FLAT = 1e-12
+"""Squared sine of the angle between a ray and a bone, below which they count as parallel."""
+
+
+@INNER_ORDERED
+def _relative(rotation, translation, place, symbols, pair, pose):
+    """Fill pose (15, STRIP) for some symbols: turn and shift of part q as part p sees it, and the station there."""
+    p, q = pair
+    for k in range(STRIP):
+        mine, theirs, own = rotation[symbols[k], p], rotation[symbols[k], q], translation[symbols[k], p]
+        shift = translation[symbols[k], q]
+        # A pose's matrix is a rotation: its inverse is its transpose.
+        for i in range(3):
+            a, b, c = mine[0, i], mine[1, i], mine[2, i]
+            for j in range(3):
+                pose[3 * i + j, k] = a * theirs[0, j] + b * theirs[1, j] + c * theirs[2, j]
+            pose[9 + i, k] = a * (shift[0] - own[0]) + b * (shift[1] - own[1]) + c * (shift[2] - own[2])
+            pose[12 + i, k] = a * (place[0] - own[0]) + b * (place[1] - own[1]) + c * (place[2] - own[2])
+
+
+@INNER_ORDERED
+def _span(values):
+    """The middle of values, and how far they go off it."""
+    low, high = np.inf, -np.inf
+    for k in range(STRIP):
+        low, high = min(low, values[k]), max(high, values[k])
+    return 0.5 * (low + high), 0.5 * (high - low) + ROOM_M
+
+
+@INNER_ORDERED
+def _foreseen(spans, point, toward, bundle):
+    """Fill bundle (12,) with boxes that hold all starts and all ways: their middles, then half their sides.
+
+    spans (15, 2): those of the numbers in pose.
+    """
+    for i in range(3):
+        middle, half, place, moved = spans[9 + i, 0], spans[9 + i, 1], spans[12 + i, 0], spans[12 + i, 1]
+        for j in range(3):
+            middle += spans[3 * i + j, 0] * point[j]
+            half += spans[3 * i + j, 1] * abs(point[j])
+        bundle[i], bundle[6 + i] = middle + toward * (place - middle), half + toward * moved
+        bundle[3 + i], bundle[9 + i] = place - bundle[i], moved + bundle[6 + i]
+
+
+@INNER_ORDERED
+def _sent(pose, point, toward, ray, bundle):
+    """Fill ray (9, STRIP): starts, ways to the station, one over each component of these; and bundle (12,), as they are."""
+    for i in range(3):
+        r0, r1, r2, t, s = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2], pose[9 + i], pose[12 + i]
+        start, way, over = ray[i], ray[3 + i], ray[6 + i]
+        for k in range(STRIP):
+            at = r0[k] * point[0] + r1[k] * point[1] + r2[k] * point[2] + t[k]
+            start[k] = at + toward * (s[k] - at)
+            way[k] = s[k] - start[k]
+            over[k] = 1.0 / (way[k] if abs(way[k]) > 1e-30 else 1e-30)
+        bundle[i], bundle[6 + i] = _span(start)
+        bundle[3 + i], bundle[9 + i] = _span(way)
+
+
+@INNER_ORDERED
+def _can_meet(bundle, box):
+    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along the ways parts them.
+
+    Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by what the ways differ.
+    """
+    u, v, w, f, g, h = bundle[3], bundle[4], bundle[5], bundle[9], bundle[10], bundle[11]
+    i, j, k = 0.5 * (box[3] - box[0]), 0.5 * (box[4] - box[1]), 0.5 * (box[5] - box[2])
+    a, b, c = box[0] + i - bundle[0], box[1] + j - bundle[1], box[2] + k - bundle[2]
+    i, j, k = i + bundle[6], j + bundle[7], k + bundle[8]
+    p, q, r, x, y, z = abs(u) + f, abs(v) + g, abs(w) + h, abs(a), abs(b), abs(c)
+    return (
+        abs(b * w - c * v) <= j * r + k * q + y * h + z * g and abs(c * u - a * w) <= k * p + i * r + z * f + x * h
+        and abs(a * v - b * u) <= i * q + j * p + x * g + y * f
+        and a * u + b * v + c * w >= -(i * p + j * q + k * r + x * f + y * g + z * h)
+    )  # fmt: skip
+
+
+@INNER_ORDERED
+def _meets(ray, free, box):
+    """Whether a free ray meets a box (6,) between its start and the station: it is in all three slabs at once."""
+    x, y, z, u, v, w = ray[0], ray[1], ray[2], ray[6], ray[7], ray[8]
+    a, b, c, d, e, f = box[0], box[1], box[2], box[3], box[4], box[5]
+    most = 0.0
+    for k in range(STRIP):
+        a0, a1 = (a - x[k]) * u[k], (d - x[k]) * u[k]
+        b0, b1 = (b - y[k]) * v[k], (e - y[k]) * v[k]
+        c0, c1 = (c - z[k]) * w[k], (f - z[k]) * w[k]
+        enters = max(max(min(a0, a1), min(b0, b1)), max(min(c0, c1), 0.0))
+        leaves = min(min(max(a0, a1), max(b0, b1)), min(max(c0, c1), 1.0))
+        most = max(most, free[k] if enters <= leaves else 0.0)
+    return most > 0.0
+
+
+@INNER_ORDERED
+def _shadow(triangle, closed, ray, free):
+    """Set free (STRIP,) to 0 where rays meet a triangle (9,): a corner and both edges; Moeller & Trumbore 1997.
+
+    Of a closed surface with outward normals, the side turned to the station alone hides.
+    """
+    a0, a1, a2, d0, d1, d2 = triangle[0], triangle[1], triangle[2], triangle[3], triangle[4], triangle[5]
+    e0, e1, e2, largest = triangle[6], triangle[7], triangle[8], 0.0 if closed else np.inf
+    x, y, z, us, vs, ws = ray[0], ray[1], ray[2], ray[3], ray[4], ray[5]
+    for k in range(STRIP):
+        u, v, w, o0, o1, o2 = us[k], vs[k], ws[k], x[k] - a0, y[k] - a1, z[k] - a2
+        h0, h1, h2 = v * e2 - w * e1, w * e0 - u * e2, u * e1 - v * e0
+        q0, q1, q2 = o1 * d2 - o2 * d1, o2 * d0 - o0 * d2, o0 * d1 - o1 * d0
+        turned = d0 * h0 + d1 * h1 + d2 * h2
+        sign = 1.0 if turned > 0.0 else -1.0
+        whole = sign * turned
+        first, second = sign * (o0 * h0 + o1 * h1 + o2 * h2), sign * (u * q0 + v * q1 + w * q2)
+        way = sign * (e0 * q0 + e1 * q1 + e2 * q2)
+        # A ray in the triangle's plane has turned = 0, and then `way` is not between 0 and it.
+        met = (turned <= largest) & (first >= 0.0) & (second >= 0.0) & (first + second <= whole)
+        free[k] = 0.0 if met & (way > 0.0) & (way < whole) else free[k]
+
+
+@INNER_ORDERED
+def _left(triangles, first, count, closed, ray, free):
+    """Hold rays against `count` triangles (`_shadow`); return whether any ray is still free."""
+    for f in range(first, first + count):
+        _shadow(triangles[f], closed, ray, free)
+    most = 0.0
+    for k in range(STRIP):
+        most = max(most, free[k])
+    return most > 0.0
+
+
+@INNER_ORDERED
+def _walk(boxes, triangles, closed, ray, bundle, free, last):
+    """Set free (STRIP,) to 0 where rays meet a part's triangles; return the leaf that hid the last one, 0 for none.
+
+    boxes (2 B, 6): node k holds nodes 2 k and 2 k + 1, the root is node 1, and nodes from B on are the leaves, whose
+    triangles (F, 9) follow each other. last: the leaf to begin with, 0 for none.
+    """
+    leaves = len(boxes) // 2
+    each, node = len(triangles) // leaves, 1
+    if last > 0 and not _left(triangles, (last - leaves) * each, each, closed, ray, free):
+        return last
+    while True:
+        if _can_meet(bundle, boxes[node]):
+            if node < leaves:
+                node *= 2
+                continue
+            if _meets(ray, free, boxes[node]) and not _left(triangles, (node - leaves) * each, each, closed, ray, free):
+                return node
+        # The next node that is not inside this one.
+        node += 1
+        while node % 2 == 0:
+            node //= 2
+        if node == 1:
+            return 0
+
+
+@ORDERED
+def cast(tree, motion, place, order, pair, toward, work, hidden):
+    """Set hidden (L, N) where triangles of part p stand between points of part q and the station at `place` (3,).
+
+    tree: `rays.Tree` of p; motion: as in `rays.hidden_by`, points already off their surface; order (strips, STRIP):
+    symbols that walk together, some may come twice; pair: (p, q); toward (L,): as in `rays.hidden_by`; work: poses
+    (strips, 15, STRIP), spans (strips, 15, 2), ray (9, STRIP), bundle (12,) and free (STRIP,).
+    """
+    (boxes, triangles, closed), (rotation, translation, points, part) = tree, motion
+    poses, spans, ray, bundle, free = work
+    for strip in range(len(order)):
+        _relative(rotation, translation, place, order[strip], pair, poses[strip])
+        for i in range(15):
+            spans[strip, i] = _span(poses[strip, i])
+    for l in range(len(points)):  # noqa: E741
+        last = 0
+        for strip in range(len(order) if part[l] == pair[1] else 0):
+            _foreseen(spans[strip], points[l], toward[l], bundle)
+            if not _can_meet(bundle, boxes[1]):
+                continue
+            symbols, left = order[strip], 0.0
+            for k in range(STRIP):
+                free[k] = 0.0 if hidden[l, symbols[k]] else 1.0
+                left += free[k]
+            if left == 0.0:
+                continue
+            _sent(poses[strip], points[l], toward[l], ray, bundle)
+            last = _walk(boxes, triangles, closed, ray, bundle, free, last)
+            for k in range(STRIP):
+                hidden[l, symbols[k]] = free[k] == 0.0
+
+
+@INNER_ORDERED
+def _capsule(node, first, second, place, square, hidden):
+    """Set hidden (N,) where the rays p + s d, s > 0, from nodes (3, N) come within a capsule round a bone, a + t e.
+
+    first, second (3, N): the bone's ends; square (m^2): of its radius. A node inside the capsule is not hidden by it.
+    """
+    p0, p1, p2, a0, a1, a2 = node[0], node[1], node[2], first[0], first[1], first[2]
+    for n in range(np.uint64(len(hidden))):
+        d0, d1, d2 = place[0] - p0[n], place[1] - p1[n], place[2] - p2[n]
+        length = math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        d0, d1, d2 = d0 / length, d1 / length, d2 / length
+        e0, e1, e2 = second[0, n] - a0[n], second[1, n] - a1[n], second[2, n] - a2[n]
+        w0, w1, w2 = a0[n] - p0[n], a1[n] - p1[n], a2[n] - p2[n]
+        ee, ww = e0 * e0 + e1 * e1 + e2 * e2, w0 * w0 + w1 * w1 + w2 * w2
+        de, dw, ew = d0 * e0 + d1 * e1 + d2 * e2, d0 * w0 + d1 * w1 + d2 * w2, e0 * w0 + e1 * w1 + e2 * w2
+        near = min(max(-ew / ee, 0.0), 1.0) if ee > 0.0 else 0.0
+        inside = ww + near * (2.0 * ew + near * ee) <= square
+        # With the best s for each t the distance is a convex function of t, so the best t is its minimum or an end.
+        across = ee - de * de
+        t = min(max((de * dw - ew) / across, 0.0), 1.0) if across > FLAT * ee else near
+        s = dw + t * de
+        away = ww + t * (2.0 * ew + t * ee) - s * s
+        hidden[n] |= (s > 0.0) & (not inside) & (away <= square)
+
+
+@ORDERED
+def capsules(place, nodes, bones, radius_m, hidden):
+    """Set hidden (L, N) where a capsule round a bone stands between a node, nodes (L, 3, N) m, and the station.
+
+    bones (B, 2): nodes at the ends of each; radius_m (B,). A node stands for the skin round it: a capsule does not hide
+    the nodes that lie in it or end its bone.
+    """
+    for l in range(len(nodes)):  # noqa: E741
+        for b in range(len(bones)):
+            first, second = bones[b, 0], bones[b, 1]
+            if l not in (first, second):
+                _capsule(nodes[l], nodes[first], nodes[second], place, radius_m[b] * radius_m[b], hidden[l])
