@@ -24,6 +24,10 @@ class Physics(NamedTuple):
         """Whether an echo is more than a response: its subcarriers leak into each other."""
         return self.symbol_motion is not None or self.cyclic_prefix is not None
 
+    def response(self, view: View, paths: list[Path], factor: np.ndarray | float) -> np.ndarray:
+        """Return the subcarriers (N, M) of `response.response` with the physics that the scene names."""
+        return response(view, paths, factor, squint=self.squint, wavefront=self.wavefront)
+
 
 def arriving(
     physics: Physics, view: View, factor: np.ndarray | float, paths_of: Callable[[View], list[Path]],
@@ -38,27 +42,26 @@ def arriving(
     delays_s, weights = np.zeros(1), np.ones((1, count))
     if physics.symbol_motion is not None:
         delays_s, weights = physics.symbol_motion.module.instants(physics.symbol_motion.settings, view)
-    late, turn = np.zeros(view.places.shape[:2], np.int64), np.ones(count)
+    late, turn = None, np.ones(count)
     if physics.cyclic_prefix is not None:
         prefix, settings = physics.cyclic_prefix.module, physics.cyclic_prefix.settings
         late, turn = prefix.late_samples(settings, view), prefix.turn(settings, view.network)
-    factor = np.broadcast_to(factor, (*np.shape(factor)[:-2], *late.shape))
     samples = np.zeros((len(view.times_s), count), np.complex128)
     for delay_s, weight in zip(delays_s, weights, strict=True):
         moved = view if delay_s == 0.0 else view.at(view.times_s + delay_s)
         paths = paths_of(moved)
+        if late is None:
+            samples += weight * transmit(physics.response(moved, paths, factor), symbols[0])
+            continue
         # Points that lose equally many samples of the window share one response.
         for lost in np.unique(late):
             rows = np.flatnonzero((late == lost).any(axis=1))
             some = [_at_rows(path, rows) for path in paths]
-            echo = response(
-                moved.at_rows(rows), some, (factor * (late == lost))[..., rows, :], squint=physics.squint,
-                wavefront=physics.wavefront,
-            )  # fmt: skip
+            echo = physics.response(moved.at_rows(rows), some, (factor * (late == lost))[..., rows, :])
             now = transmit(echo, symbols[0][rows])
             if lost:
                 now[:, :lost] = transmit(echo * turn, symbols[1][rows])[:, :lost]
-            samples[rows] += now * weight
+            samples[rows] += weight * now
     return samples
 
 

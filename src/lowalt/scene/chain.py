@@ -199,7 +199,7 @@ class Sample:
         if view is self.view and not paths and not bent:
             return self.direct
         factor = self.routes(view, paths)
-        return response(view, paths, factor, squint=self.physics.squint, wavefront=self.physics.wavefront)
+        return self.physics.response(view, paths, factor)
 
     def arrived(self) -> np.ndarray:
         """Return the response (N, M) of all echoes as the receiver's own data reveal it, behind the receiver's effects.
@@ -255,9 +255,7 @@ class Sample:
 
     def direct_seen(self, view: View) -> np.ndarray:
         """Return the subcarriers (N, M) of the target on the direct path with squint and spherical waves as named."""
-        return response(
-            view, (), self.weight(view), squint=self.physics.squint, wavefront=self.physics.wavefront
-        )  # fmt: skip
+        return self.physics.response(view, [], self.weight(view))
 
     @cached_property
     def power(self) -> float:

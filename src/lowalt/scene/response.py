@@ -16,6 +16,7 @@ from scipy.special import jv
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.scene import response_loops, spherical
+from lowalt.scene.geometry import ball
 from lowalt.scene.view import View
 
 ERROR = 1e-11
@@ -56,30 +57,32 @@ def response(
     if not same:
         sender = station.transmitter or station
         ends.insert(0, (sender, network.transmit, [path.sender or path for path in seen]))
-    middle, radius = _middle(view.places)
     arrays = [_end(view, *end, (squint, wavefront)) for end in ends]
-    aperture = max(array.spacing * _half_diagonal(array.counts) for array in arrays)
-    nearest = min(float(array.centre.min()) for array in arrays) - radius.max()
-    reach = radius * (1.0 + 2.0 * aperture / nearest) if squint and nearest > 0 else radius + 2.0 * aperture * squint
-    # One table serves all symbols, and a power of sqrt(2) lets a few serve all samples.
-    largest = 2.0 ** (np.ceil(2 * np.log2(max(float(reach.max()), 1e-3))) / 2)
+    reach = ball(_planes(view.places), np.empty((len(view.times_s), 3)))
+    if squint:
+        # Ranges then count to the arrays' middles, whose directions to the points differ.
+        aperture = max(array.spacing * _half_diagonal(array.counts) for array in arrays)
+        nearest = min(float(array.centre.min()) for array in arrays) - reach
+        reach += 2.0 * aperture * min(reach / nearest if nearest > 0 else 1.0, 1.0)
+    # A power of sqrt(2), so that a few tables serve all samples.
+    reach = 2.0 ** (np.ceil(2 * np.log2(max(reach, 1e-3))) / 2)
     band_m = network.subcarriers * network.subcarrier_spacing_hz / SPEED_OF_LIGHT
-    to_nodes, to_band = tables(len(arrays[0].kappas), float(2.0 * largest * band_m), network.subcarriers)
+    to_nodes, to_band = tables(len(arrays[0].kappas), float(2.0 * reach * band_m), network.subcarriers)
     out, back = arrays[0], arrays[-1]
     nodes, orders = len(out.kappas), len(to_nodes) // len(out.kappas)
-    result = np.empty((len(out.places), len(back.places), len(middle), nodes, 2, orders))
+    result = np.empty((len(out.places), len(back.places), len(view.times_s), nodes, 2, orders))
     strength = _amplitudes(view, factor)
-    fault = response_loops.moments(out, back, same, strength, largest, result)
+    fault = response_loops.moments(out, back, same, strength, reach, result)
     if fault:
         raise InputError(
             f"position of a point at symbol {fault - 1} is that of station {station.name} (r = 0), expected r > 0"
         )
-    total = np.zeros((len(middle), network.subcarriers), np.complex128)
+    total = np.zeros((len(view.times_s), network.subcarriers), np.complex128)
     for a, b in np.ndindex(result.shape[:2]):
         if same and b < a:
             continue
         weight = 2.0 if same and a != b else 1.0
-        own = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(middle), -1)
+        own = weight * (result[a, b, :, :, 0] + 1j * result[a, b, :, :, 1]).reshape(len(view.times_s), -1)
         range_m = out.centre[a] + back.centre[b]
         spectrum = np.ascontiguousarray((own @ to_nodes) @ to_band)
         response_loops.add_turned(spectrum, -out.turns * range_m, -range_m * band_m / network.subcarriers, total)
@@ -97,10 +100,9 @@ def _amplitudes(view: View, factor: np.ndarray | float) -> np.ndarray:
     return np.ascontiguousarray(np.broadcast_to(strength, (*strength.shape[:2], *view.places.shape[:2])))
 
 
-def _middle(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The mean (N, 3) of places (N, L, 3) m, and the distance (N,) of the farthest place from it."""
-    middle = places.mean(axis=1)
-    return middle, np.sqrt(((places - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
+def _planes(places: np.ndarray) -> np.ndarray:
+    """Places (N, L, 3) as (N, 3, L), in one block of memory."""
+    return np.ascontiguousarray(np.swapaxes(places, 1, 2), np.float64)
 
 
 def _half_diagonal(counts: np.ndarray) -> float:
@@ -126,12 +128,14 @@ def _end(
     beams = view.beams_of(station)
     # An instant that is a multiple of the update must not fall before it by rounding.
     current = np.searchsorted(beams.starts_s, view.times_s + 1e-9, side="right") - 1
-    images = np.stack([np.ascontiguousarray(np.swapaxes(path.places, 1, 2)) for path in paths])
+    images = np.stack([_planes(path.places) for path in paths])
     coefficient = np.stack([
         np.broadcast_to(np.asarray(path.coefficient, np.complex128), view.places.shape[:2]) for path in paths
     ])  # fmt: skip
     # An image keeps all distances, so the mean of the images is as far from them as the points' mean is from these.
-    centres = np.stack([path.places.mean(axis=1) for path in paths])
+    centres = np.empty((len(paths), len(view.times_s), 3))
+    for image, centre in zip(images, centres, strict=True):
+        ball(image, centre)
     end = response_loops.End(
         np.array(station.position_m, np.float64), station.horizontal[:2].copy(), np.array(counts),
         SPEED_OF_LIGHT / (2.0 * carrier), lowest / carrier, frequencies(network, view.station, squint), squint,

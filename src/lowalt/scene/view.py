@@ -11,6 +11,7 @@ from lowalt.common.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.scene.antenna import Element, gain
+from lowalt.scene.geometry import carry
 from lowalt.scene.perturbations import at_times, summed
 from lowalt.scene.sampling import Sampling
 from lowalt.targets.cloud import Cloud
@@ -56,23 +57,25 @@ class View:
     def places(self) -> np.ndarray:
         """Every point's place (N, L, 3) in metres, global frame."""
         if self.nodes:
-            return self.motion.translation
-        return self._carried(self.cloud.points) + self.motion.translation[:, self.cloud.part]
+            return np.ascontiguousarray(self.motion.translation.swapaxes(1, 2)).swapaxes(1, 2)
+        return self._carried(self.cloud.points, self.motion.translation)
 
     @cached_property
     def normals(self) -> np.ndarray:
         """Every point's unit normal (N, L, 3), global frame, NaN where unknown."""
         if self.nodes:
             return np.full(self.places.shape, np.nan)
-        return self._carried(self.cloud.normals)
+        return self._carried(self.cloud.normals, np.zeros_like(self.motion.translation))
 
-    def _carried(self, vectors: np.ndarray) -> np.ndarray:
-        """Vectors (L, 3) of the parts' own frames, turned into the global frame, (N, L, 3)."""
-        result = np.empty((len(self.times_s), len(vectors), 3))
-        for part in range(len(self.cloud.kinds)):
-            mine = self.cloud.part == part
-            result[:, mine] = vectors[mine] @ self.motion.rotation[:, part].swapaxes(1, 2)
-        return result
+    def _carried(self, vectors: np.ndarray, translation: np.ndarray) -> np.ndarray:
+        """Vectors (L, 3) of the parts' own frames in the global frame, (N, L, 3), moved by translation (N, P, 3) m."""
+        result = np.empty((len(self.times_s), 3, len(vectors)))
+        rotation = np.ascontiguousarray(self.motion.rotation)
+        carry(
+            rotation, np.ascontiguousarray(translation), np.ascontiguousarray(vectors.T),
+            np.asarray(self.cloud.part, np.int64), result,
+        )  # fmt: skip
+        return result.swapaxes(1, 2)
 
     @property
     def nodes(self) -> bool:
