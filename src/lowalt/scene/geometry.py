@@ -27,13 +27,13 @@ def carry(rotation, translation, points, part, result):
                 )
                 row = result[n, axis]
                 for i in range(np.uint64(first), np.uint64(last)):
-                    row[i] = a * points[0, i] + b * points[1, i] + c * points[2, i] + d
+                    row[i] = a * points[0, i] + b * points[1, i] + c * points[2, i] + shift
         first = last
 
 
 @VECTOR
 def ball(places, middle):
-    """Fill middle (N, 3) with the mean of places (N, 3, L) m; return the distance of the farthest place from its mean."""
+    """Fill middle (N, 3) with the mean of places (N, 3, L) m; return how far the farthest place is from it."""
     farthest = 0.0
     for n in range(len(places)):
         x, y, z = places[n, 0], places[n, 1], places[n, 2]
