@@ -19,13 +19,8 @@ def carry(rotation, translation, points, part, result):
             last += 1
         for n in range(len(result)):
             for axis in range(3):
-                a, b, c, d = (
-                    rotation[n, p, axis, 0],
-                    rotation[n, p, axis, 1],
-                    rotation[n, p, axis, 2],
-                    translation[n, p, axis],
-                )
-                row = result[n, axis]
+                turn, row, shift = rotation[n, p, axis], result[n, axis], translation[n, p, axis]
+                a, b, c = turn[0], turn[1], turn[2]
                 for i in range(np.uint64(first), np.uint64(last)):
                     row[i] = a * points[0, i] + b * points[1, i] + c * points[2, i] + shift
         first = last
