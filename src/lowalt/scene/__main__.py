@@ -8,10 +8,10 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.network import Network
+from lowalt.motion import read_table
 from lowalt.scene.catalogue import called
 from lowalt.scene.chunk import scene_signals
-from lowalt.scene.chain import Scene
-from lowalt.motion import read_table
+from lowalt.scene.observe import Scene
 from lowalt.targets.cloud import read
 
 

@@ -5,8 +5,9 @@ names acts in the order of the catalogue. What no effect asks for is left out wh
 time samples without anything that reaches into them.
 """
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
@@ -14,62 +15,18 @@ import numpy as np
 
 from lowalt.common.blas_threads import one_blas_thread
 from lowalt.common.memory import keep_freed_arrays
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.common.network import SPEED_OF_LIGHT, Station
 from lowalt.common.power import rms
-from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.scene import protocols, waveform
 from lowalt.scene.arrivals import Physics, arriving
-from lowalt.scene.catalogue import (
-    BY_END,
-    LOOK_WIDE,
-    PAIR_WIDE,
-    SHARED_STREAMS,
-    NamedEffect,
-    placed,
-    providing,
-)
+from lowalt.scene.catalogue import BY_END, NamedEffect, placed, providing
 from lowalt.scene.listening import Listening
+from lowalt.scene.observe import Scene, ends_of, observe, with_cross_sections
 from lowalt.scene.response import Path, response
 from lowalt.scene.view import View
 from lowalt.scene.waveform import Look
 from lowalt.targets.cloud import Cloud
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A scene: its network, seed, the echo engine's tolerance, and its effects in the chain's order."""
-
-    network: Network
-    seed: int
-    tolerance: float | None
-    effects: tuple[NamedEffect, ...]
-
-    def stream(self, name: str, row: dict, *more: str) -> np.random.Generator:
-        """Return the stream of an effect for the motion model `row`, from its start at every call."""
-        # Noise at one SNR does not depend on noise at another.
-        levels = [effect.settings["snr_db"] for effect in self.effects if effect.name == name == "cell_noise"]
-        return stream(self.seed, "effect", name, row["subtype"], row["model"], *more, *filter(None, levels))
-
-    def drawn(self, row: dict, station: Station, name: str) -> np.random.Generator:
-        """Return the stream of an effect at a station, from its start: one for the look where its draws belong to it.
-
-        Both directions of a link share the stream of an effect whose draws belong to the pair.
-        """
-        name = SHARED_STREAMS.get(name, name)
-        if name in LOOK_WIDE:
-            return self.stream(name, row)
-        if name in PAIR_WIDE and station.transmitter is not None:
-            return self.stream(name, row, *sorted((station.transmitter.name, station.receiver.name)))
-        return self.stream(name, row, station.name)
-
-    def at_snr(self, snr_db: float) -> "Scene":
-        """Return the scene with noise in all range cells at this SNR (dB), instead of at each of noise.snr_db."""
-        changed = [
-            effect._replace(settings=effect.settings | {"snr_db": snr_db}) if effect.name == "cell_noise" else effect
-            for effect in self.effects
-        ]
-        return replace(self, effects=tuple(effect for effect in changed if not effect.module.idle(effect.settings)))
 
 
 class Received(NamedTuple):
@@ -113,6 +70,8 @@ class Sample:
             by_name.get("symbol_motion"),
             by_name.get("cyclic_prefix"),
         )
+        self.share = 1.0
+        """Factor on the amplitudes of the target's own points."""
         self._factors: dict[tuple[View, str], np.ndarray] = {}
 
     @cached_property
@@ -132,7 +91,7 @@ class Sample:
 
     def weight(self, view: View, names: Iterable[str] | None = None) -> np.ndarray:
         """Return the product (N, L) of the factors of all effects, or those named, on the points of a view."""
-        result = np.ones(view.places.shape[:2])
+        result = np.full(view.places.shape[:2], self.share if view.row is self.row else 1.0)
         for effect in providing(self.channel, protocols.WeighsPoints):
             if names is None or effect.name in names:
                 result *= self._factor(effect, view)
@@ -175,7 +134,7 @@ class Sample:
         for effect in providing(self.channel, protocols.AddsTargets):
             rng = self.scene.stream(effect.name, self.row)
             found = effect.module.companions(effect.settings, self.cloud, self.row, self.clouds, rng)
-            beams = {end.name: self.view.beams_of(end) for end in _ends(self.scene.network, self.station)}
+            beams = {end.name: self.view.beams_of(end) for end in ends_of(self.scene.network, self.station)}
             for cloud, row in found:
                 own = cloud if cloud is self.cloud else with_cross_sections(self.scene, cloud)
                 occluders = self.view.occluders if cloud is self.cloud else None
@@ -271,15 +230,26 @@ class Sample:
             2.0 * range_m / SPEED_OF_LIGHT,
         )  # fmt: skip
 
+    @cached_property
     def cells(self) -> np.ndarray:
-        """Return the range cells (N, M) of the received symbols behind the receiver and the filters of detection."""
+        """The range cells (N, M) of the received symbols behind the receiver, before detection."""
         total, picking = self.arrived(), providing(self.transmitter, protocols.PicksSubcarriers)
         cells = picking[0].module.range_cells(picking[0].settings, total) if picking else waveform.range_cells(total)
-        if self.view.sampling is not None:
-            cells = cells[self.view.sampling.present]
-        for effect in providing(self.detection, protocols.FiltersCells):
+        return cells if self.view.sampling is None else cells[self.view.sampling.present]
+
+    def filtered(self, detection: Sequence[NamedEffect]) -> np.ndarray:
+        """Return the range cells (N, M) behind the filters of these detection effects."""
+        cells = self.cells
+        for effect in providing(detection, protocols.FiltersCells):
             cells = effect.module.process(effect.settings, cells, self.look, self.draws(effect.name))
         return cells
+
+    def chosen(self, detection: Sequence[NamedEffect], cells: np.ndarray) -> np.ndarray:
+        """Return the cells (N,) that these detection effects choose of range cells (N, M): else the strongest."""
+        result = abs(cells).argmax(axis=1)
+        for effect in providing(detection, protocols.ChoosesCells):
+            result = effect.module.choose(effect.settings, result, cells, self.look, self.draws(effect.name))
+        return result
 
     def received(self) -> Received:
         """Return the sample's signal, the chosen range cells and the reference power."""
@@ -289,10 +259,8 @@ class Sample:
                 self.scene.tolerance, sample=self.name,
             )  # fmt: skip
             return Received(echo.signal, echo.cell, arriving_power(echo.signal))
-        cells = self.cells()
-        chosen = abs(cells).argmax(axis=1)
-        for effect in providing(self.detection, protocols.ChoosesCells):
-            chosen = effect.module.choose(effect.settings, chosen, cells, self.look, self.draws(effect.name))
+        cells = self.filtered(self.detection)
+        chosen = self.chosen(self.detection, cells)
         signal = cells[np.arange(len(cells)), chosen]
         sampling = self.view.sampling
         if sampling is not None:
@@ -302,6 +270,21 @@ class Sample:
             every[sampling.present] = chosen
             chosen = every
         return Received(signal, chosen, self.power)
+
+    def without_target(self) -> "Sample":
+        """Return the same sample, with the same draws and noise level, whose target reflects nothing."""
+        result, power = copy(self), self.power
+        result.__dict__ = {name: value for name, value in self.__dict__.items() if name not in ("cells", "direct")}
+        result.share, result.power = 0.0, power
+        return result
+
+    def own_cell(self) -> np.ndarray:
+        """Return the range cell (N,) of the target's middle at each received symbol, on the direct path."""
+        ends = self.station.transmitter or self.station, self.station
+        middle = self.view.places.mean(axis=1)
+        ways_m = sum(np.linalg.norm(middle - np.asarray(end.position_m), axis=1) for end in ends)
+        cells = np.rint(ways_m / (2 * self.scene.network.cell_m)).astype(np.int64) % self.cells.shape[1]
+        return cells if self.view.sampling is None else cells[self.view.sampling.present]
 
     @property
     def name(self) -> str:
@@ -345,48 +328,7 @@ def arriving_power(signal: np.ndarray) -> float:
     return rms(signal.astype(np.complex64)) ** 2
 
 
-def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
-    """Return the cloud with the cross sections that the scene gives its points."""
-    for effect in providing(scene.effects, protocols.SetsCrossSections):
-        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud))
-    return cloud
-
-
 def _offset_cells(effect: NamedEffect, view: View) -> float:
     """How far an effect's echoes stand beyond their range cells' centres, in cells."""
     offset: Callable[[View], float] = getattr(effect.module, "offset_cells", lambda view: 0.0)
     return offset(view)
-
-
-def observe(scene: Scene, station: Station, cloud: Cloud, row: dict, occluders: dict | None = None) -> View:
-    """Return the view of a sample with the scene's motion effects drawn; their draws do not depend on the station."""
-    times_s = scene.network.times_s
-    grid_s = np.append(times_s, len(times_s) * scene.network.symbol_interval_s)
-    sampling = None
-    for effect in providing(scene.effects, protocols.SamplesTime):
-        draws = scene.stream(effect.name, row, station.name)
-        sampling = effect.module.sampling(effect.settings, scene.network, draws)
-        times_s = sampling.times_s
-    moved = tuple(
-        effect.module.perturb(effect.settings, cloud, row, grid_s, scene.stream(effect.name, row))
-        for effect in placed(scene.effects, "motion")
-    )
-    shaped = [effect.module.element(effect.settings) for effect in providing(scene.effects, protocols.ShapesElements)]
-    view = View(
-        scene.network, station, cloud, row, times_s, grid_s, moved, occluders, shaped[0] if shaped else None, None,
-        sampling,
-    )  # fmt: skip
-    for effect in providing(scene.effects, protocols.PointsBeams):
-        beams = {
-            end.name: effect.module.beams(effect.settings, view.of(end), scene.stream(effect.name, row, end.name))
-            for end in _ends(scene.network, station)
-        }
-        view = replace(view, beams=beams)
-    return view
-
-
-def _ends(network: Network, station: Station) -> list[Station]:
-    """All stations of the network that are not links, and those of `station`."""
-    own = [station] if station.transmitter is None else [station.transmitter, station.receiver]
-    others = [each for each in network.stations if each.transmitter is None]
-    return list({each.name: each for each in [*others, *own]}.values())
