@@ -1,11 +1,18 @@
-"""The command `lowalt explain` lists the effects that a scene simulates and those left out, with reason and cost."""
+"""The command `lowalt explain` says whether a scene's receiver finds its targets, and what each effect changes."""
 
 import argparse
 import os
+import sys
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from lowalt.commands.for_programs import as_json, json_option
-from lowalt.common.config import load
+from lowalt.common.config import load, merge
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.common.yaml_files import load_yaml
 
 
 def _sample(text: str) -> tuple[str, int]:
@@ -19,15 +26,20 @@ def _sample(text: str) -> tuple[str, int]:
 def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
     """Add `explain` to a parser's commands; base: the configuration by default; schema: its schema."""
     line = commands.add_parser(
-        "explain", help="list the effects that a scene simulates and those left out, with reason and cost",
-        epilog="example: lowalt explain config/scenes/urban.yaml --sample Crow:3",
+        "explain", help="say whether a scene's receiver finds its targets, and what each effect changes",
+        epilog="example: lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml",
     )  # fmt: skip
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the base; more may follow it")
     line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
-    line.add_argument("--station", help="the station that listens (default: the first)")
-    line.add_argument("--no-cost", action="store_true", help="do not measure times")
+    line.add_argument("--station", help="the station of the table of effects (default: the first)")
+    line.add_argument("--model", type=Path, help="a trained model: how many of its answers each effect changes")
+    line.add_argument("--no-table", action="store_true", help="the verdict alone")
+    line.add_argument("--levels", action="store_true", help="list the levels of every sample as a link budget does")
+    line.add_argument("--sources", action="store_true", help="list where the model of each effect comes from")
+    line.add_argument("--suggest", type=float, metavar="LEAST", help="write the effects that change a signal by more")
+    line.add_argument("--out", type=Path, help="the scene to write with --suggest (.yaml)")
     json_option(line)
 
 
@@ -36,10 +48,82 @@ def run(given: argparse.Namespace) -> str:
 
     Raises: InputError where the configuration, a sample or a station is wrong.
     """
-    from lowalt.effects.explain import scene_facts
-    from lowalt.effects.explain_text import data, text
+    if (given.suggest is None) != (given.out is None):
+        raise InputError(
+            "--suggest: without --out, expected both" if given.out is None else "--out: expected --suggest"
+        )
+    from lowalt.scene import explain, explain_text
 
     inputs = os.environ.get("LOWALT_INPUTS")
     config = load([given.base, *given.scene], given.schema)
-    found = scene_facts(config, Path(inputs) if inputs else None, given.sample, given.station, not given.no_cost)
-    return as_json(data(found)) if given.json else text(found)
+    scene = explain.scene_of(config)
+    stations = scene.network.stations
+    first = given.station or stations[0].name
+    scene.network.station(first)
+    print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
+    chosen = explain.samples(config, Path(inputs) if inputs else None, given.sample)
+    clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
+    findings = [explain.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
+    changes = []
+    if not given.no_table or given.suggest is not None:
+        print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
+        names = [station.name for station in stations] if given.model else [first]
+        changes = explain.changes(config, chosen, names, _comparison(config, names, given.model))
+    if given.out is not None:
+        overlay: dict = {}
+        for path in given.scene:
+            overlay = merge(overlay, load_yaml(path))
+        with replacing(given.out) as temporary:
+            temporary.write_text(explain_text.suggested(overlay, changes, given.suggest))
+    if given.json:
+        return as_json({
+            "run": config["run"], "findings": [finding._asdict() for finding in findings],
+            "changes": [change._asdict() for change in changes],
+        })  # fmt: skip
+    lines = explain_text.verdict(findings)
+    if changes and not given.no_table:
+        lines += ["", *explain_text.effects_table(changes, given.sources)]
+    for finding in findings if given.levels else []:
+        lines += ["", *explain_text.level_lines(finding)]
+    return "\n".join(lines)
+
+
+def _comparison(
+    config: dict, stations: list[str], model: Path | None
+) -> Callable[[np.ndarray, np.ndarray], dict[str, float]]:  # fmt: skip
+    """What two sets of signals (K, stations, N) differ in as images, and in the answers of a trained model."""
+    from dataclasses import replace
+
+    from lowalt.common.network import Network
+    from lowalt.tiles import Renderer
+
+    visible = 8
+    network = Network.from_settings(config["network"])
+    blocks = {key: config[key] for key in ("network", "spectra", "images")}
+    whole = Renderer.from_settings(blocks)
+    seen = replace(network, stations=tuple(network.station(name) for name in stations))
+    renderer = Renderer(seen, whole.spectra, whole.images)
+    answer = None
+    if model is not None:
+        from lowalt.recognition.one_sample import of_tile
+        from lowalt.recognition.zoo import opened
+
+        trained, settings = opened(model)
+
+        def answer(tile: np.ndarray) -> str:
+            """The most probable class of a tile."""
+            found = of_tile(trained, tile, settings or blocks)
+            return max(found, key=found.__getitem__)
+
+    def compare(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
+        """Shares of pixels whose index differs by more than 8 of 255, and of answers that differ."""
+        pairs = [
+            [renderer.tile(signals.astype(np.complex64)).astype(int) for signals in pair]
+            for pair in zip(before, after, strict=True)
+        ]
+        result = {"pixels": float(np.mean([abs(a - b) > visible for a, b in pairs]))}
+        if answer is not None:
+            result["answers"] = float(np.mean([answer(a) != answer(b) for a, b in pairs]))
+        return result
+
+    return compare
