@@ -1,0 +1,79 @@
+"""Checks of a scene before any job starts: whether its effects fit its network, its noise and each other."""
+
+from typing import NamedTuple
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.common.plan import snrs_of
+from lowalt.scene.catalogue import called
+
+STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")
+"""Effects that add something that stands still."""
+
+
+class CheckedScene(NamedTuple):
+    """The part of a scene's configuration that an effect's `check` may look at.
+
+    effects: the complete settings of every effect that is not idle, by name; snr_db: the set SNRs.
+    """
+
+    network: Network
+    effects: dict[str, dict]
+    snr_db: tuple[float, ...]
+
+
+def check(config: dict) -> CheckedScene:
+    """Return the scene of a configuration whose effects fit together.
+
+    Raises: InputError naming the effect, the value and what was expected, before any job starts.
+    """
+    effects = called(config["effects"])
+    scene = CheckedScene(
+        Network.from_settings(config["network"]),
+        {effect.name: effect.settings for effect in effects},
+        snrs_of(config),
+    )
+    links = [station.name for station in scene.network.stations if station.transmitter is not None]
+    if links and "direct_path" not in config["effects"]:
+        raise InputError(
+            f"network.stations: {links} are links between two stations, expected effects.direct_path in the same scene"
+        )
+    if scene.network.guard_subcarriers < 0 and "interference" not in scene.effects:
+        raise InputError(
+            f"network.guard_subcarriers: {scene.network.guard_subcarriers}, sub-bands overlap, expected "
+            "effects.interference in the same scene"
+        )
+    noisy = [snr for snr in scene.snr_db if snr != float("inf")]
+    if "receiver_noise" in scene.effects and noisy:
+        raise InputError(
+            f"effects.receiver_noise: noise.snr_db is {list(scene.snr_db)}, expected [.inf]: a scene has a link budget "
+            "or set SNRs, not both"
+        )
+    if noisy and config.get("shards", {}).get("kind") == "recipe" and {"cell_noise", "canceller"} & set(scene.effects):
+        raise InputError(
+            "shards.kind: 'recipe' draws white noise as samples are read, expected 'image' or 'signal' in a scene with "
+            "effects.cell_noise or effects.canceller"
+        )
+    regrid = scene.effects.get("slow_time", {"regrid": "zero"})["regrid"]
+    if config.get("spectra", {}).get("times") == "known" and regrid != "zero":
+        raise InputError(
+            f"effects.slow_time.regrid: {regrid!r} makes an even signal, and spectra.times is 'known', expected 'zero'"
+        )
+    if "canceller" in scene.effects and not set(STILL) & set(scene.effects):
+        raise InputError(
+            f"effects.canceller: there is no clutter to cancel, expected one of {list(STILL)} in the same scene"
+        )
+    for effect in effects:
+        if hasattr(effect.module, "check"):
+            effect.module.check(effect.settings, scene)
+    return scene
+
+
+def above_ground(effect: str, network: Network) -> None:
+    """Raise InputError naming `effect` for a station in or below the ground z = 0."""
+    for station in network.stations:
+        if station.position_m[2] <= 0:
+            raise InputError(
+                f"effects.{effect}: station {station.name} stands at z = {station.position_m[2]} m, expected above the "
+                "ground z = 0"
+            )

@@ -1,0 +1,101 @@
+"""Canceller of the land's echoes on range cells, over the symbols of a look.
+
+mean, pulse and exponential cancel what stands still. Wind moves land, and it passes them; `clutter` is made for the
+spectrum of windblown land: of the covariance that land has over the symbols, it removes every component that lies less
+than `depth_db` below the land's power, and leaves all else as it is. What it costs a target follows from the target's
+radial speed alone (`loss_db`). All filters are scaled to unit noise gain, so that a set SNR means the same before and
+behind them.
+"""
+
+import math
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import eigh, toeplitz
+
+from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.scene.effects.channel.windblown import windblown
+from lowalt.scene.waveform import Look
+
+SOURCE = (
+    "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.2 (pulse cancellers, their response and "
+    "noise gain); M. I. Skolnik, Radar Handbook, 3rd ed. 2008, ch. 2 (recursive MTI filters); A. M. Haimovich, Y. "
+    "Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its "
+    "covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
+)
+DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95, "wind_mps": 4.5, "depth_db": 70.0}
+
+
+def idle(settings: dict) -> bool:
+    """Return True for kind none, or a difference of order 0."""
+    return settings["kind"] == "none" or (settings["kind"] == "pulse" and settings["order"] == 0)
+
+
+def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Return the range cells (N, M) behind the filter; nothing is drawn."""
+    return filtered(settings, cells, look.network)
+
+
+def filtered(settings: dict, cells: np.ndarray, network: Network) -> np.ndarray:
+    """Return range cells (N, M) without the echoes of land.
+
+    mean: subtracts the look's mean. pulse: `order` first differences over symbols. exponential: subtracts a running
+    mean with weights memory^n. These two start as if the first symbol had lasted forever: their first output is zero,
+    and clutter leaves no transient, though a moving target does. clutter: projects on what `land` leaves.
+    Source: Richards 2014, 5.2; Haimovich and Bar-Ness 1991.
+    """
+    if settings["kind"] == "mean":
+        # Without the first symbol before the mean, an echo that stands still cancels to the last bit.
+        moved = cells - cells[0]
+        return moved - moved.mean(axis=0)
+    if settings["kind"] == "pulse":
+        for _ in range(settings["order"]):
+            cells = _step(cells)
+        # The noise gain of k differences is the sum of squared binomials, C(2k, k).
+        return cells / math.sqrt(math.comb(2 * settings["order"], settings["order"]))
+    if settings["kind"] == "clutter":
+        basis = land(len(cells), network, settings["wind_mps"], settings["depth_db"])
+        left = cells - basis @ (basis.T @ cells)
+        return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
+    memory = settings["memory"]
+    # The noise gain of a (1 - z^-1) / (1 - a z^-1) is 2 a^2 / (1 + a).
+    result = _step(cells) * math.sqrt((1 + memory) / 2)
+    for earlier, now in pairwise(result):
+        now += memory * earlier
+    return result
+
+
+def _step(cells: np.ndarray) -> np.ndarray:
+    """First difference over symbols (N, M), zero at the first."""
+    return np.diff(cells, axis=0, prepend=cells[:1])
+
+
+@lru_cache(maxsize=8)
+def land(symbols: int, network: Network, wind_mps: float, depth_db: float) -> np.ndarray:
+    """Return the components (N, K) of windblown land's echoes over N symbols that lie above its power less `depth_db`.
+
+    They are orthonormal: the eigenvectors of the land's covariance. Its still part is constant, and its moving part's
+    exponential Doppler spectrum of slope beta has the covariance 1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
+    """
+    still, beta = windblown(wind_mps, network.carrier_hz)
+    lag_s = network.symbol_interval_s * np.arange(symbols)
+    if np.isfinite(still):
+        decay_s = beta * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi)
+        lags = (still + 1 / (1 + (lag_s / decay_s) ** 2)) / (1 + still)
+    else:
+        lags = np.ones(symbols)
+    # The still part has one component of N times its power: the power of each component is per symbol.
+    power, basis = eigh(toeplitz(lags))
+    return basis[:, power > 10 ** (-depth_db / 10)]
+
+
+def loss_db(settings: dict, network: Network, speed_mps: float) -> float:
+    """Return by how much a filter weakens a steady echo of this radial speed (m/s), over its gain on white noise (dB).
+
+    Negative where the echo gains on the noise, infinite where none is left. Speeds fold at c / (4 f T_r) to each side.
+    """
+    turns = 2 * speed_mps * network.carrier_hz / SPEED_OF_LIGHT * network.symbol_interval_s
+    echo = np.exp(2j * np.pi * turns * np.arange(network.symbols))[:, None]
+    left = np.mean(abs(filtered(settings, echo, network)) ** 2)
+    return float(-10 * np.log10(left)) if left > 0 else math.inf

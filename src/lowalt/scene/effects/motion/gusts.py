@@ -1,0 +1,145 @@
+"""Gusts: Dryden turbulence pushes a flying target, which leans against the push to keep its place and course.
+
+Turbulence is a field frozen into the mean wind; the target meets it at its airspeed. Drag carries the target along
+with the air. Its control asks for a thrust against speed and displacement, and the attitude follows with a lag: a
+multirotor tilts by atan(a / g) towards the acceleration a of its thrust alone, a bird banks. Drag tilts nothing.
+Turbulence, velocity, place and thrust are one linear process, discretised exactly.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from lowalt.common import portable
+from lowalt.motion.poses import Perturbation
+from lowalt.motion.rotations import attitude
+from lowalt.scene.effects.motion import flight
+from lowalt.scene.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
+from lowalt.targets.cloud import Cloud
+
+SOURCE = (
+    "Dryden spectra, scale lengths, intensities and wind profile below 1000 ft: MIL-F-8785C, 1980, section 3.7 "
+    "(the same spectra as MIL-HDBK-1797 with its half scale lengths); tilt: balance of thrust and weight; control: "
+    "gains 0.95/s on place and 1.8/s on speed of PX4 (MPC_XY_P, MPC_XY_VEL_P_ACC) at a lag of 0.1 s, scaled with it; "
+    + flight.SOURCE
+)
+DEFAULTS = {"wind_mps": 7.7, "response_s": None, "attitude_s": None}
+
+SPEED_GAIN, PLACE_GAIN = 0.18, 0.0171
+"""Thrust against speed times the attitude's lag, and against displacement times its square; stable at any drag."""
+
+FOOT_M = 0.3048
+HEIGHTS_FT = (10.0, 1000.0)
+"""Range of the low-altitude model; outside it the nearer end is used."""
+ROUGHNESS_FT = 2.0
+"""Roughness length of the mean wind's profile, all flight phases but landing."""
+SLOWEST_MPS = 0.1
+"""Least airspeed, below which turbulence would stand still around the target."""
+GRAVITY_MPS2 = flight.GRAVITY_MPS2
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the air stands still."""
+    return settings["wind_mps"] == 0
+
+
+def turbulence(height_m: float, wind_mps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return scale lengths (3,) m and intensities (3,) m/s along the wind, across it and upwards.
+
+    wind_mps: speed 20 ft (6 m) above ground. Source: MIL-F-8785C, section 3.7, low altitude.
+    """
+    feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
+    ratio = 0.177 + 0.000823 * feet
+    up = 0.1 * wind_mps
+    along = feet * FOOT_M / portable.power(ratio, 1.2)
+    return np.array([along, along, feet * FOOT_M]), np.array([up / portable.power(ratio, 0.4)] * 2 + [up])
+
+
+def mean_wind_mps(height_m: float, wind_mps: float) -> float:
+    """Return the mean wind's speed (m/s) at a height, from that at 20 ft. Source: MIL-F-8785C, section 3.7."""
+    feet = float(np.clip(height_m / FOOT_M, *HEIGHTS_FT))
+    return float(wind_mps * portable.log(feet / ROUGHNESS_FT) / portable.log(20.0 / ROUGHNESS_FT))
+
+
+def process(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[np.ndarray, ...]:
+    """Return drift (5, 5), noise (5,) and outputs (4, 5) of unit turbulence and the target's response; times in steps.
+
+    scale: the turbulence's time L / V; response: of the velocity to the air; lag: of the attitude. Outputs: gust, the
+    target's velocity (both of unit turbulence), its displacement (that times a step) and its thrust's acceleration
+    (that over a step). Each state is an integral of those before it with weights near one, so that their steps'
+    covariances stay well conditioned however short a step is.
+    """
+    a, b, c = 1.0 / scale, 1.0 / response, 1.0 / lag
+    # The lateral filter (1 + sqrt(3) t s) / (1 + t s)^2 is a mix of a first- and a second-order lag.
+    mix = 0.0 if longitudinal else (1.0 / np.sqrt(3.0) - 1.0) * a
+    gain = np.sqrt(2.0 * a) if longitudinal else np.sqrt(3.0 * a)
+    drift = np.array([
+        [-a, 0, 0, 0, 0],
+        [1, -a, 0, 0, 0],
+        [1, mix, -b, 0, 1],
+        [0, 0, 1, 0, 0],
+        [0, 0, -SPEED_GAIN * c * c, -PLACE_GAIN * c * c * c, -c],
+    ])  # fmt: skip
+    outputs = gain * np.array([
+        [1, mix, 0, 0, 0],
+        [0, 0, b, 0, 0],
+        [0, 0, 0, b, 0],
+        [0, 0, 0, 0, b],
+    ])  # fmt: skip
+    return drift, np.array([1.0, 0, 0, 0, 0]), outputs
+
+
+@lru_cache(maxsize=4096)
+def axis(scale: float, longitudinal: bool, response: float, lag: float) -> tuple[Steps, np.ndarray, np.ndarray]:
+    """Return one axis's steps, the root (5, 5) of its states' stationary covariance, and its outputs (4, 5).
+
+    Answers are kept: all stations ask for the same axes of a target.
+    """
+    drift, noise, outputs = process(scale, longitudinal, response, lag)
+    over_step = steps(drift, noise)
+    return over_step, root_of(stationary(over_step)), outputs
+
+
+def perturb(settings: dict, cloud: Cloud, row: dict, times_s: np.ndarray, rng: np.random.Generator) -> Perturbation:
+    """Return a flying target's offset (N, 3) m and tilt (N, 3) rad at `times_s` (N,) s, equally spaced.
+
+    The motion table's place is the target's place at the first of the times.
+    The wind's direction is drawn. Nothing for targets on the ground.
+    """
+    if cloud.like not in ("UAV", "Bird"):
+        return Perturbation({})
+    heading = rng.uniform(0.0, 2 * np.pi)
+    first = rng.standard_normal((3, 5))
+    normal = rng.standard_normal((3, len(times_s) - 1, 5))
+    forward = np.array([portable.cos(heading), portable.sin(heading), 0.0])
+    velocity = np.array([row["vx_mps"], row["vy_mps"], row["vz_mps"]])
+    scales, intensities = turbulence(row["z_m"], settings["wind_mps"])
+    through = velocity - mean_wind_mps(row["z_m"], settings["wind_mps"]) * forward
+    airspeed = max(float(portable.norm(through)), SLOWEST_MPS)
+    step = step_s(times_s)
+    level, up = (settings["response_s"],) * 2 if settings["response_s"] else flight.response_s(cloud, airspeed)
+    lag = settings["attitude_s"] or flight.attitude_s(cloud)
+    axes = [
+        axis(scale / airspeed / step, number == 0, response / step, lag / step)
+        for number, (scale, response) in enumerate(zip(scales, (level, level, up), strict=True))
+    ]
+    start = np.stack([portable.applied(root, normals) for (_, root, _), normals in zip(axes, first, strict=True)])
+    states = walk([over_step for over_step, _, _ in axes], start, normal)
+    answer = np.stack([portable.product(states[i], axes[i][2].T) for i in range(3)]) * intensities[:, None, None]
+    wind = np.stack([forward, [-forward[1], forward[0], 0.0], [0.0, 0.0, 1.0]])
+    offset = portable.product((answer[..., 2] - answer[:, :1, 2]).T, wind) * step
+    acceleration = portable.product(answer[..., 3].T, wind) / step
+    ahead = attitude(row["yaw_rad"], 0.0, 0.0)
+    return Perturbation({}, offset, tilt(portable.product(acceleration, ahead), pitches=cloud.like == "UAV"))
+
+
+def tilt(acceleration_mps2: np.ndarray, pitches: bool) -> np.ndarray:
+    """Return yaw, pitch and roll (N, 3) rad that give the thrust an acceleration (N, 3): right, front, up.
+
+    pitches: whether the body also pitches for its acceleration to the front, as a multirotor does and a bird does not.
+    """
+    result = np.zeros((len(acceleration_mps2), 3))
+    if pitches:
+        result[:, 1] = -portable.arctan(acceleration_mps2[:, 1] / GRAVITY_MPS2)
+    result[:, 2] = portable.arctan(acceleration_mps2[:, 0] / GRAVITY_MPS2)
+    return result

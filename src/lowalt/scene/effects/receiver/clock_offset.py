@@ -1,0 +1,85 @@
+"""Sampling-clock offset: the converter's clock runs fast or slow against the one that made the symbols.
+
+Sample instants shrink within a symbol, and the window slips from symbol to symbol, so ranges drift.
+"""
+
+import math
+
+import numpy as np
+from scipy import fft
+
+from lowalt.common.errors import InputError
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects.receiver import offsets
+from lowalt.scene.waveform import Look
+
+SOURCE = (
+    "T. Pollet, P. Spruyt, M. Moeneclaey, The BER performance of OFDM systems using non-synchronized sampling, "
+    "IEEE GLOBECOM 1994; default: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1"
+)
+DEFAULTS = {"fixed_ppm": 0.0, "sigma_ppm": 0.017, "prefix_slack_s": 2.9e-7}
+
+ROUNDING = 1e-14
+"""Largest share of a sample that the series of the stretch leaves out."""
+
+
+def idle(settings: dict) -> bool:
+    """Return True where no station's clock is off."""
+    return offsets.idle(settings["fixed_ppm"], settings["sigma_ppm"])
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for an unknown station, or a slip that leaves the cyclic prefix before the look ends."""
+    offsets.check_stations("effects.clock_offset.fixed_ppm", settings["fixed_ppm"], scene.network)
+    offsets.check_oscillator("clock_offset", scene)
+    carrier = scene.effects.get("carrier_offset")
+    for key in ("fixed_ppm", "sigma_ppm"):
+        if carrier and carrier[key] != settings[key]:
+            raise InputError(
+                f"effects.clock_offset: {key} is {settings[key]} and effects.carrier_offset has {carrier[key]}, "
+                "expected the same: carrier and sampling clock come from one oscillator"
+            )
+    network, timing = scene.network, scene.effects.get("timing_offset")
+    rate = 1e-6 * offsets.largest(settings["fixed_ppm"], settings["sigma_ppm"])
+    slip = rate * network.symbols * network.symbol_interval_s
+    slip += offsets.largest(timing["fixed_s"], timing["sigma_s"]) if timing else 0.0
+    if slip > settings["prefix_slack_s"]:
+        raise InputError(
+            f"effects.clock_offset: the window slips by up to {slip:g} s in a look (timing_offset included), expected "
+            f"at most prefix_slack_s = {settings['prefix_slack_s']:g}: beyond the cyclic prefix it would take in "
+            "another symbol's data"
+        )
+
+
+def fast(settings: dict, look: Look, rng: np.random.Generator) -> float:
+    """Return by which share this station's sampling clock is fast (1e-6 for one ppm)."""
+    fixed = offsets.fixed(settings["fixed_ppm"], look.station.name)
+    return 1e-6 * (fixed + settings["sigma_ppm"] * offsets.drawn(rng))
+
+
+def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) of the same band-limited signal, taken at t / (1 + e) instead of t.
+
+    Every sample is the exact sum of the symbol's M subcarriers at its own instant, in the symbol's cyclic extension. A
+    fast clock is early ever more, so ranges grow by c n T_r e / 2. Source: Pollet et al. 1994; one draw a sample and
+    station.
+    """
+    rate = fast(settings, look, rng)
+    early = -rate / (1 + rate)
+    middle = samples.shape[1] // 2
+    shift_hz = early * fft.ifftshift(look.baseband_hz)
+    # The whole symbol moves with its middle sample, and a series in time about that stretches it.
+    instants = look.times_s + look.within_s[middle]
+    term = offsets.turned(fft.fft(samples, axis=-1), np.outer(instants, shift_hz))
+    result = fft.ifft(term, axis=-1)
+    step = 2 * np.pi * look.sample_s * shift_hz
+    place = np.arange(samples.shape[1]) - middle
+    size = reach = float(abs(step).max() * abs(place).max())
+    order = 1
+    while size * math.exp(reach) > ROUNDING:
+        # exp(j step place) is the sum over k of (j step)^k place^k / k!.
+        term = term * (1j * step / order)
+        result += fft.ifft(term, axis=-1) * place.astype(float) ** order
+        order += 1
+        size *= reach / order
+    return result

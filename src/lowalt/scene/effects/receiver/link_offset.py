@@ -1,0 +1,45 @@
+"""Offsets between two stations' oscillators and clocks, in the links between them and nowhere else.
+
+Every station's oscillator and clock have one error each in a look. A link from A to B has A's less B's, and the link
+from B to A the opposite. A station that receives its own signal has no offset.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.scene import clocks
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects.receiver.offsets import delayed, risen
+from lowalt.scene.waveform import Look
+
+SOURCE = (
+    "P. H. Moose, IEEE Trans. Commun. 42(10), 1994 (carrier); M. Speth et al., IEEE Trans. Commun. 47(11), 1999 "
+    "(time); defaults: 3 sigma at the 0.05 ppm of 3GPP TS 38.104, 6.5.1, and clocks disciplined to 20 ns by "
+    "satellites: estimate"
+)
+DEFAULTS = {"sigma_ppm": 0.017, "sigma_s": 2e-8}
+
+
+def idle(settings: dict) -> bool:
+    """Return whether all stations agree on frequency and time."""
+    return settings["sigma_ppm"] == 0 and settings["sigma_s"] == 0
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a network without links."""
+    if all(station.transmitter is None for station in scene.network.stations):
+        raise InputError("effects.link_offset: no station of the network is a link, expected {transmit, receive}")
+
+
+def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) of a link, turned by the carriers' difference and moved by the clocks'; others as they are.
+
+    A sender whose frequency is higher by F raises all lines by F; a sender whose clock is late makes echoes late.
+    rng: the look's stream, the same for all stations.
+    """
+    sends, hears = look.station.transmitter, look.station.receiver
+    if sends is None:
+        return samples
+    errors = clocks.errors(settings, look.network, rng)
+    ppm, late_s = (theirs - ours for theirs, ours in zip(errors[sends.name], errors[hears.name], strict=True))
+    return risen(delayed(samples, late_s, look), 1e-6 * ppm * look.oscillator_hz, look)

@@ -1,0 +1,36 @@
+"""Thermal noise of the receiver from a link budget, before range compression: the strongest cell may be a wrong one."""
+
+import numpy as np
+
+from lowalt.scene.set_noise import white
+from lowalt.scene.waveform import Look
+
+SOURCE = (
+    "H. T. Friis, Noise Figures of Radio Receivers, Proc. IRE 32(7), 1944, Eqs. 1 and 8 (noise k T B F); "
+    "S. M. Kay, Fundamentals of Statistical Signal Processing II, 1998, 4.3 (matched-filter gain)"
+)
+DEFAULTS = {"noise_figure_db": 7.0, "temperature_k": 290.0}
+
+BOLTZMANN = 1.380649e-23
+"""J/K, exact by definition of the kelvin."""
+
+
+def idle(settings: dict) -> bool:
+    """Return True at 0 K, where there is no thermal noise."""
+    return settings["temperature_k"] == 0
+
+
+def variance(settings: dict, spacing_hz: float) -> float:
+    """Return the noise power k T df F of one subcarrier (W); a range cell, the mean of M subcarriers, has 1/M of it."""
+    return BOLTZMANN * settings["temperature_k"] * spacing_hz * 10 ** (settings["noise_figure_db"] / 10)
+
+
+def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) plus circular white Gaussian noise, k T df F a subcarrier.
+
+    A subcarrier is the sum of M samples and a range cell the mean of M subcarriers: both a sample and a cell have 1/M
+    of a subcarrier's noise. Unit-norm receive weights leave one antenna's noise; the link budget's power is the
+    network's `power_w` a subcarrier. Source: Friis 1944 (noise figure).
+    """
+    power = variance(settings, look.network.subcarrier_spacing_hz) / look.network.subcarriers
+    return samples + white(rng, power, samples.shape)

@@ -1,0 +1,45 @@
+"""Transmit leakage: the station's own signal reaches its receiver directly, and fills the converter's range.
+
+The leakage stands still in range cell 0. It comes after the oscillator's effects: a station that sends and receives by
+one oscillator hears its own signal after nanoseconds, so phase noise cancels in it. A canceller removes it; the
+converter's quantisation noise, which follows the larger signal, stays.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.waveform import Look, transmit
+
+SOURCE = (
+    "A. Sabharwal et al., In-band full-duplex wireless: challenges and opportunities, IEEE J. Sel. Areas Commun. "
+    "32(9), 2014; 80 dB by separate panels and analogue cancellation: estimate"
+)
+DEFAULTS = {"isolation_db": 80.0, "delay_s": 0.0}
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the receiver is fully isolated."""
+    return settings["isolation_db"] is None
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError where the receiver has an oscillator of its own."""
+    apart = [name for name in ("carrier_offset", "clock_offset") if name in scene.effects]
+    if not scene.effects.get("phase_noise", {"shared": True})["shared"]:
+        apart.append("phase_noise with shared: false")
+    if apart:
+        raise InputError(
+            f"effects.transmit_leakage: {apart} give the receiver an oscillator of its own, expected the transmitter's "
+            "for leakage, in which offsets and phase noise cancel"
+        )
+
+
+def receive(settings: dict, samples: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
+    """Return samples (N, M) plus the sent waveform, `isolation_db` below its power, with a drawn constant phase.
+
+    Every subcarrier leaks with the power that the network gives it. One draw a sample and station.
+    """
+    level = np.sqrt(look.network.power) * 10 ** (-settings["isolation_db"] / 20)
+    leaked = level * np.exp(2j * np.pi * (float(rng.random()) - look.baseband_hz * settings["delay_s"]))
+    return samples + transmit(leaked, look.aired)

@@ -1,0 +1,93 @@
+"""Slow time as real frames have it: symbols in downlink slots only, some missing, none exactly on time.
+
+A station sends sensing symbols in the downlink part of each TDD period. Some of these symbols carry something else, and
+each may be sent up to `jitter_s` later than its nominal instant. `regrid` names how the received symbols become
+the evenly spaced signal that the spectra expect. Late symbols spread lines beyond half the symbol rate, which would
+fold. The land and phase noise keep the nominal instants.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import Network
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.sampling import Sampling
+
+SOURCE = (
+    "3GPP TS 38.331, TDD-UL-DL-Pattern (periods of 0.5 to 10 ms); non-uniform transform: F. Marvasti (ed.), Nonuniform "
+    "Sampling, 2001, ch. 1; spectra of missing samples: P. Stoica, R. Moses, Spectral Analysis of Signals, 2005, 2.4"
+)
+DEFAULTS = {"tdd_period_s": 0.01, "downlink": 0.75, "missing": 0.0, "jitter_s": 0.0, "regrid": "zero"}
+
+REGRIDS = ("zero", "hold", "linear", "nudft")
+FEWEST = 2
+"""Least number of symbols in a look."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether every symbol is sent, and on time."""
+    return settings["downlink"] == 1 and settings["missing"] == 0 and settings["jitter_s"] == 0
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a jitter beyond the next symbol, a look without symbols, or set SNRs with gaps of zeros."""
+    step = scene.network.symbol_interval_s
+    if settings["jitter_s"] >= step:
+        raise InputError(
+            f"effects.slow_time.jitter_s: {settings['jitter_s']}, expected below the symbol interval {step}"
+        )
+    if _in_downlink(settings, scene.network).sum() < FEWEST:
+        raise InputError(
+            f"effects.slow_time: downlink {settings['downlink']} of a period of {settings['tdd_period_s']} s holds "
+            f"fewer than {FEWEST} of {scene.network.symbols} symbols, expected more"
+        )
+    noisy = [snr for snr in scene.snr_db if snr != float("inf")]
+    gaps = settings["downlink"] < 1 or settings["missing"] > 0
+    if noisy and gaps and settings["regrid"] in ("zero", "nudft"):
+        raise InputError(
+            f"effects.slow_time.regrid: {settings['regrid']!r} leaves gaps without a signal, and noise.snr_db "
+            f"{list(scene.snr_db)} would fill them with noise; expected hold or linear, or [.inf] with receiver_noise"
+        )
+
+
+def _in_downlink(settings: dict, network: Network) -> np.ndarray:
+    """Whether each symbol's nominal instant (N,) lies in the downlink part, which begins every period."""
+    phase = network.times_s / settings["tdd_period_s"]
+    # Instants that are multiples of the period must not fall before it by rounding.
+    return phase - np.floor(phase + 1e-9) < settings["downlink"] - 1e-9
+
+
+def sampling(settings: dict, network: Network, rng: np.random.Generator) -> Sampling:
+    """Return the instants of a look and which symbols are received; 2 N draws.
+
+    Two symbols at least are received: where fewer are left, the first of the downlink ones are kept.
+    """
+    late, lost = rng.random((2, network.symbols))
+    sent = _in_downlink(settings, network)
+    present = sent & (lost >= settings["missing"])
+    if present.sum() < FEWEST:
+        present[np.flatnonzero(sent)[:FEWEST]] = True
+    return Sampling(network.times_s + settings["jitter_s"] * late, present)
+
+
+def regridded(settings: dict, signal: np.ndarray, given: Sampling, network: Network) -> np.ndarray:
+    """Return the evenly spaced signal (N,) made of received symbols `signal` (K,), K of them present.
+
+    zero: each symbol at its nominal instant, zeros in the gaps. hold: the last symbol received, or the first one before
+    any was. linear: straight lines between the true instants, constant beyond them. nudft: the evenly spaced signal
+    whose N Fourier coefficients are the sums over symbols at their true instants.
+    """
+    steps = np.arange(network.symbols)
+    at = np.flatnonzero(given.present)
+    if settings["regrid"] == "hold":
+        return signal[np.maximum(np.searchsorted(at, steps, side="right") - 1, 0)]
+    times = given.times_s[at]
+    if settings["regrid"] == "linear":
+        nominal = network.times_s
+        return np.interp(nominal, times, signal.real) + 1j * np.interp(nominal, times, signal.imag)
+    if settings["regrid"] == "nudft":
+        frequency = np.fft.fftfreq(network.symbols, network.symbol_interval_s)
+        return np.fft.ifft(np.exp(-2j * np.pi * np.outer(frequency, times)) @ signal)
+    result = np.zeros(network.symbols, np.complex128)
+    result[at] = signal
+    return result
