@@ -55,3 +55,11 @@ def gain(element: Element, station: Station, places: np.ndarray) -> np.ndarray:
         antenna_loops.halvings(most), np.empty((7, planes.shape[2])), out,
     )  # fmt: skip
     return out.reshape(shape)
+
+
+def array_sum(count: int, x: np.ndarray) -> np.ndarray:
+    """Return the sum (...) of `count` elements in a line, half a wavelength apart, counted from the first.
+
+    x: direction cosine off the beam times the frequency over the carrier, any shape.
+    """
+    return np.exp(1j * np.pi * np.multiply.outer(x, np.arange(count))).sum(axis=-1)

@@ -60,7 +60,7 @@ def _foreseen(spans, point, toward, bundle):
 
 @INNER_ORDERED
 def _sent(pose, point, toward, ray, bundle):
-    """Fill ray (9, STRIP): starts, ways to the station, one over each component of these; and bundle (12,), as they are."""
+    """Fill ray (9, STRIP): starts, ways to the station, one over each way; and bundle (12,), the boxes around them."""
     for i in range(3):
         r0, r1, r2, t, s = pose[3 * i], pose[3 * i + 1], pose[3 * i + 2], pose[9 + i], pose[12 + i]
         start, way, over = ray[i], ray[3 + i], ray[6 + i]
@@ -75,7 +75,7 @@ def _sent(pose, point, toward, ray, bundle):
 
 @INNER_ORDERED
 def _can_meet(bundle, box):
-    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along the ways parts them.
+    """Whether any ray of a bundle can meet a box (6,), low and high corner: no axis across or along it parts them.
 
     Source: separating axes, Gottschalk, Lin & Manocha, OBBTree, SIGGRAPH 1996, widened by what the ways differ.
     """

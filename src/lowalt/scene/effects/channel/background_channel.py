@@ -1,0 +1,134 @@
+"""Echoes of the surroundings, drawn as 3GPP's background channel of a station that hears itself.
+
+Three points of reference stand round the station, a third of a turn apart. To each there is a link without line of
+sight, whose rays the station sends and receives in the same directions. Nothing moves, so a canceller removes it.
+"""
+
+import numpy as np
+from scipy.special import gammaincinv
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT, Station
+from lowalt.echo.radar import radar
+from lowalt.scene.antenna import gain
+from lowalt.scene.checks import CheckedScene, above_ground
+from lowalt.scene.crossing import toward
+from lowalt.scene.effects.channel import fast_fading
+from lowalt.scene.effects.channel.fast_fading import Link
+from lowalt.scene.view import View
+
+SOURCE = (
+    "3GPP TR 38.901 V19.4, clause 7.9.4.2 (TRP monostatic, Table 7.9.4.2-1, Eq. 7.9.4-15), steps 3 to 12 of clause 7.5 "
+    "without line of sight and with one polarisation, clause 7.6.9 (absolute delay) and, on request, 7.9.5.5 (weak "
+    "clusters); arrival angles are those of departure, as agreed in 3GPP RAN1"
+)
+DEFAULTS = {"environment": "UMa", "reference_points": 3, "weak_clusters": False}
+
+PLACES = {
+    "UMi": ((6.1996, 0.1558, 15.2697), (12.0487, 2.3261, 0.0157)),
+    "UMa": ((10.3370, 0.1317, 68.7778), (16.2253, 1.9218, 2.6142)),
+    "RMa": ((6.2025, 0.0391, 1.2940), (0.0007, 5.0146, 0.0522)),
+}
+"""Shape, rate and offset of the gamma laws of a reference point's distance and height (m). Source: Table 7.9.4.2-1."""
+WEAK = 360, -25.0
+"""Number of weak clusters, of one ray each, and their power over that of the strongest cluster (dB)."""
+HIGHEST_RURAL_GHZ = 7.0
+USUAL = 64
+"""Draws whose median is the usual level."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether there is no reference point."""
+    return settings["reference_points"] == 0
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for an unknown environment, a rural one at high frequency, or a station in the ground."""
+    above_ground("background_channel", scene.network)
+    if settings["environment"] not in PLACES:
+        raise InputError(
+            f"effects.background_channel.environment: {settings['environment']!r}, expected one of {list(PLACES)}"
+        )
+    highest = max(radar(scene.network, station).centre_hz for station in scene.network.stations) / 1e9
+    if settings["environment"] == "RMa" and highest > HIGHEST_RURAL_GHZ:
+        raise InputError(
+            f"effects.background_channel.environment: RMa is known to {HIGHEST_RURAL_GHZ:g} GHz, expected UMa or UMi "
+            f"at {highest:.3g} GHz"
+        )
+
+
+def reference_points(settings: dict, rng: np.random.Generator) -> np.ndarray:
+    """Return the reference points (R, 3): distance (m), height (m), azimuth (rad); azimuths are equally far apart."""
+    count = settings["reference_points"]
+    uniform = rng.random((2, count))
+    first = 2 * np.pi * (float(rng.random()) - 0.5)
+    columns = [
+        gammaincinv(shape, drawn) / rate + offset
+        for (shape, rate, offset), drawn in zip(PLACES[settings["environment"]], uniform, strict=True)
+    ]
+    return np.stack([*columns, first + 2 * np.pi * np.arange(count) / count], axis=1)
+
+
+def drawn(
+    settings: dict, station: Station, ghz: float, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return all rays: delays (K,) s, complex amplitudes (K,) for isotropic antennas, unit directions (K, 3)."""
+    environment = settings["environment"]
+    delays, amplitudes, directions = [], [], []
+    for flat, height, azimuth in reference_points(settings, rng):
+        link = Link(float(flat), float(station.position_m[2]), float(height), ghz)
+        large = fast_fading.large_scale(environment, link, rng)
+        level = 10 ** ((large.shadow_db - fast_fading.path_loss_db(environment, link)) / 20)
+        first = link.range_m / SPEED_OF_LIGHT + fast_fading.later_s(environment, rng)
+        for clusters, below_db in (None, 0.0), WEAK:
+            rays = fast_fading.rays(environment, link, large, rng, clusters)
+            if clusters is None:
+                strongest = rays.power.max() * len(fast_fading.OFFSETS)
+            share = 1.0 if clusters is None else strongest * 10 ** (below_db / 10)
+            phase = np.exp(2j * np.pi * rng.random(len(rays.power)))
+            delays.append(first + rays.delay_s)
+            amplitudes.append(level * np.sqrt(share * rays.power) * phase)
+            directions.append(_directions(azimuth + np.radians(rays.azimuth_deg), np.radians(rays.zenith_deg)))
+            if not settings["weak_clusters"]:
+                break
+    return np.concatenate(delays), np.concatenate(amplitudes), np.concatenate(directions)
+
+
+def _directions(azimuth: np.ndarray, zenith: np.ndarray) -> np.ndarray:
+    """Unit vectors (K, 3) of azimuths and zenith angles (K,) rad."""
+    flat = np.sin(zenith)
+    return np.stack([flat * np.cos(azimuth), flat * np.sin(azimuth), np.cos(zenith)], axis=1)
+
+
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the frequency response (N, M) of the surroundings, the same in all symbols.
+
+    Each ray has both array sums and the element's gain in its direction; independent from sample to sample and station
+    to station.
+    """
+    network, station = view.network, view.station
+    ghz = radar(network, station).centre_hz / 1e9
+    delay, amplitude, direction = drawn(settings, station, ghz, rng)
+    amplitude = amplitude * _antennas(view, direction)
+    # The rays of a cluster share a delay.
+    late, number = np.unique(delay, return_inverse=True)
+    sums = np.bincount(number, amplitude.real) + 1j * np.bincount(number, amplitude.imag)
+    steps = np.arange(network.subcarriers) * network.subcarrier_spacing_hz
+    turned = np.exp(-2j * np.pi * late[:, None] * steps)
+    return np.broadcast_to(sums @ turned, (len(view.times_s), network.subcarriers)).copy()
+
+
+def usual_power(settings: dict, view: View) -> float:
+    """Return the mean power (W) of a subcarrier of the surroundings' echoes, the median of `USUAL` draws."""
+    drawn = [scatter(settings, view.at(view.times_s[:1]), np.random.default_rng(number)) for number in range(USUAL)]
+    return float(np.median([np.mean(abs(one) ** 2) for one in drawn]))
+
+
+def _antennas(view: View, direction: np.ndarray) -> np.ndarray:
+    """Amplitude factor (K,) of sending and receiving along unit vectors (K, 3), in the units of the echo."""
+    network, station = view.network, view.station
+    places = np.asarray(station.position_m) + direction
+    elements = np.prod(network.transmit) * np.prod(network.receive)
+    result = np.sqrt(network.power / elements) * toward(view, station, network.transmit, places)
+    result = result * toward(view, station, network.receive, places)
+    return result if view.element is None else result * gain(view.element, station, places)

@@ -1,0 +1,123 @@
+"""Echoes of the ground: a patch of land in every range cell, still as a whole and stirred by the wind.
+
+A cell's mean power follows from its area under both beams, with a reflectivity gamma sin(grazing angle) (`land`). Its
+amplitude is compound Gaussian: a texture, drawn once and correlated between neighbours, times speckle whose still part
+stays and whose moving part has Billingsley's exponential Doppler spectrum (`windblown`). On a link cells are of the
+range sum, and Doppler is that along the bisector.
+"""
+
+import numpy as np
+from scipy import fft
+from scipy.signal import lfilter
+from scipy.special import gamma, gammaincinv, ndtr, ndtri
+
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.echo.radar import radar
+from lowalt.scene import land
+from lowalt.scene.antenna import gain
+from lowalt.scene.checks import CheckedScene, above_ground
+from lowalt.scene.effects.channel.windblown import speckle, windblown
+from lowalt.scene.view import View
+
+SOURCE = (
+    "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
+    "laws: Ward, Tough & Watts, Sea Clutter, 2006, and Kanter, Stable densities under change of scale, Ann. Prob. 3, "
+    "1975; texture from cell to cell: Tough & Ward, J. Phys. D 32, 1999, its correlation length: estimate; "
+    "windblown clutter: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; on links: gamma "
+    "(sin psi_1 sin psi_2)^(1/2), Willis, Bistatic Radar, 2nd ed. 1995, ch. 9, measured in the plane of both grazing "
+    "rays; at other angles out of plane, and the spectrum narrowed by cos(beta / 2): estimates"
+)
+DEFAULTS = {
+    "gamma": 0.03, "clutter_to_signal_db": None, "reach_m": 1000.0, "law": "weibull", "shape": 1.5, "wind_mps": 4.5,
+    "correlation_m": 20.0,
+}  # fmt: skip
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the land reflects nothing."""
+    return settings["gamma"] == 0
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a station in or below the ground, or an amplitude law without that shape."""
+    above_ground("clutter", scene.network)
+    if settings["law"] == "weibull" and not settings["shape"] <= 2:
+        raise InputError(f"effects.clutter: shape is {settings['shape']} for law weibull, expected above 0 to 2")
+
+
+def offset_cells(view: View) -> float:
+    """Return how far all echoes of the land stand beyond the centres of their range cells."""
+    return land.OFFSET
+
+
+def alike(uniform: np.ndarray, correlation: float) -> np.ndarray:
+    """Return uniforms (2, cells) of which neighbours are alike: their normal scores correlate by `correlation`^lag.
+
+    Each keeps its law, so textures made from them do too. Source: memoryless non-linear transform, Tough & Ward, The
+    correlation properties of gamma and other non-Gaussian processes, J. Phys. D 32, 1999.
+    """
+    if correlation == 0:
+        return uniform
+    score = ndtri(uniform)
+    score[:, 1:] *= np.sqrt(1 - correlation**2)
+    return ndtr(lfilter([1.0], [1.0, -correlation], score, axis=1))
+
+
+def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
+    """Return positive textures (cells,) of mean 1 from uniforms (2, cells); sqrt(texture) times speckle has the law.
+
+    rayleigh: 1; k: gamma variates of order `shape`; weibull: a Weibull power of shape c/2 is an exponential over a
+    positive stable variate of index c/2 (Kanter 1975). Amplitudes, not powers, have the Weibull shape c.
+    """
+    if law == "rayleigh" or (law == "weibull" and shape == 2):
+        return np.ones(uniform.shape[1])
+    if law == "k":
+        return gammaincinv(shape, uniform[0]) / shape
+    index = 0.5 * shape
+    angle, wait = np.pi * uniform[0], -np.log(uniform[1])
+    kanter = np.sin(index * angle) ** index * np.sin((1 - index) * angle) ** (1 - index) / np.sin(angle)
+    stable = (kanter ** (1 / (1 - index)) / wait) ** ((1 - index) / index)
+    return 1.0 / (stable * gamma(1.0 + 1.0 / index))
+
+
+def target_power(view: View) -> float:
+    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
+    elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
+    amplitude = radar(view.network, view.station).scale * elements
+    for end in (view.station.transmitter or view.station, view.station):
+        aim_m = view.aim_of(end)
+        amplitude /= np.linalg.norm(aim_m - np.asarray(end.position_m))
+        if view.element is not None:
+            amplitude *= np.sqrt(gain(view.element, end, aim_m))
+    return float(amplitude**2 * view.cloud.rcs_m2.sum())
+
+
+def mean_power(settings: dict, view: View) -> np.ndarray:
+    """Return the mean power (cells,) (W) of the land in every slant-range cell, at the level that settings ask for."""
+    return _land(settings, view)[0]
+
+
+def _land(settings: dict, view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Mean power (cells,) (W), and how much each cell's Doppler is slowed."""
+    aims_m = np.stack([view.aim_of(view.station.transmitter or view.station), view.aim_m])
+    power, slow = land.cell_power(settings, view.network, view.station, aims_m, view.element)
+    total, wanted_db = power.sum(), settings["clutter_to_signal_db"]
+    if wanted_db is not None and total > 0:
+        power = power * (target_power(view) * 10 ** (wanted_db / 10) / total)
+    return power, slow
+
+
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the land's frequency response (N, M), independent from sample to sample and station to station."""
+    network, frequency = view.network, radar(view.network, view.station).centre_hz
+    power, slow = _land(settings, view)
+    correlation = np.exp(-network.cell_m / settings["correlation_m"]) if settings["correlation_m"] > 0 else 0.0
+    uniform = alike(1.0 - rng.random((2, len(power))), correlation)
+    lit = np.sqrt(power * texture(settings["law"], settings["shape"], uniform))
+    waves = speckle(
+        rng, len(power), len(view.times_s), network.symbol_interval_s, windblown(settings["wind_mps"], frequency),
+        SPEED_OF_LIGHT / frequency, slow if view.station.transmitter else 1.0,
+    )  # fmt: skip
+    cells = land.folded(lit[:, None] * waves, network.subcarriers)
+    return fft.fft(cells, axis=0, overwrite_x=True).T * land.ramp(network.subcarriers)

@@ -1,0 +1,134 @@
+"""Other targets in the beam: a flock, a bird next to a drone, a car under it. The label stays the primary target's.
+
+Companions stand around the target at the first symbol and move on. Each is a target of its own: points, moving parts,
+cross sections, motion effects and paths as the scene gives them. Their complex echoes add to the target's before the
+strongest range cell is chosen, which may be a companion's. Beams point at the primary target, and set SNRs refer to
+its echo alone. Records of samples name the companions' subtypes.
+"""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.motion.sample import AIRBORNE, draw_rates
+from lowalt.motion.table import NUMBERS
+from lowalt.scene.checks import CheckedScene
+from lowalt.targets.cloud import Cloud
+
+SOURCE = (
+    "several scatterers add as their echoes: M. I. Skolnik, Introduction to Radar Systems, 3rd ed. 2001, 2.7 (complex "
+    "targets); the spread of a flock: estimate"
+)
+DEFAULTS = {"subtypes": [], "count": [1, 3], "spread_m": 4.0, "speed_mps": 1.0}
+
+TRIES = 200
+"""Draws of a place that keeps clear of the other targets, before the spread counts as too small."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the target is always alone."""
+    return settings["count"] == [0, 0]
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a range of counts that falls, or companions whose surfaces the scene would need."""
+    low, high = settings["count"]
+    if low > high:
+        raise InputError(f"effects.companions.count: {settings['count']}, expected the smaller number first")
+    if "occlusion" in scene.effects and settings["subtypes"]:
+        raise InputError(
+            "effects.companions.subtypes: surfaces are known for the target's own subtype only, expected [] in a "
+            "scene with effects.occlusion"
+        )
+
+
+def named(settings: dict, subtype: str, rng: np.random.Generator) -> list[str]:
+    """Return the companions' subtypes of one motion model: the first draws of its stream."""
+    low, high = settings["count"]
+    count = int(rng.integers(low, high + 1))
+    choice = settings["subtypes"] or [subtype]
+    return [choice[int(rng.integers(0, len(choice)))] for _ in range(count)]
+
+
+def listed(settings: dict, seed: int, row: dict) -> list[str]:
+    """Return the companions' subtypes of the motion model `row`, as its record names them."""
+    rng = stream(seed, "effect", "companions", row["subtype"], row["model"])
+    return named({**DEFAULTS, **settings}, row["subtype"], rng)
+
+
+def companions(
+    settings: dict, cloud: Cloud, row: dict, clouds: Mapping[str, Cloud], rng: np.random.Generator
+) -> list[tuple[Cloud, dict]]:
+    """Return the companions of the motion model `row`: their clouds, and rows as of the motion table.
+
+    clouds: those of the other subtypes, by name. Raises: InputError naming a subtype without a cloud, or a spread in
+    which the targets do not find room.
+    """
+    taken, result = [(_place(row), _reach(cloud))], []
+    for number, name in enumerate(named(settings, row["subtype"], rng)):
+        if name != row["subtype"] and name not in clouds:
+            raise InputError(
+                f"effects.companions.subtypes: no cloud of {name!r} among {sorted(clouds)}, expected one of each"
+            )
+        other = cloud if name == row["subtype"] else clouds[name]
+        mine = _moving(settings, other, row, rng)
+        for _ in range(TRIES):
+            offset = settings["spread_m"] * rng.standard_normal(3)
+            for axis, shift in zip("xyz", offset, strict=True):
+                mine[f"{axis}_m"] = row[f"{axis}_m"] + float(shift)
+            if other.like not in AIRBORNE:
+                mine["z_m"] = other.record["origin_height_m"]
+            place, reach = _place(mine), _reach(other)
+            if place[2] > reach * (other.like in AIRBORNE) and all(
+                np.linalg.norm(place - away) > reach + size for away, size in taken
+            ):
+                break
+        else:
+            raise InputError(
+                f"effects.companions.spread_m: {settings['spread_m']} m leaves no room for {number + 1} companions of "
+                f"{row['subtype']}, model {row['model']}, expected more"
+            )
+        taken.append((place, reach))
+        # Random streams are keyed by this name, so each companion has its own.
+        mine["model"] = f"{row['subtype']} {row['model']} companion {number}"
+        result.append((other, mine))
+    return result
+
+
+def _place(row: dict) -> np.ndarray:
+    """Place (3,) of a row's target at the first symbol (m)."""
+    return np.array([row["x_m"], row["y_m"], row["z_m"]])
+
+
+def _reach(cloud: Cloud) -> float:
+    """Distance of the farthest point from a target's origin (m)."""
+    points = cloud.track if "node" in cloud.kinds else cloud.points
+    return float(np.linalg.norm(points, axis=-1).max())
+
+
+def _moving(settings: dict, other: Cloud, row: dict, rng: np.random.Generator) -> dict:
+    """A companion's row without its place: in a flock nearly the target's motion, otherwise its subtype's own."""
+    mine = {**dict.fromkeys(NUMBERS, math.nan), "subtype": other.subtype, "category": other.category}
+    published, flying = other.record["published"], other.like in AIRBORNE
+    flock = other.category == row["category"]
+    mine |= {f"{angle}_rad": row[f"{angle}_rad"] if flock else 0.0 for angle in ("yaw", "pitch", "roll")}
+    speed = 0.0
+    if flying:
+        for axis in "xyz":
+            own = rng.uniform(-1.0, 1.0) * published[f"v{axis}_abs_max"]
+            shared = row[f"v{axis}_mps"] + settings["speed_mps"] * float(rng.standard_normal())
+            mine[f"v{axis}_mps"] = shared if flock else own
+    else:
+        own = rng.uniform(published["speed_lo"], published["speed_hi"])
+        shared = math.hypot(row["vx_mps"], row["vy_mps"]) + settings["speed_mps"] * float(rng.standard_normal())
+        speed = max(shared, 0.0) if flock else own
+    if not flock:
+        mine["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
+    if not flying:
+        yaw = mine["yaw_rad"]
+        mine |= {"vx_mps": -speed * math.sin(yaw), "vy_mps": speed * math.cos(yaw), "vz_mps": 0.0}
+    draw_rates(rng, other, published, mine, speed, "free")
+    return mine

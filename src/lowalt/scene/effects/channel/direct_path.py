@@ -1,0 +1,60 @@
+"""The direct path of a link between two stations: the sent signal reaches the receiving station without the target.
+
+It stands still, at the delay of the masts' distance, and enters by both arrays' side lobes, since their beams point at
+the target. Stations that receive their own signal have none; their leakage is `transmit_leakage`. A scene with links
+names this effect, without loss or with it; everything physical that is not modelled between two stations is refused.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.crossing import crossing
+from lowalt.scene.view import View
+
+SOURCE = (
+    "H. T. Friis, A note on a simple transmission formula, Proc. IRE 34, 1946; N. J. Willis, Bistatic Radar, 2nd ed. "
+    "1995, ch. 3 (range sum, direct path) and ch. 6 (Doppler of the bisector)"
+)
+DEFAULTS = {"loss_db": 0.0}
+
+MONOSTATIC = "background_channel", "transmit_leakage"
+"""Effects that are modelled for a station that hears itself only."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the direct path is lost; links hear their target alone."""
+    return settings["loss_db"] is None
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a network without links, or effects that are not modelled between two stations."""
+    if all(station.transmitter is None for station in scene.network.stations):
+        raise InputError("effects.direct_path: no station of the network is a link, expected {transmit, receive}")
+    refused = sorted(set(MONOSTATIC) & set(scene.effects))
+    if refused:
+        raise InputError(f"effects.direct_path: {refused} are not modelled between two stations, expected none of them")
+
+
+def offset_cells(view: View) -> float:
+    """Return how far a link's direct path stands beyond the centre of a range cell, -1/2 to 1/2; 0 for a station."""
+    sends = view.station.transmitter
+    if sends is None:
+        return 0.0
+    away = np.linalg.norm(np.asarray(view.station.position_m) - np.asarray(sends.position_m))
+    cells = float(away) / (2 * view.network.cell_m)
+    return cells - round(cells)
+
+
+def scatter(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the frequency response (N, M) of the direct path, zero for a station that receives its own signal.
+
+    Both array sums toward the other mast, in the units of the echo: the amplitude is sqrt(P / elements) lambda /
+    (4 pi d) times both sums. Source: Friis 1946. Nothing is drawn.
+    """
+    network, hears, sends = view.network, view.station, view.station.transmitter
+    shape = len(view.times_s), network.subcarriers
+    if sends is None:
+        return np.zeros(shape, np.complex128)
+    turned = crossing(view, sends, hears)[0] * 10 ** (-settings["loss_db"] / 20)
+    return np.broadcast_to(turned, shape).copy()

@@ -1,0 +1,31 @@
+"""Antenna elements with a front and a back: every echo is weighted by the element's gain, out and back.
+
+Without this effect elements are isotropic. Reflected paths and the land get the gain of their own direction.
+"""
+
+import numpy as np
+
+from lowalt.scene.antenna import Element, gain
+from lowalt.scene.view import View
+
+SOURCE = "3GPP TR 38.901, section 7.3, Table 7.3-1 (element of 8 dBi, 65 degrees wide, 30 dB front to back)"
+DEFAULTS = Element()._asdict()
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the element is isotropic: no gain and no side or back loss."""
+    return settings["gain_dbi"] == 0 and settings["back_db"] == 0
+
+
+def element(settings: dict) -> Element:
+    """Return the element that settings describe."""
+    return Element(**settings)
+
+
+def visible(settings: dict, view: View, rng: np.random.Generator | None = None) -> np.ndarray:
+    """Return the factor (N, L) on every point's two-way amplitude: the element's power gain in its direction.
+
+    On a link it is the geometric mean of both stations' gains.
+    """
+    gains = [gain(element(settings), end.station, view.places) for end in view.ends()]
+    return gains[0] if len(gains) == 1 else np.sqrt(gains[0] * gains[1])

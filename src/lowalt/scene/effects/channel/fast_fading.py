@@ -1,0 +1,214 @@
+"""Clusters and rays of a link without line of sight, drawn as the tables of 3GPP TR 38.901 say.
+
+Steps 3 to 8 of clause 7.5 for one link from a base station to a point, and the absolute delay of clause 7.6.9. Only
+directions of departure are drawn; one polarisation. Frequencies are in GHz and angles in degrees, as in the tables.
+"""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.network import SPEED_OF_LIGHT
+
+OFFSETS = np.repeat([0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551], 2)
+OFFSETS[1::2] *= -1
+"""Angles (20,) of a cluster's rays, in units of its spread. Source: Table 7.5-3."""
+PARTS = (np.r_[0:8, 18, 19], np.r_[8:12, 16, 17], np.r_[12:16])
+"""Rays of the three parts of each of the two strongest clusters. Source: Table 7.5-5."""
+FAINTEST_DB = 25.0
+"""Clusters so far below the strongest are left out."""
+WIDEST_DEG = 104.0, 52.0
+"""Largest spreads in azimuth and zenith."""
+STREET_M, ROOF_M = 20.0, 5.0
+"""Width of streets and height of buildings in the country."""
+
+
+class Fading(NamedTuple):
+    """One environment's parameters without line of sight; formulas take the frequency (GHz)."""
+
+    lowest_ghz: float
+    delay_spread: Callable[[float], tuple[float, float]]
+    """Mean and standard deviation of lg(DS / 1 s)."""
+    azimuth_spread: Callable[[float], tuple[float, float]]
+    """Those of lg(ASD / 1 degree)."""
+    zenith_deviation: float
+    """Standard deviation of lg(ZSD / 1 degree)."""
+    shadow_db: float
+    correlation: tuple[float, float, float, float, float, float]
+    """DS-SF, ASD-SF, ZSD-SF, ASD-DS, ZSD-DS, ZSD-ASD."""
+    stretch: float
+    """Delay scaling r_tau."""
+    clusters: int
+    cluster_azimuth_deg: float
+    cluster_delay_ns: Callable[[float], float]
+    scale_azimuth: float
+    scale_zenith: float
+    """C_phi and C_theta without line of sight."""
+    later: tuple[float, float]
+    """Mean and standard deviation of the lg of the absolute delay beyond the distance's (s)."""
+
+
+ENVIRONMENTS = {
+    "UMa": Fading(
+        6.0, lambda f: (-6.47 - 0.134 * math.log10(f), 0.39), lambda f: (1.09, 0.44), 0.49, 6.0,
+        (-0.4, -0.6, 0.0, 0.4, -0.5, 0.5), 2.3, 20, 1.8, lambda f: max(0.25, 6.5622 - 3.4084 * math.log10(f)), 1.289,
+        1.178, (-7.4, 0.2),
+    ),
+    "UMi": Fading(
+        2.0, lambda f: (-0.22 * math.log10(1 + f) - 6.87, 0.19 * math.log10(1 + f) + 0.22),
+        lambda f: (-0.24 * math.log10(1 + f) + 1.54, 0.10 * math.log10(1 + f) + 0.33), 0.35, 7.82,
+        (-0.7, 0.0, 0.0, 0.0, -0.5, 0.5), 2.1, 19, 10.0, lambda f: 11.0, 1.273, 1.184, (-7.5, 0.5),
+    ),
+    "RMa": Fading(
+        0.5, lambda f: (-7.43, 0.48), lambda f: (0.95, 0.45), 0.30, 8.0, (-0.5, 0.6, -0.04, -0.4, -0.10, 0.42), 1.7, 10,
+        2.0, lambda f: 3.91, 1.090, 0.957, (-8.33, 0.26),
+    ),
+}  # fmt: skip
+"""Source: TR 38.901 V19, Tables 7.4.1-1, 7.5-2, 7.5-4, 7.5-6 (notes: UMa below 6 GHz as at 6, UMi below 2 as at 2),
+7.5-7 to 7.5-9 and 7.6.9-1."""
+
+
+class Link(NamedTuple):
+    """A link from a base station: horizontal distance, both heights (m) and frequency (GHz)."""
+
+    flat_m: float
+    station_m: float
+    height_m: float
+    ghz: float
+
+    @property
+    def range_m(self) -> float:
+        """Distance in space (m)."""
+        return math.hypot(self.flat_m, self.station_m - self.height_m)
+
+
+class Large(NamedTuple):
+    """Large-scale parameters: delay spread (s), spreads in azimuth and zenith (degrees), shadowing (dB)."""
+
+    delay_s: float
+    azimuth_deg: float
+    zenith_deg: float
+    shadow_db: float
+
+
+class Rays(NamedTuple):
+    """Rays (K,) of a link: delay after the first (s), azimuth from the link's, zenith angle (degrees), power."""
+
+    delay_s: np.ndarray
+    azimuth_deg: np.ndarray
+    zenith_deg: np.ndarray
+    power: np.ndarray
+
+
+def path_loss_db(environment: str, link: Link) -> float:
+    """Return the path loss (dB) without line of sight, at least that with it. Source: Table 7.4.1-1."""
+    lg, f = math.log10(link.range_m), 20 * math.log10(link.ghz)
+    if environment == "RMa":
+        high = max(link.height_m, 0.01)
+        seen = _open_country_db(link.range_m, link.ghz)
+        bend = 2 * math.pi * link.station_m * high * link.ghz * 1e9 / SPEED_OF_LIGHT
+        if link.flat_m > bend:
+            seen = _open_country_db(bend, link.ghz) + 40 * math.log10(link.range_m / bend)
+        mast = math.log10(link.station_m)
+        hidden = 161.04 - 7.1 * math.log10(STREET_M) + 7.5 * math.log10(ROOF_M)
+        hidden -= (24.37 - 3.7 * (ROOF_M / link.station_m) ** 2) * mast
+        hidden += (43.42 - 3.1 * mast) * (lg - 3) + f - (3.2 * math.log10(11.75 * high) ** 2 - 4.97)
+        return max(seen, hidden)
+    # The surface's effective height is 1 m, as for points below 13 m.
+    bend = 4 * (link.station_m - 1) * max(link.height_m - 1, 0.0) * link.ghz * 1e9 / SPEED_OF_LIGHT
+    square = math.log10(max(bend**2 + (link.station_m - link.height_m) ** 2, 1.0))
+    if environment == "UMi":
+        seen = 32.4 + (21 * lg if link.flat_m <= bend else 40 * lg - 9.5 * square) + f
+        return max(seen, 35.3 * lg + 22.4 + 1.065 * f - 0.3 * (link.height_m - 1.5))
+    seen = 28.0 + (22 * lg if link.flat_m <= bend else 40 * lg - 9 * square) + f
+    return max(seen, 13.54 + 39.08 * lg + f - 0.6 * (link.height_m - 1.5))
+
+
+def _open_country_db(range_m: float, ghz: float) -> float:
+    """Path loss of open country with line of sight before its break."""
+    lg = math.log10(range_m)
+    near = 20 * math.log10(40 * math.pi * range_m * ghz / 3) + min(0.03 * ROOF_M**1.72, 10) * lg
+    return near - min(0.044 * ROOF_M**1.72, 14.77) + 0.002 * math.log10(ROOF_M) * range_m
+
+
+def zenith_spread(environment: str, link: Link) -> tuple[float, float]:
+    """Return the mean of lg(ZSD / 1 degree) and the zenith angles' offset (degrees). Source: Tables 7.5-7 to 7.5-9."""
+    flat, high = link.flat_m, link.height_m
+    if environment == "RMa":
+        turned = math.degrees(math.atan((35 - 3.5) / flat) - math.atan((35 - 1.5) / flat))
+        return max(-1.0, -0.19 * flat / 1000 - 0.01 * (high - 1.5) + 0.28), turned
+    if environment == "UMi":
+        mean = max(-0.5, -3.1 * flat / 1000 + 0.01 * max(high - link.station_m, 0.0) + 0.2)
+        return mean, -(10 ** (-1.5 * math.log10(max(10.0, flat)) + 3.3))
+    lg = math.log10(max(link.ghz, ENVIRONMENTS["UMa"].lowest_ghz))
+    power = (0.208 * lg - 0.782) * math.log10(max(25.0, flat)) - 0.13 * lg + 2.03 - 0.07 * (high - 1.5)
+    return max(-0.5, -2.1 * flat / 1000 - 0.01 * (high - 1.5) + 0.9), 7.66 * lg - 5.96 - 10**power
+
+
+def large_scale(environment: str, link: Link, rng: np.random.Generator) -> Large:
+    """Return a link's spreads and shadowing, correlated as Table 7.5-6 says; positive shadowing means more power."""
+    given = ENVIRONMENTS[environment]
+    ghz = max(link.ghz, given.lowest_ghz)
+    matrix = np.eye(4)
+    for (row, column), value in zip([(1, 0), (2, 0), (3, 0), (2, 1), (3, 1), (3, 2)], given.correlation, strict=True):
+        matrix[row, column] = matrix[column, row] = value
+    shadow, delay, azimuth, zenith = np.linalg.cholesky(matrix) @ rng.standard_normal(4)
+    (delay_mean, delay_dev), (azimuth_mean, azimuth_dev) = given.delay_spread(ghz), given.azimuth_spread(ghz)
+    wide = min(10 ** (azimuth_mean + azimuth_dev * azimuth), WIDEST_DEG[0])
+    tall = min(10 ** (zenith_spread(environment, link)[0] + given.zenith_deviation * zenith), WIDEST_DEG[1])
+    return Large(10 ** (delay_mean + delay_dev * delay), wide, tall, given.shadow_db * shadow)
+
+
+def rays(environment: str, link: Link, large: Large, rng: np.random.Generator, clusters: int | None = None) -> Rays:
+    """Return a link's rays. Their powers sum to one before the faintest clusters are left out.
+
+    clusters: as many clusters of one ray each instead of the table's of 20 rays. Source: clause 7.5, steps 5 to 8,
+    Eqs. 7.5-1, 7.5-5, 7.5-9, 7.5-11, 7.5-13, 7.5-14, 7.5-19, 7.5-20 and 7.5-26.
+    """
+    given = ENVIRONMENTS[environment]
+    count = clusters or given.clusters
+    delay = -given.stretch * large.delay_s * np.log1p(-rng.random(count))
+    delay = np.sort(delay - delay.min())
+    power = np.exp(-delay * (given.stretch - 1) / (given.stretch * large.delay_s))
+    power *= 10 ** (-0.3 * rng.standard_normal(count))
+    power /= power.sum()
+    depth = -np.log(power / power.max())
+    mean_zenith, offset = zenith_spread(environment, link)
+    sign = np.where(rng.random((2, count)) < 0.5, -1.0, 1.0)
+    spread = np.array([large.azimuth_deg, large.zenith_deg])[:, None]
+    jitter = spread / 7 * rng.standard_normal((2, count))
+    azimuth = sign[0] * 2 * (large.azimuth_deg / 1.4) * np.sqrt(depth) / given.scale_azimuth + jitter[0]
+    straight = math.degrees(math.acos((link.height_m - link.station_m) / link.range_m))
+    zenith = sign[1] * large.zenith_deg * depth / given.scale_zenith + jitter[1] + straight + offset
+    kept = power > power.max() * 10 ** (-FAINTEST_DB / 10)
+    delay, azimuth, zenith, power = delay[kept], azimuth[kept], zenith[kept], power[kept]
+    if clusters:
+        return Rays(delay, azimuth, zenith, power)
+    return _split(given, link, mean_zenith, Rays(delay, azimuth, zenith, power), rng)
+
+
+def _split(given: Fading, link: Link, mean_zenith: float, clusters: Rays, rng: np.random.Generator) -> Rays:
+    """The rays of clusters, coupled at random in azimuth and zenith; the two strongest clusters have three parts."""
+    count = len(OFFSETS)
+    delay = np.repeat(clusters.delay_s[:, None], count, axis=1)
+    azimuth = clusters.azimuth_deg[:, None] + given.cluster_azimuth_deg * OFFSETS
+    later = 1.28e-9 * given.cluster_delay_ns(max(link.ghz, given.lowest_ghz))
+    zenith = np.empty_like(azimuth)
+    strongest = np.argsort(-clusters.power)[:2]
+    for number in range(len(delay)):
+        groups = PARTS if number in strongest else (np.arange(count),)
+        coupled = OFFSETS.copy()
+        for step, group in enumerate(groups):
+            coupled[group] = OFFSETS[group][rng.permutation(len(group))]
+            delay[number, group] += step * later
+        zenith[number] = clusters.zenith_deg[number] + 0.375 * 10**mean_zenith * coupled
+    power = np.repeat(clusters.power[:, None] / count, count, axis=1)
+    return Rays(delay.ravel(), azimuth.ravel(), zenith.ravel(), power.ravel())
+
+
+def later_s(environment: str, rng: np.random.Generator) -> float:
+    """Return the delay (s) of the first ray beyond that of the distance. Source: clause 7.6.9, Table 7.6.9-1."""
+    mean, deviation = ENVIRONMENTS[environment].later
+    return 10 ** (mean + deviation * float(rng.standard_normal()))

@@ -1,0 +1,126 @@
+"""Fluctuation of a target's cross section: an angular pattern (B1) and a log-normal factor (B2) on its mean (A).
+
+Both act on all points alike. The log-normal factor is drawn once a look and station; both directions of a link share
+one draw. The pattern follows the direction of the station in the body's frame; TR 38.901 gives none to small UAVs,
+people and birds. On a link it is that at the bisector of both ends, less a loss by the bistatic angle, which all
+classes have.
+"""
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.target_classes import LARGE_UAV, LARGE_UAV_DBSM, VEHICLE, VEHICLE_DBSM, Lobe, large
+from lowalt.scene.view import View
+from lowalt.targets.cloud import Cloud
+
+SOURCE = (
+    "3GPP TR 38.901 V19.4.0, Eqs. 7.9.2-1 to 7.9.2-3, Tables 7.9.2.1-1, -2 and -4 (A, B1, B2 are sigma_M, sigma_D, "
+    "sigma_S there); on links, no forward scattering (sigma_FS of minus infinity) and one draw for both directions "
+    "(reciprocity): estimates; birds take the small UAV's spread and loss: estimate"
+)
+DEFAULTS = {"pattern": True, "spread_db": None}
+
+CUT = 3.0
+"""Standard deviations above its mean at which the log-normal factor is cut (TR 38.901, Eq. 7.9.4-1)."""
+
+
+BISTATIC = {LARGE_UAV: (6.05, 1.33), VEHICLE: (6.0, 1.65)}
+"""k1 (dB) and k2 of Eq. 7.9.2-3."""
+BISTATIC_DB = 3.0
+"""Loss of a target without a pattern where both ends stand on opposite sides (Eq. 7.9.2-2)."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether the cross section keeps its mean."""
+    return not settings["pattern"] and settings["spread_db"] == 0
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for two patterns at once."""
+    if settings["pattern"] and "cross_sections" in scene.effects:
+        raise InputError(
+            "effects.fluctuation: pattern is true and effects.cross_sections gives every point a pattern of its own, "
+            "expected pattern: false in a scene with both"
+        )
+
+
+def spread_db(cloud: Cloud) -> float:
+    """Return the standard deviation of B2 in dB, by class and size."""
+    if cloud.like == "UAV" and large(cloud):
+        return 2.50
+    return {"UAV": 3.74, "Bird": 3.74, "Pedestrian": 3.94, "Vehicle": 3.41}[cloud.like]
+
+
+def pattern_dbsm(
+    faces: tuple[Lobe, ...], azimuth_deg: np.ndarray, zenith_deg: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return 10 lg(sigma_M sigma_D) of a target's face in a direction (any shape), and its least value (dBsm).
+
+    azimuth: 0 front, 90 left.
+
+    Faces share the directions as the tables say: the roof above 45 degrees (30 for vehicles), then quarters of azimuth.
+    """
+    roof, floor = (45.0, 135.0) if len(faces) == len(LARGE_UAV) else (30.0, 181.0)
+    face = (np.floor((azimuth_deg + 45.0) / 90.0) % 4).astype(int)
+    face = np.where(zenith_deg < roof, 4, np.where(zenith_deg >= floor, 5, face))
+    centre, width, high, tall, peak, depth = (
+        np.array([0.0 if one[k] is None else one[k] for one in faces])[np.minimum(face, len(faces) - 1)]
+        for k in range(6)
+    )
+    off = (azimuth_deg - centre + 180.0) % 360.0 - 180.0
+    across = np.where(face >= 4, 0.0, np.minimum(12.0 * (off / width) ** 2, depth))
+    along = np.minimum(12.0 * ((zenith_deg - high) / tall) ** 2, depth)
+    return peak - np.minimum(across + along, depth), peak - depth
+
+
+def bistatic_loss_db(faces: tuple[Lobe, ...] | None, angle_rad: np.ndarray) -> np.ndarray:
+    """Return the loss (dB) at bistatic angles of 0 to pi (any shape); faces: None for a target without a pattern.
+
+    Source: TR 38.901, Eq. 7.9.2-3, without its floor, and Eq. 7.9.2-2.
+    """
+    if faces is None:
+        return BISTATIC_DB * np.sin(0.5 * angle_rad)
+    k1, k2 = BISTATIC[faces]
+    with np.errstate(divide="ignore"):
+        return k1 * np.sin(0.5 * k2 * angle_rad) - 5.0 * np.log10(np.maximum(np.cos(0.5 * angle_rad), 0.0))
+
+
+def pattern(view: View) -> np.ndarray:
+    """Return B1 (N, 1), relative to the mean cross section, in the station's direction or at a link's bisector."""
+    cloud = view.cloud
+    faces, mean = None, 0.0
+    if "body" in cloud.kinds and cloud.like == "Vehicle":
+        faces, mean = VEHICLE, VEHICLE_DBSM
+    elif "body" in cloud.kinds and cloud.like == "UAV" and large(cloud):
+        faces, mean = LARGE_UAV, LARGE_UAV_DBSM
+    ends = view.ends()
+    if faces is None and len(ends) == 1:
+        return np.ones((len(view.times_s), 1))
+    body = cloud.kinds.index("body") if "body" in cloud.kinds else 0
+    ways = [np.asarray(end.station.position_m) - view.motion.translation[:, body] for end in ends]
+    away, angle = ways[0], np.zeros(len(view.times_s))
+    if len(ends) == 2:
+        units = [way / np.linalg.norm(way, axis=1, keepdims=True) for way in ways]
+        away = units[0] + units[1]
+        # The half angle by its tangent keeps small and large angles exact.
+        angle = 2.0 * np.arctan2(np.linalg.norm(units[0] - units[1], axis=1), np.linalg.norm(away, axis=1))
+    loss = bistatic_loss_db(faces, angle)
+    if faces is None:
+        return 10 ** (-loss / 10)[:, None]
+    right, front, up = np.einsum("nij,ni->jn", view.motion.rotation[:, body], away)
+    azimuth = np.degrees(np.arctan2(-right, front)) % 360.0
+    zenith = np.degrees(np.arctan2(np.hypot(right, front), up))
+    shone, floor = pattern_dbsm(faces, azimuth, zenith)
+    return 10 ** ((np.maximum(shone - loss, floor) - mean) / 10)[:, None]
+
+
+def visible(settings: dict, view: View, rng: np.random.Generator) -> np.ndarray:
+    """Return the factor (N, 1) on all amplitudes: the root of B1 B2; one draw a sample and station or pair of stations.
+
+    B2 is log-normal with mean one: its mean in dB is -ln(10) / 20 times its variance (Eq. 7.9.2-1).
+    """
+    spread = spread_db(view.cloud) if settings["spread_db"] is None else settings["spread_db"]
+    gained_db = -np.log(10) / 20 * spread**2 + spread * min(float(rng.standard_normal()), CUT)
+    factor = pattern(view) if settings["pattern"] else np.ones((len(view.times_s), 1))
+    return np.sqrt(factor * 10 ** (gained_db / 10))

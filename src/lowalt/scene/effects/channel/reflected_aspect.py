@@ -1,0 +1,74 @@
+"""Aspect and occlusion along reflected routes: by the ground or a facade a target shows another side.
+
+A point sees the station in the mirror, so the way there and back by one reflected path has the aspect and the shadows
+of a station at the mirror image's place. Out by one path and back by another, each way counts with the root of its own
+two-way factor. Without this effect all paths have the direct one's aspect and shadows.
+"""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.scene.catalogue import PLACES
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.response import Path
+from lowalt.scene.view import View
+
+SOURCE = (
+    "images of the station: Balanis, Advanced Engineering Electromagnetics, section 7.4; product of one factor for "
+    "each way: reciprocity, exact for a Lambert surface (Lambert's cosine law, cos i cos s) and for opaque shadows, an "
+    "estimate for facets"
+)
+DEFAULTS = {"follow": ["cross_sections", "fluctuation", "occlusion"]}
+
+FOLLOWED = tuple(DEFAULTS["follow"])
+"""Effects that depend on the side that a target shows."""
+
+
+def idle(settings: dict) -> bool:
+    """Return whether no effect is evaluated along the reflected routes."""
+    return not settings["follow"]
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError where the scene has no reflected route, or none of the effects in `follow`."""
+    if not {"ground_reflection", "walls"} & set(scene.effects):
+        raise InputError(
+            "effects.reflected_aspect: there is no reflected route, expected ground_reflection or walls in the same "
+            "scene"
+        )
+    if not set(settings["follow"]) & set(scene.effects):
+        raise InputError(
+            f"effects.reflected_aspect.follow: {settings['follow']}, expected one of the scene's effects among "
+            f"{list(FOLLOWED)}"
+        )
+
+
+def routes(
+    settings: dict, view: View, paths: list[Path], weight: Callable[[View, Iterable[str] | None], np.ndarray]
+) -> np.ndarray:
+    """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
+
+    weight(view, names): product (N, L) of the amplitude factors of the named effects as `view` sees them. On a link,
+    both ways by the same kind of path are the link between both images. A path without an image of the station shows
+    the direct one's side.
+    """
+    follow = settings["follow"]
+    rest, ends = weight(view, PLACES.keys() - set(follow)), view.ends()
+    heard = [None, *(path.station_m for path in paths)]
+    sent = [None, *((path.sender or path).station_m for path in paths)]
+
+    def two_way(end: View, image_m: np.ndarray | None, sender_m: np.ndarray | None = None) -> np.ndarray:
+        """The followed effects' factor (N, L) for a station, or a link, that stands at its image."""
+        return weight(end if image_m is None else end.seen_from(image_m, sender_m), follow)
+
+    back = [two_way(ends[-1], image_m) for image_m in heard]
+    out, same = back, back
+    if len(ends) == 2:
+        out = [two_way(ends[0], image_m) for image_m in sent]
+        same = [two_way(view, *images_m) for images_m in zip(heard, sent, strict=True)]
+    result = np.empty((len(heard), len(heard), *view.places.shape[:2]))
+    for a, b in np.ndindex(result.shape[:2]):
+        result[a, b] = rest * (same[a] if a == b else np.sqrt(out[a] * back[b]))
+    return result

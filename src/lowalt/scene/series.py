@@ -1,0 +1,48 @@
+"""A smooth function of one number at many places: as a Chebyshev series over the stretch that the places cover."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from lowalt.common.jit import VECTOR
+
+STRIP = 256
+"""Places that pass through the loop together."""
+ENOUGH = 1e-14
+"""Share of the largest coefficient below which the last quarter of a series must be."""
+
+
+@VECTOR
+def _summed(x, terms, work, out):
+    """Fill out (K,) with the series of terms (T,) complex at x (K,), -1 to 1, by Clenshaw's rule; work: (4, STRIP)."""
+    for first in range(0, len(x), STRIP):
+        size = min(STRIP, len(x) - first)
+        re, im, last_re, last_im = work[0], work[1], work[2], work[3]
+        for i in range(size):
+            re[i], im[i], last_re[i], last_im[i] = 0.0, 0.0, 0.0, 0.0
+        for k in range(len(terms) - 1, -1, -1):
+            a, b, twice = terms[k].real, terms[k].imag, 2.0 if k else 1.0
+            for i in range(size):
+                last_re[i] = a + twice * x[first + i] * re[i] - last_re[i]
+                last_im[i] = b + twice * x[first + i] * im[i] - last_im[i]
+            re, im, last_re, last_im = last_re, last_im, re, im
+        for i in range(size):
+            out[first + i] = complex(re[i], im[i])
+
+
+def at(function: Callable[[np.ndarray], np.ndarray], places: np.ndarray) -> np.ndarray:
+    """Return the complex values of a smooth function at real places (any shape), to rounding; `function` is pointwise.
+
+    The number of terms is doubled until the last quarter of them is below rounding, up to 64; a function that needs
+    more is called at every place, as one of few places is. Source: Aurentz & Trefethen, Chopping a Chebyshev series,
+    ACM Trans. Math. Softw. 43(4), 2017, whose plateau is this quarter.
+    """
+    middle, half = 0.5 * (places.max() + places.min()), max(0.5 * float(np.ptp(places)), 1e-12)
+    for count in (8, 16, 32, 64) if places.size > 256 else ():
+        terms = chebyshev.chebinterpolate(lambda x: function(middle + half * x).astype(np.complex128), count - 1)
+        if abs(terms[-count // 4 :]).max() <= ENOUGH * abs(terms).max():
+            out = np.empty(places.shape, np.complex128)
+            _summed(((places - middle) / half).ravel(), terms, np.empty((4, STRIP)), out.reshape(-1))
+            return out
+    return function(places).astype(np.complex128)
