@@ -1,0 +1,124 @@
+"""The chain as a whole: the slow truth of motion and prefix inside symbols, and laws of what a scene names."""
+
+import importlib
+import sys
+
+import numpy as np
+import pytest
+
+import reference_effects
+from lowalt.common.errors import InputError
+from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.common.streams import stream
+from lowalt.echo import echo_signal
+from lowalt.scene import waveform
+from lowalt.scene.catalogue import ORDER, PLACES, called, dotted
+from lowalt.scene.chain import Sample, received_signal
+from lowalt.scene.observe import observe
+from lowalt.scene.response import response
+from scenes import A, network, scene, target, view_of
+
+
+def data_of(name, radio):
+    return waveform.qpsk(stream(5, "effect", name, "Thing", 3, "A"), radio.symbols, radio.subcarriers)
+
+
+def strongest(responses):
+    cells = np.fft.ifft(responses, axis=1)
+    return np.take_along_axis(cells, abs(cells).argmax(axis=1)[:, None], axis=1)[:, 0]
+
+
+def test_motion_inside_a_symbol_is_the_sum_over_every_time_sample():
+    radio = network(subcarriers=16, symbols=2, transmit=(2, 2), receive=(2, 2))
+    cloud, row = target(np.random.default_rng(7), points=5, rate_hz=500.0)
+    asked = scene({"symbol_motion": {}}, radio)
+    view = observe(asked, A, cloud, row)
+    truth = reference_effects.moving(
+        radio, A, lambda t: view.at(np.array([t])).places, cloud.rcs_m2, view.aim_m, radio.times_s,
+        data_of("waveform", radio),
+    )  # fmt: skip
+    found = received_signal(asked, A, cloud, row).signal
+    assert abs(found - strongest(truth)).max() < 1e-10 * abs(truth).max()
+    still = received_signal(scene({}, radio), A, cloud, row).signal
+    assert abs(found - still).max() > 1e-3 * abs(still).max()
+
+
+def test_a_late_echo_begins_with_the_previous_symbol():
+    radio = network(symbols=3)
+    cloud, row = target(np.random.default_rng(1), 3, 20.0, x_m=330.0, rate_hz=0.0)
+    asked = scene({"cyclic_prefix": {}}, radio)
+    view = observe(asked, A, cloud, row)
+    data, before, prefix_s = data_of("waveform", radio), data_of("previous waveform", radio), 144 / 2048 / 120e3
+    count, baseband = radio.subcarriers, (np.arange(radio.subcarriers) - 16) * 120e3
+    truth = np.zeros((3, count), complex)
+    for point in range(3):
+        places = view.places[:, point : point + 1]
+        whole = response(view_of(radio, places, cloud.rcs_m2[point : point + 1], view.aim_m))
+        delay_s = 2 * np.linalg.norm(places[:, 0] - A.position_m, axis=1) / SPEED_OF_LIGHT
+        for n, i in np.ndindex(3, count):
+            t = i / (count * 120e3)
+            late = t < delay_s[n] - prefix_s
+            sent = before[n] * np.exp(2j * np.pi * baseband * prefix_s) if late else data[n]
+            sample = (whole[n] * sent * np.exp(2j * np.pi * baseband * t)).sum() / count
+            truth[n] += sample * np.exp(-2j * np.pi * baseband * t) / data[n]
+    found = received_signal(asked, A, cloud, row).signal
+    assert abs(found - strongest(truth)).max() < 1e-10 * abs(truth).max()
+    assert abs(found - received_signal(scene({}, radio), A, cloud, row).signal).max() > 0.1 * abs(found).max()
+
+
+def test_without_effects_the_signal_is_the_echo_engines_to_the_last_bit():
+    cloud, row = target(np.random.default_rng(2))
+    found, view = received_signal(scene({}), A, cloud, row), observe(scene({}), A, cloud, row)
+    engine = echo_signal(network(), A, view.motion, cloud.rcs_m2, view.aim_m)
+    np.testing.assert_array_equal(found.signal, engine.signal)
+
+
+def test_effects_without_strength_change_no_bit():
+    cloud, row = target(np.random.default_rng(3))
+    idle = {
+        "gusts": {"wind_mps": 0.0}, "iq_imbalance": {"gain_db": 0.0, "phase_deg": 0.0}, "adc": {"bits": None},
+        "clutter": {"gamma": 0.0}, "canceller": {"kind": "none"}, "timing_offset": {"sigma_s": 0.0},
+    }  # fmt: skip
+    np.testing.assert_array_equal(
+        received_signal(scene(idle), A, cloud, row).signal, received_signal(scene({}), A, cloud, row).signal
+    )
+
+
+def test_adding_an_effect_moves_no_other_draw():
+    cloud, row = target(np.random.default_rng(4))
+    noise, land = {"receiver_noise": {"noise_figure_db": 60.0}}, {"clutter": {}}
+    noisy, cluttered, both = (Sample(scene(effects), A, cloud, row) for effects in (noise, land, noise | land))
+    echo = np.fft.ifft(noisy.direct, axis=1)
+    assert abs((both.cells - cluttered.cells) - (noisy.cells - echo)).max() < 1e-9 * abs(noisy.cells).max()
+    assert abs(noisy.cells - echo).max() > 0.1 * abs(echo).max()
+
+
+def test_the_catalogue_names_every_module_with_defaults_and_imports_none_that_is_not_called():
+    for entry in ORDER:
+        place, _, name = entry.partition("/")
+        module = importlib.import_module(dotted(name))
+        assert isinstance(module.DEFAULTS, dict) and module.SOURCE and PLACES[name] == place
+    for name in list(sys.modules):
+        if name.startswith("lowalt.scene.effects.receiver."):
+            del sys.modules[name]
+    called({"adc": {}})
+    assert {name for name in sys.modules if name.startswith("lowalt.scene.effects.receiver.")} == {
+        "lowalt.scene.effects.receiver.adc"
+    }
+
+
+def test_unknown_effects_and_parameters_are_named():
+    with pytest.raises(InputError, match="unknown effect 'fog'"):
+        called({"fog": {}})
+    with pytest.raises(InputError, match=r"effects.adc: unknown parameter\(s\) \['bit'\]"):
+        called({"adc": {"bit": 8}})
+
+
+def test_a_sample_without_its_target_keeps_its_noise_and_land():
+    cloud, row = target(np.random.default_rng(6))
+    whole = Sample(scene({"receiver_noise": {}, "clutter": {}}), A, cloud, row)
+    echo = Sample(scene({"squint": {}}), A, cloud, row)
+    empty = whole.without_target()
+    difference = whole.cells - empty.cells
+    alone = np.fft.ifft(echo.direct, axis=1)
+    assert abs(difference - alone).max() < 1e-9 * abs(whole.cells).max()
