@@ -12,7 +12,6 @@ SMALL_UAV_DBSM, LARGE_UAV_DBSM, HUMAN_DBSM, VEHICLE_DBSM = -12.81, -5.85, -1.37,
 """10 lg sigma_M of Tables 7.9.2.1-1, -2 and -4 (dBsm)."""
 
 
-
 class Lobe(NamedTuple):
     """One face of a target: centres and 3 dB widths (degrees), largest value (dBsm) and depth (dB)."""
 
