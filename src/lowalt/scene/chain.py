@@ -111,7 +111,7 @@ class Sample:
             self._factors[view, effect.name] = factor
         return self._factors[view, effect.name]
 
-    def paths(self, view: View) -> list[Path]:
+    def every_path(self, view: View) -> list[Path]:
         """Return all paths but the direct one; on a link those of its receiver, each with its sender's."""
         adding = providing(self.channel, protocols.AddsPaths)
         ends = [
@@ -120,6 +120,10 @@ class Sample:
         if len(ends) == 2:
             ends[0] = [there._replace(sender=here) for here, there in zip(*ends, strict=True)]
         return ends[0]
+
+    def paths(self, view: View) -> list[Path]:
+        """Return those paths that carry anything in the look: most facades reflect nothing of it."""
+        return [path for path in self.every_path(view) if _carries(path)]
 
     def routes(self, view: View, paths: list[Path]) -> np.ndarray:
         """Return the factor on the points' amplitudes, (N, L), or (R, R, N, L) where the scene tells routes apart."""
@@ -157,8 +161,7 @@ class Sample:
         paths, bent = self.paths(view), self.physics.squint or self.physics.wavefront
         if view is self.view and not paths and not bent:
             return self.direct
-        factor = self.routes(view, paths)
-        return self.physics.response(view, paths, factor)
+        return self.physics.response(view, paths, self.routes(view, paths))
 
     def arrived(self) -> np.ndarray:
         """Return the response (N, M) of all echoes as the receiver's own data reveal it, behind the receiver's effects.
@@ -187,8 +190,14 @@ class Sample:
 
     def _samples(self, view: View, symbols: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Time samples (N, M) of a view's target with what reaches into symbols."""
-        factor = self.routes(view, self.paths(view))
-        return arriving(self.physics, view, factor, self.paths, symbols)
+        kept = [number for number, path in enumerate(self.every_path(view)) if _carries(path)]
+
+        def paths_of(moved: View) -> list[Path]:
+            """The same paths at other instants."""
+            every = self.every_path(moved)
+            return [every[number] for number in kept]
+
+        return arriving(self.physics, view, self.routes(view, paths_of(view)), paths_of, symbols)
 
     def _standing(self, echo: np.ndarray, offset: float, symbols: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         """Time samples (N, M) of echoes (N, M) that do not move within a symbol, cut by the prefix at their cells."""
@@ -318,6 +327,11 @@ def received_signal(
     """
     keep_freed_arrays()
     return Sample(scene, station, cloud, row, occluders, clouds).received()
+
+
+def _carries(path: Path) -> bool:
+    """Whether a path carries anything in the look, both ways of a link."""
+    return bool(np.any(path.coefficient) and np.any((path.sender or path).coefficient))
 
 
 def arriving_power(signal: np.ndarray) -> float:

@@ -51,7 +51,7 @@ def response(
     Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
     network, station = view.network, view.station
-    seen = [Path(view.places), *paths]
+    seen, strength = [Path(view.places), *paths], _amplitudes(view, factor)
     ends = [(station, network.receive, seen)]
     same = station.transmitter is None and network.transmit == network.receive
     if not same:
@@ -71,7 +71,6 @@ def response(
     out, back = arrays[0], arrays[-1]
     nodes, orders = len(out.kappas), len(to_nodes) // len(out.kappas)
     result = np.empty((len(out.places), len(back.places), len(view.times_s), nodes, 2, orders))
-    strength = _amplitudes(view, factor)
     fault = response_loops.moments(out, back, same, strength, reach, result)
     if fault:
         raise InputError(

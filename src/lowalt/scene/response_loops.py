@@ -116,13 +116,20 @@ def _add_moments(factors, strength, excess, reach, table, parts, result):
             for i in range(np.uint64(count)):
                 a, b, c, d = out_re[first + i], out_im[first + i], back_re[first + i], back_im[first + i]
                 real[i], imag[i] = strength[first + i] * (a * c - b * d), strength[first + i] * (a * d + b * c)
-            for p in range(orders):
-                row, re, im = table[p], 0.0, 0.0
+            # Two orders share a pass over the points; a last one without a partner passes with itself.
+            for p in range(0, orders, 2):
+                even, odd = table[p], table[min(p + 1, orders - 1)]
+                a, b, c, d = 0.0, 0.0, 0.0, 0.0
                 for i in range(np.uint64(count)):
-                    re += row[i] * real[i]
-                    im += row[i] * imag[i]
-                result[q, 0, p] += re
-                result[q, 1, p] += im
+                    a += even[i] * real[i]
+                    b += even[i] * imag[i]
+                    c += odd[i] * real[i]
+                    d += odd[i] * imag[i]
+                result[q, 0, p] += a
+                result[q, 1, p] += b
+                if p + 1 < orders:
+                    result[q, 0, p + 1] += c
+                    result[q, 1, p + 1] += d
 
 
 @LOOPS
