@@ -14,7 +14,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import eigh, toeplitz
 
+from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel.windblown import windblown
 from lowalt.scene.waveform import Look
 
@@ -24,12 +26,22 @@ SOURCE = (
     "Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its "
     "covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
 )
-DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95, "wind_mps": 4.5, "depth_db": 70.0}
+DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95, "wind_mps": 4.5, "depth_db": 50.0}
 
 
 def idle(settings: dict) -> bool:
     """Return True for kind none, or a difference of order 0."""
     return settings["kind"] == "none" or (settings["kind"] == "pulse" and settings["order"] == 0)
+
+
+def check(settings: dict, scene: CheckedScene) -> None:
+    """Raise InputError for a filter of evenly spaced symbols where some are not received."""
+    timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})
+    if settings["kind"] == "clutter" and (timing["downlink"] < 1 or timing["missing"] > 0):
+        raise InputError(
+            "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves gaps, expected mean, "
+            "pulse or exponential"
+        )
 
 
 def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
@@ -56,7 +68,8 @@ def filtered(settings: dict, cells: np.ndarray, network: Network) -> np.ndarray:
         return cells / math.sqrt(math.comb(2 * settings["order"], settings["order"]))
     if settings["kind"] == "clutter":
         basis = land(len(cells), network, settings["wind_mps"], settings["depth_db"])
-        left = cells - basis @ (basis.T @ cells)
+        parts = np.ascontiguousarray(cells, np.complex128).view(np.float64)
+        left = (parts - basis @ (basis.T @ parts)).view(np.complex128)
         return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
     memory = settings["memory"]
     # The noise gain of a (1 - z^-1) / (1 - a z^-1) is 2 a^2 / (1 + a).
@@ -75,27 +88,29 @@ def _step(cells: np.ndarray) -> np.ndarray:
 def land(symbols: int, network: Network, wind_mps: float, depth_db: float) -> np.ndarray:
     """Return the components (N, K) of windblown land's echoes over N symbols that lie above its power less `depth_db`.
 
-    They are orthonormal: the eigenvectors of the land's covariance. Its still part is constant, and its moving part's
-    exponential Doppler spectrum of slope beta has the covariance 1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
+    They are orthonormal: the constant, in which all that stands still lies however loud it is, and the eigenvectors of
+    the moving part's covariance beside it. The exponential Doppler spectrum of slope beta has the covariance
+    1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
     """
+    constant = np.full((symbols, 1), symbols**-0.5)
     still, beta = windblown(wind_mps, network.carrier_hz)
+    if not np.isfinite(still):
+        return constant
+    decay_s = beta * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi)
     lag_s = network.symbol_interval_s * np.arange(symbols)
-    if np.isfinite(still):
-        decay_s = beta * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi)
-        lags = (still + 1 / (1 + (lag_s / decay_s) ** 2)) / (1 + still)
-    else:
-        lags = np.ones(symbols)
-    # The still part has one component of N times its power: the power of each component is per symbol.
-    power, basis = eigh(toeplitz(lags))
-    return basis[:, power > 10 ** (-depth_db / 10)]
+    moving = toeplitz(1 / (1 + (lag_s / decay_s) ** 2)) / (1 + still)
+    beside = moving - moving.mean(axis=0)
+    power, basis = eigh(beside - beside.mean(axis=1, keepdims=True))
+    return np.hstack([constant, basis[:, power > 10 ** (-depth_db / 10)]])
 
 
 def loss_db(settings: dict, network: Network, speed_mps: float) -> float:
     """Return by how much a filter weakens a steady echo of this radial speed (m/s), over its gain on white noise (dB).
 
-    Negative where the echo gains on the noise, infinite where none is left. Speeds fold at c / (4 f T_r) to each side.
+    Of the median symbol of a look, so that what a filter does at its start counts little. Negative where the echo gains
+    on the noise, infinite where none is left. Speeds fold at c / (4 f T_r) to each side.
     """
     turns = 2 * speed_mps * network.carrier_hz / SPEED_OF_LIGHT * network.symbol_interval_s
     echo = np.exp(2j * np.pi * turns * np.arange(network.symbols))[:, None]
-    left = np.mean(abs(filtered(settings, echo, network)) ** 2)
+    left = np.median(abs(filtered(settings, echo, network)) ** 2)
     return float(-10 * np.log10(left)) if left > 0 else math.inf

@@ -1,0 +1,200 @@
+"""Cancellers and the detector: what they leave of land, of targets and of noise, and where a track goes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.scene import set_noise
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects.channel.windblown import windblown
+from lowalt.scene.effects.detection import canceller, cell_error, detector
+from lowalt.scene.waveform import Look
+from scenes import A, network
+
+RADIO = network(symbols=200, subcarriers=64)
+KINDS = [{"kind": "mean"}, {"kind": "pulse", "order": 2}, {"kind": "exponential"}, {"kind": "clutter"}]
+SPEED_MPS = 299_792_458.0 / 4.9e9 / 4 / 2.5e-3
+"""Largest radial speed that does not fold."""
+
+
+def normals(seed, *shape):
+    return set_noise.white(stream(seed, "white"), 1.0, shape)
+
+
+def filtered(changes, cells, radio=RADIO):
+    return canceller.filtered(canceller.DEFAULTS | changes, cells, radio)
+
+
+@pytest.mark.parametrize("changes", KINDS)
+def test_a_canceller_leaves_nothing_of_what_stands_still_and_keeps_the_level_of_noise(changes):
+    still = np.broadcast_to(normals(1, 64), (200, 64))
+    assert abs(filtered(changes, still)).max() < 1e-9
+    # A recursive filter's first symbols hold less noise.
+    assert np.mean(abs(filtered(changes, normals(2, 200, 500))) ** 2) == pytest.approx(1.0, rel=0.06)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_pulse_canceller_weakens_a_steady_echo_as_its_response_says(order):
+    """|2 sin(pi f T)|^k over the root of C(2k, k): Richards 2014, 5.2."""
+    gain = {1: 2, 2: 6, 3: 20}[order]
+    for speed_mps in (0.3, 1.0, 3.0):
+        turns = speed_mps / SPEED_MPS / 2
+        truth = 10 * np.log10(gain / (2 * np.sin(np.pi * turns)) ** (2 * order))
+        found = canceller.loss_db(canceller.DEFAULTS | {"kind": "pulse", "order": order}, RADIO, speed_mps)
+        assert found == pytest.approx(truth, abs=1e-6)
+
+
+def land(wind_mps, rng, radio=RADIO):
+    """Windblown land of unit power (N, 400): a still part, and lines of an exponential spectrum, drawn one by one."""
+    still, beta = windblown(wind_mps, radio.carrier_hz)
+    wavelength_m = 299_792_458.0 / radio.carrier_hz
+    speeds = rng.laplace(0.0, 1 / beta, (300, 400))
+    times_s = radio.symbol_interval_s * np.arange(radio.symbols)
+    phase = 2j * np.pi * rng.random(speeds.shape)
+    lines = np.stack([np.exp(4j * np.pi / wavelength_m * time * speeds + phase).sum(axis=0) for time in times_s])
+    moving = lines / np.sqrt(300) / np.sqrt(1 + still)
+    return moving + np.sqrt(still / (1 + still)) * np.exp(2j * np.pi * rng.random(400))
+
+
+@pytest.mark.parametrize("depth_db", [20.0, 30.0])
+def test_the_clutter_filter_leaves_windblown_land_its_depth_below_what_it_was(depth_db):
+    echoes = land(4.5, np.random.default_rng(3))
+    assert np.mean(abs(echoes) ** 2) == pytest.approx(1.0, rel=0.1)
+    left = filtered({"kind": "clutter", "depth_db": depth_db}, echoes)
+    assert -depth_db - 20 < 10 * np.log10(np.mean(abs(left) ** 2)) < -depth_db
+    # A mean leaves all that moves.
+    assert 10 * np.log10(np.mean(abs(filtered({}, echoes)) ** 2)) > -8
+
+
+def test_the_clutter_filter_spares_targets_beyond_its_notch_which_grows_with_wind_and_depth():
+    def loss(wind_mps, depth_db, speed_mps):
+        settings = canceller.DEFAULTS | {"kind": "clutter", "wind_mps": wind_mps, "depth_db": depth_db}
+        return canceller.loss_db(settings, RADIO, speed_mps)
+
+    assert abs(loss(1.0, 50.0, 2.0)) < 1.0 and loss(1.0, 50.0, 0.3) > 20
+    pulse = canceller.loss_db(canceller.DEFAULTS | {"kind": "pulse", "order": 2}, RADIO, 1.2)
+    assert loss(1.0, 50.0, 1.2) < 3.0 < 10.0 < pulse
+    kept = [canceller.land(200, RADIO, wind, depth).shape[1] for wind, depth in ((1.0, 50.0), (4.5, 50.0), (4.5, 60.0))]
+    assert kept == sorted(kept) and len(set(kept)) == 3
+    assert canceller.land(200, RADIO, 0.0, 50.0).shape[1] == 1
+    # Speeds fold: a target that seems to stand still is lost whatever its true speed.
+    assert loss(1.0, 50.0, 2 * SPEED_MPS) > 20
+
+
+def test_noise_behind_a_canceller_is_that_of_its_cell():
+    noise = normals(4, 200)
+    found = set_noise.behind_canceller(noise, {"kind": "pulse", "order": 1}, RADIO)
+    np.testing.assert_array_equal(found, filtered({"kind": "pulse"}, noise[:, None])[:, 0])
+    assert set_noise.in_all_cells({"cell_noise": None}) and not set_noise.in_all_cells({"cell_noise": {"snr_db": 3.0}})
+
+
+def test_the_clutter_filter_is_refused_where_symbols_are_missing():
+    scene = CheckedScene(RADIO, {"slow_time": {"downlink": 0.75, "missing": 0.0}}, ())
+    with pytest.raises(InputError, match="slow_time"):
+        canceller.check(canceller.DEFAULTS | {"kind": "clutter"}, scene)
+    canceller.check(canceller.DEFAULTS, scene)
+
+
+def look_at(cell):
+    """A look whose beam was pointed at a range cell."""
+    data = np.ones((RADIO.symbols, RADIO.subcarriers), complex)
+    return Look(RADIO, A, data, data, RADIO.times_s, 1.0, cell / (64 * 120e3))
+
+
+def chosen(changes, cells, cell=20.0, seed=1):
+    return detector.choose(
+        detector.DEFAULTS | {"training": 8} | changes, None, cells, look_at(cell), stream(seed, "detector")
+    )
+
+
+def crossing(cells_a_symbol=0.02, level=30.0):
+    """Range cells (200, 64) of noise, a target that moves from cell 20 on, and a louder echo that stands at 40."""
+    place = 20 + cells_a_symbol * np.arange(200)
+    cells = normals(5, 200, 64)
+    cells[np.arange(200), np.rint(place).astype(int) % 64] += level
+    cells[:, 40] += 10 * level
+    return cells, np.rint(place).astype(np.int64) % 64
+
+
+@pytest.mark.parametrize("cells_a_symbol", [0.0, 0.04, -0.15])
+def test_a_track_from_the_aim_follows_its_target_past_louder_echoes_and_the_end_of_ranges(cells_a_symbol):
+    cells, place = crossing(cells_a_symbol)
+    for seed in range(5):
+        found = chosen({}, cells, seed=seed)
+        # A range error of a cell: the first symbols may lie outside the gate, and later ones do not.
+        assert (found == place)[20:].mean() > 0.97
+    assert (chosen({"start": "strongest"}, cells) == 40).all()
+
+
+def test_the_range_error_is_drawn_once_a_look_and_moves_the_gate():
+    quiet = np.zeros((200, 64), complex)
+    starts = np.array([chosen({"range_error_m": 15.0}, quiet, seed=seed)[0] for seed in range(300)])
+    assert np.std(starts - 20) == pytest.approx(15.0 / RADIO.cell_m, rel=0.15)
+    assert (chosen({"range_error_m": 0.0}, quiet) == 20).all()
+
+
+def test_symbols_without_a_detection_take_the_predicted_cell():
+    cells, place = crossing(0.05)
+    cells[120:140] = normals(6, 20, 64)
+    found = chosen({"range_error_m": 0.0, "false_alarm": 1e-6}, cells)
+    assert abs(found - place)[120:140].max() <= 1 and (found == place)[140:].mean() > 0.95
+
+
+@pytest.mark.parametrize("cfar", ["ca", "os"])
+def test_noise_exceeds_the_threshold_as_often_as_asked(cfar):
+    settings = detector.DEFAULTS | {"cfar": cfar, "false_alarm": 0.01}
+    power = abs(normals(7, 1000, 64)) ** 2
+    assert detector.exceeds(settings, power).mean() == pytest.approx(0.01, rel=0.15)
+
+
+@pytest.mark.parametrize("cfar", ["ca", "os"])
+def test_a_threshold_is_that_of_the_cells_about_it_as_sorted_one_by_one(cfar):
+    settings = detector.DEFAULTS | {"cfar": cfar, "guard": 1, "training": 4, "rank": 0.75, "false_alarm": 0.1}
+    power = abs(normals(8, 6, 64)) ** 2
+    scale = detector.factor(cfar, 8, 6, 0.1)
+    for n, m in np.ndindex(power.shape):
+        about = [power[n, (m + side * k) % 64] for side in (-1, 1) for k in range(2, 6)]
+        noise = np.mean(about) if cfar == "ca" else sorted(about)[5]
+        assert detector.exceeds(settings, power)[n, m] == (power[n, m] > scale * noise)
+
+
+def test_without_a_gate_the_strongest_detection_of_all_cells_is_taken():
+    cells, _ = crossing()
+    assert (chosen({"gate_cells": None}, cells) == 40).all()
+    cells[50:60] = 0.0
+    assert (chosen({"gate_cells": None}, cells) == 40).all()
+
+
+def test_a_gate_or_training_cells_round_all_ranges_are_refused():
+    scene = CheckedScene(RADIO, {}, ())
+    for changes, said in (({"gate_cells": 32}, "gate_cells"), ({"training": 40}, "training")):
+        with pytest.raises(InputError, match=said):
+            detector.check(detector.DEFAULTS | changes, scene)
+    with pytest.raises(InputError, match="spread_cells"):
+        cell_error.check(cell_error.DEFAULTS | {"spread_cells": 32}, scene)
+
+
+def test_wrong_cells_are_as_many_and_as_far_as_asked():
+    right = np.full(20_000, 3)
+    cells = np.zeros((20_000, 16))
+    settings = cell_error.DEFAULTS | {"probability": 0.25, "spread_cells": 2}
+    off = (cell_error.choose(settings, right, cells, None, stream(1, "e")) - 3 + 8) % 16 - 8
+    share = np.array([(off == step).mean() for step in range(-3, 4)])
+    np.testing.assert_allclose(share, [0, 1 / 16, 1 / 16, 0.75, 1 / 16, 1 / 16, 0], atol=0.01)
+    settings["probability"] = 1.0
+    fixed = settings | {"mode": "fixed", "spread_cells": -4}
+    fixed = cell_error.choose(fixed, right, cells, None, stream(1, "e"))
+    assert (fixed == 15).all()
+    look = cell_error.choose(settings | {"hold": "look"}, right, cells, None, stream(1, "e"))
+    assert len(set(look)) == 1 and look[0] != 3
+
+
+@pytest.mark.parametrize("effect", [canceller, detector, cell_error])
+def test_the_schema_knows_every_setting(effect):
+    schema = yaml.safe_load(Path("workflow/schemas/config.schema.yaml").read_text())
+    known = schema["properties"]["effects"]["properties"][effect.__name__.rpartition(".")[2]]["properties"]
+    assert set(known) == set(effect.DEFAULTS)

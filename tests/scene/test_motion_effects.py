@@ -1,0 +1,101 @@
+"""Effects on motion: laws of the processes that move rotors and flying targets, read back out of what they draw."""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm, solve_continuous_lyapunov
+
+from lowalt.common.config import load
+from lowalt.common.streams import stream
+from lowalt.scene.effects.motion import flight, gusts, markov, rotor_spread
+from lowalt.targets.make import make
+from lowalt.targets.records import records_of
+
+TIMES_S = 2.5e-3 * np.arange(401)
+ROW = {"x_m": 100.0, "y_m": 50.0, "z_m": 60.0, "vx_mps": 6.0, "vy_mps": 2.0, "vz_mps": 0.0, "yaw_rad": 0.4, "rate_hz": 80.0}  # fmt: skip  # noqa: E501
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    config = load(["config/default.yaml"], "workflow/schemas/config.schema.yaml")
+    records = records_of(config["targets"], None)
+    return {name: make(records[name], None, 1) for name in ("DJI Mini 2", "EH 216 S", "Crow", "Audi A6L 2019")}
+
+
+@pytest.mark.parametrize("longitudinal", [True, False])
+def test_a_process_is_discretised_as_its_matrix_exponential_and_lyapunov_equation_say(longitudinal):
+    drift, noise, _ = gusts.process(300.0, longitudinal, 40.0, 12.0)
+    over_step = markov.steps(drift, noise)
+    np.testing.assert_allclose(over_step.transition, expm(drift), atol=1e-13)
+    settled = solve_continuous_lyapunov(drift, -np.outer(noise, noise))
+    size = np.sqrt(np.outer(np.diag(settled), np.diag(settled)))
+    found = markov.stationary(over_step)
+    np.testing.assert_allclose(found / size, settled / size, atol=1e-8)
+    # What is settled stays so over a step.
+    after = over_step.transition @ found @ over_step.transition.T + over_step.added
+    np.testing.assert_allclose(after / size, found / size, atol=1e-12)
+    root = markov.root_of(found)
+    np.testing.assert_allclose(root @ root.T / size, found / size, atol=1e-13)
+
+
+def test_rotors_turn_at_rates_of_their_own_that_wander_as_asked(clouds):
+    cloud = clouds["DJI Mini 2"]
+    settings = {"spread": 0.05, "wander": 0.0, "correlation_s": 1.5}
+    turns = [rotor_spread.perturb(settings, cloud, ROW, TIMES_S, stream(1, "r", k)).angle_rad for k in range(300)]
+    rates = np.array([[angle[-1] for angle in turn.values()] for turn in turns]) / (2 * np.pi * 80.0 * TIMES_S[-1])
+    assert rates.shape == (300, 4)
+    assert np.std(rates / cloud.rate_factors[cloud.parts_of("rotor")]) == pytest.approx(0.05, rel=0.1)
+    settings = {"spread": 0.0, "wander": 0.02, "correlation_s": 0.1}
+    turns = [rotor_spread.perturb(settings, cloud, ROW, TIMES_S, stream(1, "w", k)).angle_rad for k in range(300)]
+    ends = np.array([[angle[-1] for angle in turn.values()] for turn in turns]) / (2 * np.pi * 80.0)
+    # The integral of an Ornstein-Uhlenbeck process over T: 2 s^2 c^2 (T / c - 1 + exp(-T / c)).
+    truth = 0.02 * 0.1 * np.sqrt(2 * (10.0 - 1 + np.exp(-10.0)))
+    assert np.std(ends / cloud.rate_factors[cloud.parts_of("rotor")]) == pytest.approx(truth, rel=0.1)
+
+
+def blown(cloud, seed, **changes):
+    return gusts.perturb(gusts.DEFAULTS | changes, cloud, ROW, TIMES_S, stream(1, "gusts", seed))
+
+
+def test_a_small_drone_keeps_its_place_within_a_decimetre_and_leans_against_gusts(clouds):
+    drawn = [blown(clouds["DJI Mini 2"], seed) for seed in range(40)]
+    offset, tilt = np.stack([each.offset_m for each in drawn]), np.stack([each.tilt_rad for each in drawn])
+    assert not offset[:, 0].any() and 0.01 < np.std(offset[:, -1]) < 1.0
+    assert not tilt[..., 0].any() and 0.1 < np.degrees(np.std(tilt[..., 1:])) < 15
+    calm = blown(clouds["DJI Mini 2"], 0, wind_mps=2.0)
+    assert np.std(calm.tilt_rad) < np.std(tilt[0])
+
+
+def test_a_heavy_craft_is_moved_less_and_a_bird_does_not_pitch(clouds):
+    light, heavy = (
+        np.mean([np.std(blown(clouds[name], seed).tilt_rad) for seed in range(20)])
+        for name in ("DJI Mini 2", "EH 216 S")
+    )
+    assert heavy < light
+    bird = blown(clouds["Crow"], 0)
+    assert not bird.tilt_rad[:, :2].any() and bird.tilt_rad[:, 2].any()
+
+
+def test_what_stands_on_the_ground_is_not_moved(clouds):
+    for effect in (rotor_spread, gusts):
+        still = effect.perturb(effect.DEFAULTS, clouds["Audi A6L 2019"], ROW, TIMES_S, stream(1, "c"))
+        assert not still.angle_rad and still.offset_m is None and still.tilt_rad is None
+
+
+def test_turbulence_and_wind_are_those_of_the_standard():
+    """MIL-F-8785C, 3.7: at 1000 ft lengths of 1000 ft and equal intensities; at 20 ft the wind itself."""
+    scales, intensities = gusts.turbulence(304.8, 10.0)
+    np.testing.assert_allclose(scales, 304.8, rtol=1e-9)
+    np.testing.assert_allclose(intensities, 1.0, rtol=1e-9)
+    assert gusts.mean_wind_mps(20 * 0.3048, 7.7) == pytest.approx(7.7)
+    scales, intensities = gusts.turbulence(30.48, 10.0)
+    ratio = 0.177 + 0.000823 * 100
+    np.testing.assert_allclose(scales, [30.48 / ratio**1.2] * 2 + [30.48], rtol=1e-9)
+    np.testing.assert_allclose(intensities, [1 / ratio**0.4] * 2 + [1.0], rtol=1e-9)
+
+
+def test_masses_are_the_makers_and_grow_with_size(clouds):
+    assert flight.mass_kg(clouds["DJI Mini 2"]) == pytest.approx(0.249, rel=1e-9)
+    assert flight.mass_kg(clouds["EH 216 S"]) == pytest.approx(620.0, rel=1e-9)
+    assert 0.1 < flight.mass_kg(clouds["Crow"]) < 1.5
+    level, up = flight.response_s(clouds["Crow"], 10.0)
+    assert level > 10 * up

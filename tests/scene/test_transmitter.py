@@ -1,0 +1,109 @@
+"""What a station sends, and when: data, amplifier, combs of pilots, and symbols that are late or missing."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lowalt.common.errors import InputError
+from lowalt.common.streams import stream
+from lowalt.scene import lateness, waveform
+from lowalt.scene.checks import CheckedScene
+from lowalt.scene.effects.transmitter import comb_pilots, data_symbols, power_amplifier, slow_time
+from scenes import A, network
+
+
+@pytest.mark.parametrize(("order", "rise_db"), [(16, 2.76), (64, 4.29)])
+def test_qam_has_mean_power_one_and_raises_the_noise_of_weak_symbols(order, rise_db):
+    points = data_symbols.constellation(order)
+    assert len(set(points.round(9))) == order and np.mean(abs(points) ** 2) == pytest.approx(1.0)
+    assert 10 * np.log10(data_symbols.noise_rise(order)) == pytest.approx(rise_db, abs=0.01)
+    sent = data_symbols.data({"order": order}, 300, 32, stream(1, "q"))
+    assert np.mean(abs(sent) ** -2.0) == pytest.approx(data_symbols.noise_rise(order), rel=0.03)
+
+
+def test_an_amplifier_passes_weak_signals_and_never_exceeds_saturation():
+    small = 1e-4 * np.exp(2j * np.pi * np.linspace(0, 1, 9))
+    np.testing.assert_allclose(power_amplifier.rapp(small, 1.0, 2.0), small, rtol=1e-12)
+    for smoothness in (1.0, 2.0, 5.0):
+        loud = power_amplifier.rapp(np.array([1.0, 1j, 1e3]), 1.0, smoothness)
+        np.testing.assert_allclose(abs(loud[:2]), 2 ** (-0.5 / smoothness), rtol=1e-12)
+        assert abs(loud[2]) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_a_limiter_leaves_a_smaller_copy_of_the_data_and_distortion_as_bussgang_says():
+    sent = waveform.qpsk(stream(1, "d"), 40, 256)
+    aired = power_amplifier.aired({"backoff_db": 3.0, "smoothness": 60.0}, sent)
+    gain, distortion = power_amplifier.soft_limit(3.0)
+    copy = np.mean(aired * sent.conj())
+    assert copy == pytest.approx(gain, abs=0.01)
+    # A part of the distortion lies outside the band.
+    assert 0.5 * distortion < np.mean(abs(aired - copy * sent) ** 2) < distortion
+    np.testing.assert_allclose(power_amplifier.aired({"backoff_db": 60.0, "smoothness": 2.0}, sent), sent, atol=1e-5)
+
+
+def test_a_comb_folds_ranges_and_keeps_amplitude_and_phase():
+    for cell in (3, 5 + 8, 6 + 16):
+        response = np.exp(-2j * np.pi * np.arange(32) * cell / 32)[None]
+        whole = np.fft.ifft(response)[0]
+        cells = comb_pilots.range_cells({"spacing": 4, "offset": 1}, response)[0]
+        assert cells.shape == (8,) and abs(cells).argmax() == cell % 8
+        expected = whole[cell] * np.exp(-2j * np.pi * (cell - cell % 8) / 32)
+        assert cells[cell % 8] == pytest.approx(expected, abs=1e-12)
+
+
+def test_symbols_are_sent_in_the_downlink_and_late_by_no_more_than_the_jitter():
+    radio = network(symbols=400)
+    settings = slow_time.DEFAULTS | {"missing": 0.1, "jitter_s": 1e-4}
+    timing = slow_time.sampling(settings, radio, stream(1, "t"))
+    late = timing.times_s - radio.times_s
+    assert late.min() >= 0 and 0.9e-4 < late.max() < 1e-4
+    phase = np.arange(400) % 4
+    assert not timing.present[phase == 3].any() and timing.present[phase < 3].mean() == pytest.approx(0.9, abs=0.05)
+    fewest = slow_time.sampling(settings | {"missing": 1.0}, radio, stream(1, "t"))
+    assert np.flatnonzero(fewest.present).tolist() == [0, 1]
+
+
+def test_regridding_restores_a_line_as_far_as_its_kind_can():
+    radio = network(symbols=400)
+    timing = slow_time.sampling(slow_time.DEFAULTS | {"jitter_s": 2e-4}, radio, stream(1, "t"))
+
+    def regridded(kind, hz):
+        received = np.exp(2j * np.pi * hz * timing.times_s[timing.present])
+        return slow_time.regridded({"regrid": kind}, received, timing, radio)
+
+    truth = np.exp(2j * np.pi * 2.0 * radio.times_s)
+    assert abs(regridded("linear", 2.0) - truth)[:-1].max() < 0.01
+    assert abs(regridded("hold", 2.0) - truth).max() < 0.1
+    zero = regridded("zero", 2.0)
+    assert not zero[~timing.present].any() and abs(zero - truth)[timing.present].max() < 0.01
+    line = np.fft.fft(regridded("nudft", 190.0))
+    assert abs(line).argmax() == 190 and abs(line[190]) == pytest.approx(timing.present.sum(), rel=1e-9)
+
+
+def test_lateness_is_drawn_again_from_the_name_of_a_sample():
+    radio, row = network(), {"subtype": "Thing", "model": 3}
+    effects = {"slow_time": {"jitter_s": 1e-4}}
+    again = lateness.lateness({"times": "known"}, effects, radio, 5, row)
+    rng = stream(5, "effect", "slow_time", "Thing", 3, A.name)
+    own = slow_time.sampling(slow_time.DEFAULTS | effects["slow_time"], radio, rng)
+    np.testing.assert_allclose(again[0], (own.times_s - radio.times_s) / 2.5e-3, rtol=1e-12)
+    assert lateness.lateness({"times": "even"}, effects, radio, 5, row) is None
+    assert lateness.lateness({"times": "known"}, {}, radio, 5, row) is None
+
+
+@pytest.mark.parametrize(
+    ("effect", "changes", "said"),
+    [
+        (data_symbols, {"order": 32}, "order"),
+        (comb_pilots, {"spacing": 3}, "divisor"),
+        (comb_pilots, {"offset": 4}, "offset"),
+        (slow_time, {"jitter_s": 2.5e-3}, "jitter_s"),
+        (slow_time, {"downlink": 1e-6, "tdd_period_s": 1.0}, "downlink"),
+        (slow_time, {"regrid": "zero"}, "regrid"),
+    ],
+)
+def test_settings_that_no_station_can_have_are_refused_by_name(effect, changes, said):
+    levels = (3.0,) if said == "regrid" else (math.inf,)
+    with pytest.raises(InputError, match=said):
+        effect.check(effect.DEFAULTS | changes, CheckedScene(network(), {}, levels))
