@@ -11,7 +11,7 @@ from scipy.special import jv
 
 from lowalt.common.jit import INNER_VECTOR
 from lowalt.scene.phasor import phasor
-from lowalt.scene.response_loops import LOOPS, End
+from lowalt.scene.response_loops import CHUNK, LOOPS, End
 
 SYMBOLS = 100
 """Symbols that share a box."""
@@ -42,19 +42,18 @@ def gains(end: End, error: float) -> np.ndarray:
             values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
             _sums(end, first, grid[None], values)
             terms = values.reshape(-1, *counts)
-            for axis, count in enumerate(counts):
-                terms = np.moveaxis(np.tensordot(_coefficients(count), terms, (1, axis + 1)), 0, axis + 1)
-            # Terms that are small together are left out.
-            size = abs(terms).sum(axis=0)
-            order = np.argsort(size, axis=None)
-            small = order[np.cumsum(size.ravel()[order]) < error * np.prod(end.counts)]
-            kept = np.setdiff1d(np.arange(size.size), small)
-            if len(kept) == 0:
-                out[:] = 0.0
-                continue
-            powers = np.stack(np.unravel_index(kept, counts), axis=1)
-            chosen = np.ascontiguousarray(terms.reshape(len(terms), -1)[:, kept])
-            _polynomials(at, middle, half, np.array(counts), powers, chosen.real.copy(), chosen.imag.copy(), out)
+            for axis, count in enumerate(terms.shape):
+                terms = np.moveaxis(np.tensordot(_coefficients(count), terms, (1, axis)), 0, axis)
+            # Terms that are small together are left out; most have few orders in frequency.
+            order = np.argsort(abs(terms), axis=None)
+            kept = order[np.cumsum(abs(terms).ravel()[order]) > error * np.prod(end.counts)]
+            # Terms of the same place in the box stand together.
+            kept = kept[np.argsort(kept % np.prod(counts), kind="stable")]
+            powers = np.stack(np.unravel_index(kept, terms.shape), axis=1)
+            places = np.pi * (np.arange(len(terms)) + 0.5) / len(terms)
+            mix = np.cos(np.outer(places, np.arange(powers[:, 0].max(initial=0) + 1)))
+            chosen = terms.ravel()[kept]
+            _polynomials(at, (middle, half), counts, powers, chosen, mix, out)
     return result
 
 
@@ -134,7 +133,7 @@ def _sums(end, symbol, at, result):
 
 @INNER_VECTOR
 def _scaled(values, middle, half, table):
-    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half, (L,)."""
+    """Fill table (K, L) with the Chebyshev polynomials of (values - middle) / half; values: the first of the L."""
     for i in range(np.uint64(len(values))):
         table[0, i] = 1.0
     if len(table) > 1:
@@ -146,26 +145,43 @@ def _scaled(values, middle, half, table):
             new[i] = 2.0 * linear[i] * old[i] - older[i]
 
 
+@INNER_VECTOR
+def _add(share, values, result):
+    """Add share times values (L,) to result (L,)."""
+    for i in range(np.uint64(len(values))):
+        result[i] += share * values[i]
+
+
 @LOOPS
-def _polynomials(at, middle, half, counts, powers, real, imag, result):
-    """Fill result (K, Q, L) with sums of terms (Q, T), each times the polynomials of its powers (T, 3)."""
-    points = at.shape[2]
-    across, up, near = np.empty((counts[0], points)), np.empty((counts[1], points)), np.empty((counts[2], points))
-    re, im, term = np.empty((len(real), points)), np.empty((len(real), points)), np.empty(points)
+def _polynomials(at, box, counts, powers, terms, mix, result):
+    """Fill result (K, Q, L) with sums of terms (T,), each times the polynomials of its powers (T, 4).
+
+    Powers are those of frequency and of the directions; mix: (Q, K) values of the former at the frequencies.
+    """
+    count, (middle, half) = min(at.shape[2], CHUNK), box
+    across, up, near = np.empty((counts[0], count)), np.empty((counts[1], count)), np.empty((counts[2], count))
+    orders, term, sums = np.empty((mix.shape[1], 2, count)), np.empty(count), np.empty((2, count))
+    across[:], up[:], near[:] = 0.0, 0.0, 0.0
     for n in range(len(at)):
-        _scaled(at[n, 0], middle[0], half[0], across)
-        _scaled(at[n, 1], middle[1], half[1], up)
-        _scaled(at[n, 2], middle[2], half[2], near)
-        re[:], im[:] = 0.0, 0.0
-        for t in range(len(powers)):
-            one, two, three = across[powers[t, 0]], up[powers[t, 1]], near[powers[t, 2]]
-            for i in range(np.uint64(points)):
-                term[i] = one[i] * two[i] * three[i]
-            for q in range(len(real)):
-                a, b, row, column = real[q, t], imag[q, t], re[q], im[q]
-                for i in range(np.uint64(points)):
-                    row[i] += a * term[i]
-                    column[i] += b * term[i]
-        for q in range(len(real)):
-            for i in range(points):
-                result[n, q, i] = complex(re[q, i], im[q, i])
+        for first in range(0, at.shape[2], CHUNK):
+            last = min(first + CHUNK, at.shape[2])
+            _scaled(at[n, 0, first:last], middle[0], half[0], across)
+            _scaled(at[n, 1, first:last], middle[1], half[1], up)
+            _scaled(at[n, 2, first:last], middle[2], half[2], near)
+            orders[:] = 0.0
+            for t in range(len(terms)):
+                k, a, b, c = powers[t]
+                if t == 0 or a != powers[t - 1, 1] or b != powers[t - 1, 2] or c != powers[t - 1, 3]:
+                    one, two, three = across[a], up[b], near[c]
+                    for i in range(np.uint64(count)):
+                        term[i] = one[i] * two[i] * three[i]
+                _add(terms[t].real, term, orders[k, 0])
+                _add(terms[t].imag, term, orders[k, 1])
+            for q in range(len(mix)):
+                row, column = sums[0], sums[1]
+                row[:], column[:] = 0.0, 0.0
+                for k in range(mix.shape[1]):
+                    _add(mix[q, k], orders[k, 0], row)
+                    _add(mix[q, k], orders[k, 1], column)
+                for i in range(last - first):
+                    result[n, q, first + i] = complex(row[i], column[i])
