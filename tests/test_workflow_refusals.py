@@ -34,6 +34,7 @@ def test_sizes_of_motion_models_rise_and_stand_without_effects():
     )
     given["motion"]["sizes_m"]["Bird"] = [0.4, 0.1]
     assert_refused("Bird from 0.4 to 0.1 m", refusals.refuse_sizes, given)
+    assert_refused("expected some of the classes", refusals.refuse_sizes, {"motion": {"sizes_m": {"Boat": [1, 2]}}})
 
 
 def test_samples_made_on_the_spot_have_no_cache():
@@ -104,9 +105,11 @@ def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_
     refusals.refuse_no_files({"where_missing": "builtin"}, "folder")
 
 
-def test_flight_heights_are_of_subtypes_and_classes():
-    refusals.refuse_heights({"Crow": 1, "UAV": 2, "Glider": 3}, {"Crow": {}}, ("Glider",))
-    assert_refused(r"height_m: \['Kite'\]", refusals.refuse_heights, {"Crow": 1, "Kite": 2}, {"Crow": {}}, ("Glider",))
+def test_flight_heights_are_of_subtypes_and_classes_the_lower_first():
+    good = {"Crow": [1, 1], "UAV": [1, 2], "Glider": [3, 4]}
+    refusals.refuse_heights(good, {"Crow": {}}, ("Glider",))
+    for more, words in (({"Kite": [1, 2]}, r"height_m: \['Kite'\]"), ({"Crow": [2, 1]}, "Crow from 2 to 1 m")):
+        assert_refused(words, refusals.refuse_heights, good | more, {"Crow": {}}, ("Glider",))
 
 
 def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, monkeypatch):
