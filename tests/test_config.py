@@ -91,7 +91,14 @@ def test_a_missing_key_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("a: 1\na: 2\n", "stands twice"), ("- 1\n", "expected a mapping"), ("a: [\n", "not YAML")]
+    ("text", "words"),
+    [
+        ("a: 1\na: 2\n", "stands twice"),
+        ("- 1\n", "expected a mapping"),
+        ("a: [\n", "not YAML"),
+        ("a: \0", r"not YAML [^\n]*$"),
+        ("__use_yte__: true\n?print(1): 2\n", "run code in it, expected a plain"),
+    ],
 )
 def test_a_broken_file_is_refused(tmp_path, text, words):
     path = tmp_path / "config.yaml"
