@@ -55,13 +55,13 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
     assert not {"transfer", "echo_cost", "effects", "accuracy_cost", "measured"} & set(page)
-    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": "a.csv", "measured": "m.csv"},
+    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": "config/accuracy.csv", "measured": "config/schemes.csv"},
                             "recognition": {"transfer": ["other"]}})  # fmt: skip
     more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
     assert more == {
         "transfer": f"{base}/transfer.csv", "echo_cost": f"{base}/cost.csv", "echo_pixels": f"{base}/cost_pixels.csv",
-        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": "a.csv",
-        "effects_figure": f"{base}/effects.png", "measured": "m.csv",
+        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": "config/accuracy.csv",
+        "effects_figure": f"{base}/effects.png", "measured": "config/schemes.csv",
     }  # fmt: skip
 
 
@@ -171,9 +171,9 @@ def test_fresh_samples_are_made_only_where_asked_for_and_an_own_backbone_is_read
     for training, keys in (({"stream": 0}, []), ({"stream": 0.5}, ["stream", "clouds"])):
         _, products, _ = parts({"recognition": {"training": training}})
         assert list(products.training_samples(job)) == ["views", *keys]
-    own = {"network": {"backbone": "mine/net.py:made"}}
+    own = {"network": {"backbone": "docs/notebooks.py:made"}}
     _, products, _ = parts({"recognition": own})
-    assert products.training_samples(job)["backbone"] == "mine/net.py"
+    assert products.training_samples(job)["backbone"] == "docs/notebooks.py"
     run = run_of()
     run.config["recognition"]["training"].pop("stream", None)
     assert list(Products(run, EffectCalls(run)).training_samples(job)) == ["views"]

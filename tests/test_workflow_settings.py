@@ -150,7 +150,12 @@ def test_options_stand_only_where_their_input_does():
 
 
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
-    shown = {"cost": True, "effects": True, "accuracy": "a.csv", "published": "config/published_accuracy.csv"}
+    shown = {
+        "cost": True,
+        "effects": True,
+        "accuracy": "config/accuracy.csv",
+        "published": "config/published_accuracy.csv",
+    }
     for overlay, names in (
         ({"report": {"cost": False}}, set()),
         (
