@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import yaml
@@ -47,7 +48,7 @@ COUNTS = ("minProperties", "maxProperties")
 """Rules of a schema on the number of a block's keys."""
 
 
-def _expected(error: jsonschema.ValidationError) -> str:
+def _expected(error: Any) -> str:
     """Return the schema's expectation in words."""
     rule, wanted = error.validator, error.validator_value
     if rule == "oneOf":
@@ -90,7 +91,7 @@ def faults(config: dict, schema: dict) -> list[str]:
     return list(lines.values())
 
 
-def _fault(error: jsonschema.ValidationError) -> str:
+def _fault(error: Any) -> str:
     """Return what is wrong with a value and what was expected."""
     if error.validator == "additionalProperties":
         known = sorted(error.schema.get("properties", {}))
