@@ -66,6 +66,8 @@ def test_models_stay_in_their_ranges_and_streams_are_named():
         assert 30 <= drawn["z_m"] <= 150
         assert np.hypot(*(MASTS - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
         assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+    tilt_deg = np.degrees([[drawn["pitch_rad"], drawn["roll_rad"]] for drawn in rows])
+    assert (abs(tilt_deg).max(axis=0) > 19).all() and abs(tilt_deg).max() <= 20
     # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
     mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
     assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)

@@ -49,6 +49,15 @@ def signal(cloud: Cloud, network: Network = NETWORK, station: str = "A", **value
     return echo_signal(network, network.station(station), motion, cloud.rcs_m2, aim).signal
 
 
+def test_arrays_of_the_default_look_at_the_middle_and_sub_bands_follow_each_other():
+    middle = np.mean([station.position_m for station in NETWORK.stations], axis=0)
+    for number, station in enumerate(NETWORK.stations):
+        assert station.frequency_hz == 4.9e9 + number * (255 + 10) * 120e3
+        ahead = (middle - station.position_m) / np.linalg.norm(middle - station.position_m)
+        # The horizontal axis points to the left of where the array looks.
+        np.testing.assert_allclose(station.horizontal, np.cross([0, 0, 1], ahead), atol=1e-9)
+
+
 def fold(frequency_hz: float, rate_hz: float = 400.0) -> float:
     """The frequency a line of `frequency_hz` shows at when sampled at `rate_hz`."""
     return (frequency_hz + rate_hz / 2) % rate_hz - rate_hz / 2
