@@ -27,7 +27,6 @@ from lowalt.tiles import (
     triangle,
 )
 from lowalt.tiles.__main__ import main
-from lowalt.tiles.colour import colour_map, paint
 from lowalt.tiles.render import normalised
 from lowalt.tiles.scale import index, lookup
 from pictures import IMAGES, NETWORK, SCALES, SPECTRA, echoes, renderer
@@ -133,12 +132,6 @@ def test_orientation_of_axes():
     assert (images[6] == 0).all() and (images[8] == 128).all()
     np.testing.assert_array_equal(tile[:256, 256:512], images[1])
     np.testing.assert_array_equal(join(images, 3), tile)
-
-
-def test_weak_is_dark_violet_and_strong_is_yellow():
-    # The ends of viridis in red, green and blue (Smith and van der Walt 2015).
-    colours = paint(np.array([[0, 255]], np.uint8), colour_map("viridis"))
-    assert colours.tolist() == [[[68, 1, 84], [253, 231, 36]]]
 
 
 @pytest.mark.parametrize("scale", SCALES, ids=lambda s: f"{s.name}{s.floor_db:g}")
