@@ -107,7 +107,6 @@ def test_jobs_on_other_machines_need_no_memory_here_and_no_table_no_check(tmp_pa
 def test_planned_jobs_come_with_what_is_there_of_their_files_and_like_the_rule_that_was_measured(
     local, cores, tmp_path, monkeypatch, caplog
 ):
-    from snakemake.exceptions import WorkflowError
     from snakemake.logging import logger
 
     monkeypatch.setattr(logger, "propagate", True)
@@ -131,14 +130,14 @@ def test_planned_jobs_come_with_what_is_there_of_their_files_and_like_the_rule_t
         raise InputError("too much")
 
     monkeypatch.setattr(space_check, "check", refuse)
-    with pytest.raises(WorkflowError, match="too much"):
+    with pytest.raises(InputError, match="too much"):
         space_check.before(workflow, PLAN, CONFIG)
 
 
 def test_a_directory_that_cannot_be_written_tells_what_is_free_to_a_tenth_of_a_megabyte(tmp_path, monkeypatch):
     monkeypatch.setattr(space_check, "free_bytes", lambda folder: 10**12)
     with pytest.raises(InputError, match=r"No such file or directory, 1000000\.0 MB free"):
-        space_check.writable(tmp_path / "none")
+        space_check.writable(tmp_path / "none", "a")
 
 
 def test_a_working_directory_needs_room_for_sixty_four_kilobytes(tmp_path, monkeypatch):
@@ -152,7 +151,7 @@ def test_a_working_directory_needs_room_for_sixty_four_kilobytes(tmp_path, monke
             return None
 
     monkeypatch.setattr(space_check.tempfile, "TemporaryFile", lambda dir: File())
-    space_check.writable(tmp_path)
+    space_check.writable(tmp_path, "a")
     assert sizes == [65536]
 
 

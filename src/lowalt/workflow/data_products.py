@@ -85,10 +85,10 @@ class DataProducts:
         hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
         return self._of_group("occluders", wildcards) if hidden else []
 
-    def span(self, wildcards: Any) -> str:
-        """The part of a group's motion models that one chunk holds, as options of the stage."""
+    def span(self, wildcards: Any) -> list[str]:
+        """The part of a group's motion models that one chunk holds, as words of the stage's command line."""
         first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
-        return f"--first {first} --count {count}"
+        return ["--first", str(first), "--count", str(count)]
 
     def cost_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of the first subtype of each category, in the table's order."""
