@@ -169,7 +169,7 @@ def member(name, data=b"x", **more):
 )  # fmt: skip
 def test_members_of_a_recipe_that_leave_its_folder_are_refused(bad, tmp_path):
     path = tar_of(tmp_path / "a.tar", member("recipe.json", b"{}"), bad)
-    with pytest.raises(InputError, match=r"a.tar: (not a recipe|has members that are no plain files)"):
+    with pytest.raises(InputError, match=r"a.tar: member '.*(escaped|link|device|hard)' is no plain file of a recipe"):
         recipe.unpack(path, tmp_path / "deep/out")
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.tar"]
 

@@ -1,6 +1,7 @@
 """The real workflow on a tiny overlay: it runs, repeats to the byte, and re-runs only what a change touches."""
 
 import hashlib
+import json
 import os
 import re
 import shutil
@@ -29,11 +30,19 @@ pytestmark = pytest.mark.workflow
 ROOT = Path(__file__).parent.parent
 OVERLAY = {
     "run": "test",
-    "targets": {"select": ["DJI Mini 2", "Crow", "Walking Pedestrian 5"]},
-    "motion": {"models": 4, "models_per_chunk": 2},
-    "split": {"train": 1, "val": 1, "test": 0},
+    "targets": {"select": ["DJI Mini 2", "Crow", "NIO ET5T 2023", "Walking Pedestrian 5"]},
+    "motion": {"models": 6, "models_per_chunk": 3},
+    "split": {"train": 1, "val": 1, "test": 1},
     "noise": {"snr_db": [8, float("inf")]},
     "echo": {"job": "chunk"},
+}
+
+
+ODD = "o'brien läb $(touch y)"
+"""Name of a folder that a shell would take apart."""
+WHOLE = {
+    "recognition": {"schemes": ["A:VRP+TRP+VT"], "protocols": ["seen"], "training": {"steps": 2, "validate_every": 1}},
+    "report": {"cost": False},
 }
 
 
@@ -75,9 +84,21 @@ def checksums(folder: Path) -> dict[str, str]:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory) -> Path:
     """A workplace whose data set is made, on two cores."""
-    folder = workplace(tmp_path_factory.mktemp("two-cores"))
+    folder = workplace(tmp_path_factory.mktemp("two-cores") / ODD)
     snakemake(folder, "--", "data")
     return folder
+
+
+def test_the_whole_workflow_runs_in_a_folder_of_an_odd_name(finished, tmp_path):
+    folder = tmp_path / ODD
+    shutil.copytree(finished, folder)
+    (folder / "whole.yaml").write_text(yaml.safe_dump(WHOLE))
+    snakemake(folder, "--configfile", "overlay.yaml", "whole.yaml")
+    base = folder / "results/test"
+    manifest = json.loads((base / "report.json").read_text())
+    assert manifest["accuracy"] == "results/test/accuracy.csv" and (base / "accuracy.csv").is_file()
+    assert "A:VRP+TRP+VT" in (base / "report.html").read_text()
+    assert not [path for path in tmp_path.rglob("y") if path.name == "y"]
 
 
 def test_no_job_asks_for_the_network(finished):
@@ -187,7 +208,7 @@ def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(fini
         for row, one, other in zip(rows, before, after, strict=True):
             assert (one.tobytes() != other.tobytes()) == (row["category"] == "UAV")
             changed += row["category"] == "UAV"
-    assert changed == 2 < len(rows)
+    assert changed == 3 < len(rows)
 
 
 def test_declared_code_holds_every_module_the_jobs_really_imported(finished):

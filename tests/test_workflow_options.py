@@ -1,6 +1,7 @@
 """Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `lowalt.workflow.settings`)."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,6 +47,14 @@ def test_an_option_stands_where_the_job_has_its_input_and_is_empty_elsewhere(nam
     given, words = GIVEN[name]
     assert getattr(options, name)(None, Inputs(given)) == words
     assert getattr(options, name)(None, Inputs(dict.fromkeys(given, ""))) == []
+
+
+def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_commands():
+    text = "\n".join(path.read_text() for path in [Path("Snakefile"), *Path("workflow/rules").glob("*.smk")])
+    commands = "".join(re.findall(r"^    shell:\n((?:        .*\n)+)", text, re.MULTILINE))
+    fields = re.findall(r"(?<!\{)\{([^{}]+)\}(?!\})", commands)
+    assert len(fields) > 100 and {field for field in fields if not field.endswith(":q")} == {"threads"}
+    assert not re.findall(r"^    (?:script|run|notebook|wrapper|cwl):", text, re.MULTILINE)
 
 
 def test_samples_are_named_by_their_kind_with_the_heights_that_images_come_with():

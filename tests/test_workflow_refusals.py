@@ -127,3 +127,15 @@ def test_a_run_to_train_on_too_that_has_no_shards_is_named_with_what_makes_its_f
     for folder, target in (("views/24", "training_samples"), ("slow_time", "slow_times"), ("tracks", "tracks")):
         words = f"no results/other/shards; expected what the target `{target}` makes in the run 'other'"
         assert_refused(words, extra_runs.files, "other", folder)
+
+
+def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not():
+    config = {
+        "recognition": {"table": "my 'table'.csv"},
+        "report": dict.fromkeys(("published", "accuracy", "measured")),
+    }
+    refusals.refuse_braces(config, "in$(touch y)")
+    refusals.refuse_braces(config, None)
+    assert_refused(r"inputs: 'in\{x\}', expected a path without braces", refusals.refuse_braces, config, "in{x}")
+    config["report"]["accuracy"] = "a}.csv"
+    assert_refused(r"report\.accuracy: 'a\}\.csv'", refusals.refuse_braces, config, None)

@@ -23,6 +23,7 @@ from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
+    refuse_braces,
     refuse_data,
     refuse_extra,
     refuse_height,
@@ -58,6 +59,7 @@ class Run:
         Raises: InputError naming the key, its value and the expected one, or the missing files of the user.
         """
         check(config, schema)
+        refuse_braces(config, inputs)
         records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
         classes, plan = classes_of(published), Plan.of(config, published)
