@@ -184,9 +184,13 @@ def test_a_wrong_configuration_makes_no_run(overlay, words):
 def test_a_wrong_configuration_starts_no_job(tmp_path, finished):
     path = tmp_path / "wrong.yaml"
     path.write_text(yaml.safe_dump({"targets": {"select": ["Dodo"]}}))
-    text = snakemake(finished, "--configfile", "overlay.yaml", str(path), "--", "data", good=False)
-    assert "targets.select: ['Dodo']" in text
-    assert "rule " not in text
+    line = [sys.executable, "-m", "lowalt", "run", "overlay.yaml", str(path), "--target", "data"]
+    ran = subprocess.run(
+        line, cwd=finished, env=os.environ | {"PYTHONPATH": str(finished / "src")}, capture_output=True
+    )
+    sentence, rest = ran.stderr.decode().split("error: ")
+    assert ran.returncode == 2 and "\n" not in rest.strip() and sentence.count("\n") <= 1
+    assert rest.startswith("targets.select: ['Dodo'], expected names of the table")
 
 
 def test_a_scene_s_effect_changes_the_signals_it_is_about_and_no_other_byte(finished, tmp_path):

@@ -145,9 +145,8 @@ def test_companions_bring_their_clouds_once_and_strangers_are_refused():
     assert products.scene_clouds(CHUNK) == [*own, f"results/default/clouds/{slug(other)}.npz"]
     products, _ = scene({"companions": None})
     assert products.scene_clouds(CHUNK) == own
-    products, _ = scene({"companions": {"subtypes": ["Kite"]}})
     with pytest.raises(InputError, match=r"companions\.subtypes: \['Kite'\], expected subtypes of the run"):
-        products.scene_clouds(CHUNK)
+        run_of({"effects": {"companions": {"subtypes": ["Kite"]}}})
 
 
 def test_effects_that_do_not_fit_together_are_refused_and_so_are_links_without_a_direct_path():

@@ -3,6 +3,7 @@
 Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
 """
 
+from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
@@ -28,6 +29,13 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
+
+
+def refuse_companions(config: dict, subtypes: Collection[str]) -> None:
+    """Refuse companions that the run does not have."""
+    named = (config["effects"].get("companions") or {}).get("subtypes", [])
+    if unknown := sorted(set(named) - set(subtypes)):
+        raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
 
 
 def refuse_sizes(config: dict) -> None:

@@ -24,6 +24,7 @@ from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
     refuse_braces,
+    refuse_companions,
     refuse_data,
     refuse_extra,
     refuse_height,
@@ -88,6 +89,7 @@ class Run:
             from lowalt.effects.checks import check as check_effects
 
             check_effects(config)
+            refuse_companions(config, chosen)
         lacking = missing_inputs(chosen, inputs)
         refuse_no_files(config["targets"], inputs)
         if lacking:
