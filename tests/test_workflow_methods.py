@@ -135,14 +135,8 @@ def test_heights_of_another_run_come_from_its_own_tracks_shard_by_shard(overlay,
         assert found[key] == [f"results/invented/{kind}/seen-train-0000{part}.npz" for part in (0, 1)]
     assert list(products.samples(job)) == ["views", "tracks"]
     assert products.frozen(job)[1] == "results/invented/SHA256SUMS"
-    assert options.extra(None, Inputs(extra=["a", "b"], extra_tracks=["c", "d"])) == [
-        "--extra",
-        "a",
-        "b",
-        "--extra-tracks",
-        "c",
-        "d",
-    ]
+    more = {"extra": ["a"], "extra_tracks": ["c", "d"]}
+    assert options.extra(None, Inputs(more)) == ["--extra", "a", "--extra-tracks", "c", "d"]
 
 
 @pytest.mark.parametrize("name", ["invented", "track-invented", "methods"])

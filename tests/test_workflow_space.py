@@ -216,21 +216,6 @@ def test_a_working_directory_that_cannot_be_written_is_refused_by_name_and_reaso
         space_check.writable(small_disk, "a")
 
 
-@pytest.mark.parametrize("place", ["results", "results/a", "results/a/echo"])
-def test_a_folder_of_results_that_cannot_be_written_is_refused_by_name_and_others_are_not(
-    small_disk, tmp_path_factory, place
-):
-    tmp_path = tmp_path_factory.mktemp("large_disk")
-    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
-    (tmp_path / place).symlink_to(small_disk)
-    space_check.writable(tmp_path, "a")
-    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
-    with pytest.raises(InputError, match=rf"{small_disk}: cannot write into this folder \(Read-only file system"):
-        space_check.writable(tmp_path, "a")
-    if place != "results":
-        space_check.writable(tmp_path, "b")
-
-
 def test_results_on_a_disk_that_is_not_mounted_are_refused(tmp_path):
     (tmp_path / "results").symlink_to(tmp_path / "disk")
     with pytest.raises(InputError, match=rf"results: a link to {tmp_path}/disk, which is not there"):

@@ -1,6 +1,7 @@
 """What a run needs at the limits: what just fits is no fault, and jobs run together as far as the cores reach."""
 
 import json
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +10,13 @@ import yaml
 
 from lowalt.common.errors import InputError, SpaceError
 from lowalt.workflow import space, space_check, space_measured
-from test_workflow_space import CHUNK, CONFIG, FIGURES, PLAN
+from test_workflow_space import (
+    CHUNK,
+    CONFIG,
+    FIGURES,
+    PLAN,
+    small_disk,  # noqa: F401
+)
 
 
 def test_a_verdict_changes_where_more_is_needed_than_there_is_and_not_before():
@@ -185,3 +192,16 @@ def test_jobs_on_other_machines_share_this_one_s_disk_as_on_one_core_and_none_of
     monkeypatch.setenv(space_check.VARIABLE, "warn")
     (told,) = space_check.check([space.PlannedJob("noise", CHUNK)] * 5, PLAN, CONFIG, None, table, tmp_path)
     assert told.startswith("the run will write 2000000000.0 GB, ")
+
+
+@pytest.mark.parametrize("place", ["results", "results/a", "results/a/echo"])
+def test_a_folder_of_results_that_cannot_be_written_is_refused(small_disk, tmp_path_factory, place):  # noqa: F811
+    tmp_path = tmp_path_factory.mktemp("large_disk")
+    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / place).symlink_to(small_disk)
+    space_check.writable(tmp_path, "a")
+    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+    with pytest.raises(InputError, match=rf"{small_disk}: cannot write into this folder \(Read-only file system"):
+        space_check.writable(tmp_path, "a")
+    if place != "results":
+        space_check.writable(tmp_path, "b")

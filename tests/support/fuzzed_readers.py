@@ -170,29 +170,18 @@ def _arrays() -> list[Reader]:
     heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    surfaces = dict.fromkeys(occluders.ARRAYS, np.zeros((0, 3)))
+    surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
+    tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
     said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])
     return [
         Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud, seal=ARCHIVE),
-        Reader(
-            "occluders",
-            "a.npz",
-            _bytes(lambda p: occluders.write(p, surfaces, "a"), "a.npz"),
-            occluders.read,
-            seal=ARCHIVE,
-        ),
+        Reader("occluders", "a.npz", surfaces, occluders.read, seal=ARCHIVE),
         Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")}), seal=ARCHIVE),
         Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1)), seal=ARCHIVE),
         Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p)), seal=ARCHIVE),
         Reader("index", "index.json", _index(render), load_index, seal=INDEX),
-        Reader(
-            "tiles",
-            "a.npz",
-            _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"),
-            lambda p: [*_all(Tiles(p))],
-            seal=ARCHIVE,
-        ),
+        Reader("tiles", "a.npz", tiles, lambda p: _all(Tiles(p)), seal=ARCHIVE),
         Reader("image", "a.png", png, lambda p: decode(p.read_bytes()), seal=PNG),
         Reader("tile to predict", "a.png", tile, lambda p: images_of(p, render), seal=PNG),
         Reader("signals to predict", "a.npy", signals, lambda p: images_of(p, render)),
