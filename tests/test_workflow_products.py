@@ -87,10 +87,10 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
     base = "results/default"
     assert products.chunk_echoes(CHUNK) == [f"{base}/echo/seen-00001/{name}.npy" for name in "ABCD"]
     assert products.listening(CHUNK) == ["B"]
-    assert products.span(CHUNK) == "--first 50 --count 50"
+    assert products.span(CHUNK) == ["--first", "50", "--count", "50"]
     content = {"signals": f"{base}/noisy/seen-00001.npy", "tiles": f"{base}/tiles/seen-00001.npz"}
     assert products.shard_content(CHUNK) == content
-    assert options.content(None, content) == f"--signals {content['signals']} --tiles {content['tiles']}"
+    assert options.content(None, content) == ["--signals", content["signals"], "--tiles", content["tiles"]]
     clouds = products.group_clouds(CHUNK)
     assert len(clouds) == len(run.plan.groups["seen"]) and len(set(clouds)) == len(clouds)
     assert all(Path(path).stem in run.subtypes for path in clouds)
@@ -190,8 +190,8 @@ def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signal
     _, products, texts = parts({"shards": {"kind": "signal"}})
     assert products.reduced(SimpleNamespace(size="24")) == {}
     output = SimpleNamespace(reduced=["results/default/reduced/24/seen-00001.npy"])
-    assert options.reduced(None, output) == "--reduced 24=results/default/reduced/24/seen-00001.npy"
-    assert options.reduced(None, SimpleNamespace(reduced=[])) == ""
+    assert options.reduced(None, output) == ["--reduced", "24=results/default/reduced/24/seen-00001.npy"]
+    assert options.reduced(None, SimpleNamespace(reduced=[])) == []
 
 
 def test_training_reads_images_of_the_scheme_s_own_size():

@@ -1,8 +1,11 @@
 """Refusals: each contradiction is refused by its words, and the same configuration without it is taken."""
 
+import re
+
 import pytest
 import yaml
 
+from configured import run_of
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import Scheme
@@ -130,3 +133,33 @@ def test_a_run_to_train_on_too_that_has_no_shards_is_named_with_what_makes_its_f
     for folder, target in (("views/24", "training_samples"), ("slow_time", "slow_times"), ("tracks", "tracks")):
         words = f"no results/other/shards; expected what the target `{target}` makes in the run 'other'"
         assert_refused(words, extra_runs.files, "other", folder)
+
+
+def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not():
+    config = {
+        "recognition": {"table": "my 'table'.csv"},
+        "report": dict.fromkeys(("published", "accuracy", "measured")),
+    }
+    refusals.refuse_braces(config, "in$(touch y)")
+    refusals.refuse_braces(config, None)
+    assert_refused(r"inputs: 'in\{x\}', expected a path without braces", refusals.refuse_braces, config, "in{x}")
+    config["report"]["accuracy"] = "a}.csv"
+    assert_refused(r"report\.accuracy: 'a\}\.csv'", refusals.refuse_braces, config, None)
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"noise": {"snr_db": []}}, "noise.snr_db: value [], expected at least 1 item(s)"),
+        ({"targets": {"select": ["Dodo"]}}, "targets.select: ['Dodo']"),
+        ({"network": {"carrier_hz": 4.9}}, "network.carrier_hz: value 4.9"),
+        ({"network": {"symbols": 256}}, "256"),
+        ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
+        ({"recogniton": {}}, "unknown key(s) ['recogniton']"),
+        ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
+        ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
+    ],
+)
+def test_a_wrong_configuration_makes_no_run(overlay, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        run_of(overlay)

@@ -3,12 +3,13 @@
 Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
 """
 
+from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
-from lowalt.common.shipped import as_named, located
+from lowalt.common.shipped import SHIPPED, as_named, located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import Scheme
@@ -18,6 +19,23 @@ from lowalt.targets.records import missing_inputs, records_of
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 """Blocks of the configuration that may differ between a run and the run whose data set it trains on."""
+
+
+def refuse_braces(config: dict, inputs: str | None) -> None:
+    """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
+    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"))
+    paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
+    paths |= {f"{block}.{key}": config[block][key] for block, key in keys}
+    for name, path in paths.items():
+        if path and {"{", "}"} & {*path}:
+            raise InputError(f"{name}: {path!r}, expected a path without braces")
+
+
+def refuse_companions(config: dict, subtypes: Collection[str]) -> None:
+    """Refuse companions that the run does not have."""
+    named = (config["effects"].get("companions") or {}).get("subtypes", [])
+    if unknown := sorted(set(named) - set(subtypes)):
+        raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
 
 
 def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:

@@ -22,6 +22,8 @@ from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
+    refuse_braces,
+    refuse_companions,
     refuse_data,
     refuse_extra,
     refuse_height,
@@ -59,6 +61,7 @@ class Run:
         Raises: InputError naming the key, its value and the expected one, or the missing files of the user.
         """
         check(config, schema)
+        refuse_braces(config, inputs)
         records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
         classes, plan = classes_of(published), Plan.of(config, published)
@@ -86,6 +89,7 @@ class Run:
             from lowalt.effects.checks import check as check_effects
 
             check_effects(config)
+            refuse_companions(config, chosen)
         lacking = missing_inputs(chosen, inputs)
         refuse_no_files(config["targets"], inputs)
         if lacking:
