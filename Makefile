@@ -20,7 +20,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest kept-numbers help
+.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -89,13 +89,13 @@ data: $(BASE)  ## the default's data set only, no training
 	$(SNAKEMAKE) -- data
 
 real: $(SETUP)  ## real meshes and recordings: make real INPUTS=folder
-	LOWALT_INPUTS=$(INPUTS) $(SNAKEMAKE) --configfile config/real.yaml
+	LOWALT_INPUTS="$$INPUTS" $(SNAKEMAKE) --configfile config/real.yaml
 
 # Twice gives equal bytes. Of the recordings only those of vehicles have a licence, so only their picture is kept in git.
 measured: $(SETUP)  ## recordings held against their radars' twins: make measured INPUTS=folder of the measured sets
-	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs $(INPUTS) --out results/measured || exit 1; done
-	$(BIN)/python -m lowalt.recordings recognise --inputs $(INPUTS) --out results/measured --models results/measured/models
-	$(BIN)/python -m lowalt.recordings ablate --inputs $(INPUTS) --out results/measured --models results/measured/models/ablation
+	for step in pairs compare; do $(BIN)/python -m lowalt.recordings $$step --inputs "$$INPUTS" --out results/measured || exit 1; done
+	$(BIN)/python -m lowalt.recordings recognise --inputs "$$INPUTS" --out results/measured --models results/measured/models
+	$(BIN)/python -m lowalt.recordings ablate --inputs "$$INPUTS" --out results/measured --models results/measured/models/ablation
 	$(BIN)/python -m lowalt.report.measured --pairs results/measured --tables results/measured --page results/measured/report.html
 	cp results/measured/measured-*.csv results/reference/
 	for pair in measured-vehicle.png:results/reference/ measured-short.png:design/pictures/measured.png; do \
@@ -113,9 +113,6 @@ test-slow: $(TESTING)  ## the slow checks
 # One process a reader; some ten minutes.
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
-
-kept-numbers: $(TESTING)  ## what functions of the echo and of the effects return in small scenes, kept again: tests/data/kept_numbers.csv
-	PYTHONPATH=tests/support:src $(BIN)/python -m kept_numbers
 
 # At the lowest priority; the same command goes on where the last one stopped: make mutants MINUTES=45
 MUTANTS ?= 25

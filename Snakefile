@@ -27,8 +27,9 @@ include: "workflow/rules/report.smk"
 
 onstart:
     print(RUN.sources, file=sys.stderr)
-    RUN.launch.before(workflow)
-    space_check.before(workflow, RUN.plan, config)
+    with refusing():
+        RUN.launch.before(workflow)
+        space_check.before(workflow, RUN.plan, config)
 
 
 onerror:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 import torch
 
+from craft import craft
+from fuzzed_seals import ARCHIVE, PNG
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
@@ -16,10 +18,14 @@ from lowalt.recognition import checkpoint, schemes
 from lowalt.recognition.one_sample import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
+from lowalt.shards.table import SAMPLE, map_samples
+from lowalt.shards.table import write as write_table
+from lowalt.targets.cloud import read as read_cloud
+from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import load_table
 from lowalt.tiles.files import Tiles
 from lowalt.tiles.files import write as write_tiles
-from lowalt.tiles.png import encode
+from lowalt.tiles.png import SIGNATURE, decode, encode
 
 
 def encoded(height: int, width: int) -> bytes:
@@ -102,3 +108,46 @@ def test_what_is_no_sample_is_refused_by_its_file(name, content, expected, tmp_p
     config = load_yaml("config/default.yaml")
     with pytest.raises(InputError, match=f"{path}: .*{expected}"):
         images_of(path, {key: config[key] for key in ("network", "spectra", "images")})
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "expected"),
+    [
+        ("points", b"no array at all", "the magic string is not correct"),
+        ("record", np.array([4294967295], "u4").view("U1"), "its text has the code 4294967295, which is no character"),
+        ("points", np.full((20, 3), 1e300), "points has a coordinate that is no number within 1000 m"),
+        ("points", np.full((20, 3), "a"), "points has values of type <U1, expected numbers"),
+        ("part", np.zeros(20), "part has values of type float64, expected numbers"),
+        ("rcs_m2", np.full(20, 1e300), "rcs_m2 has a value that is no number from 0 to 1e[+]09 m2"),
+    ],
+    ids=["bytes", "no character", "far", "text", "parts by halves", "huge"],
+)  # fmt: skip
+def test_a_cloud_of_what_are_no_numbers_or_none_that_a_target_has_is_refused(name, content, expected, tmp_path):
+    path = tmp_path / "a.npz"
+    write_cloud(path, craft())
+    parts = ARCHIVE.opened(path.read_bytes())
+    if isinstance(content, np.ndarray):
+        np.save(tmp_path / "a.npy", content)
+        content = (tmp_path / "a.npy").read_bytes()
+    path.write_bytes(ARCHIVE.closed(parts | {f"{name}.npy": content}))
+    with pytest.raises(InputError, match=rf"a\.npz: .*{expected}"):
+        read_cloud(path)
+
+
+@pytest.mark.parametrize("count", [7, 10**15, -1])
+def test_a_table_that_says_it_is_longer_than_its_file_is_refused(count, tmp_path):
+    path = tmp_path / "a.npz"
+    write_table(path, {}, np.zeros(6, SAMPLE))
+    assert len(map_samples(path)) == 6
+    path.write_bytes(path.read_bytes().replace(b"'shape': (6,)", f"'shape': ({count},)".encode()))
+    with pytest.raises(InputError, match=r"a\.npz: no array samples\.npy"):
+        map_samples(path)
+
+
+def test_an_interlaced_image_without_its_pixels_is_refused():
+    parts = PNG.opened(encoded(24, 24))
+    name = next(iter(parts))
+    cut = PNG.closed(parts | {name: parts[name][:12] + b"\1", "2 IDAT": b""})
+    assert cut.startswith(SIGNATURE)
+    with pytest.raises(InputError, match="image: "):
+        decode(cut)

@@ -1,6 +1,7 @@
 """Answers of `lowalt --json`: valid JSON with the keys that the reference names, and the plain command's status."""
 
 import json
+import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,13 +16,14 @@ from lowalt.commands.for_programs import as_json
 from lowalt.common.config import load, plain
 from lowalt.common.files import replacing
 from lowalt.report.figures import inspection, target
+from lowalt.shards.dataset import Dataset, Place
 from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
 from test_targets_own import craft
 
 ROOT = Path(__file__).parents[1]
-SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
 PAGE = (ROOT / "docs/reference/json.md").read_text()
 STATION = {"method", "decisions", "rms_change", "other_cells"}
 STATIC = ("settings", "stages", "method")
@@ -78,11 +80,34 @@ def test_explain_answers_with_the_facts_of_its_text(answer, capsys, tmp_path):
 
 
 def test_explain_answers_for_a_link_with_its_geometry(answer):
-    found, _ = answer("explain", "config/scenes/links.yaml", "--station", "A-B", "--sample", "Crow:3", "--no-cost")
+    scene = ("explain", "config/scenes/links.yaml", "--sample", "Crow:3", "--no-cost", "--station")
+    found, _ = answer(*scene, "A-B")
     (sample,) = found["samples"]
     assert found["time"] is None and not set(sample) & STATION
+    out, back, angle = (sample["link"][name] for name in ("out_m", "back_m", "bistatic_rad"))
     assert set(sample["link"]) == {"out_m", "back_m", "bistatic_rad"}
-    assert sample["range_m"] == pytest.approx((sample["link"]["out_m"] + sample["link"]["back_m"]) / 2)
+    assert sample["range_m"] == pytest.approx((out + back) / 2)
+    assert [answer(*scene, name)[0]["samples"][0]["range_m"] for name in "AB"] == pytest.approx([out, back])
+    masts = load([CONFIG, ROOT / "config/scenes/links.yaml"], SCHEMA)["network"]["stations"]
+    apart = math.dist(masts["A"]["position_m"], masts["B"]["position_m"])
+    assert out**2 + back**2 - 2 * out * back * math.cos(angle) == pytest.approx(apart**2)
+
+
+def test_explain_says_how_far_effects_change_the_signals_of_the_data_set(answer, tmp_path):
+    """A wrong cell holds another value, so the symbols that change are those with another cell."""
+    plain_scene, overlay = tmp_path / "plain.yaml", tmp_path / "scene.yaml"
+    plain_scene.write_text("targets: {select: [Crow]}\nnetwork: {symbols: 32}\nspectra: {vrp: {window: 16}}\n")
+    overlay.write_text(plain_scene.read_text() + "effects: {cell_error: {probability: 0.4}}\n")
+    found, _ = answer("explain", str(overlay), "--sample", "Crow:3", "--no-cost")
+    (sample,) = found["samples"]
+    without, signal = (
+        Dataset(load([CONFIG, path], SCHEMA)).made_signal(Place("seen", "Crow", 3, math.inf))[0].astype(complex)
+        for path in (plain_scene, overlay)
+    )
+    assert 0.1 < sample["other_cells"] == (signal != without).mean() < 0.9
+    change = np.sqrt((abs(signal - without) ** 2).mean() / (abs(without) ** 2).mean())
+    # Signals of the data set are complex64.
+    assert sample["rms_change"] == pytest.approx(change, rel=1e-6)
 
 
 def test_spectra_answers_with_the_size_of_each(answer):

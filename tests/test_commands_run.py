@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from lowalt.commands import explain, target, workflow
+from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED
 
 
@@ -28,10 +29,27 @@ def test_outside_a_checkout_a_run_gets_the_package_s_configuration_and_profile(t
     line = workflow.command(given(configfile=[Path("mine.yaml")]))
     assert line == [*head, "--cores", "all", "--configfile", base, "mine.yaml"]
     # How many cores there are is the cluster's matter, unless it is said.
+    (tmp_path / "profiles/slurm").mkdir()
+    (tmp_path / "profiles/slurm/config.yaml").write_text("")
     cluster = given(profile=Path("profiles/slurm"))
     assert workflow.command(cluster) == [*head, "--workflow-profile", "profiles/slurm", "--configfile", base]
     cluster.cores = "4"
     assert workflow.command(cluster)[5:7] == ["--cores", "4"]
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"cores": "two"}, "--cores 'two', expected a whole number"),
+        ({"cores": "0"}, "--cores '0', expected a whole number"),
+        ({"profile": Path("profiles/slrum")}, "--profile profiles/slrum: no config.yaml there"),
+        ({"profile": Path("config/tiny.yaml")}, "--profile config/tiny.yaml: no config.yaml there"),
+        ({"overlay": [Path("none.yaml")]}, "no file at none.yaml"),
+    ],
+)
+def test_a_run_is_refused_before_snakemake_starts(changes, words):
+    with pytest.raises(InputError, match=words):
+        workflow.command(given(**changes))
 
 
 def test_a_sample_to_explain_is_a_subtype_and_a_number_and_a_unit_a_name_or_metres():

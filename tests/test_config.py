@@ -41,11 +41,46 @@ def test_every_shipped_configuration_is_valid(overlay):
         ({"echo": {"tolerance": 0}}, r"echo.tolerance: value 0, expected more than 0"),
         ({"echo": {"job": "all"}}, r"echo.job: value 'all', expected"),
         ({"run": "../x"}, r"run: value '../x', expected text like"),
+        ({"run": "reference"}, r"run: value 'reference', expected none of"),
+        ({"moton": {}}, r"^configuration refused: configuration: .*, expected perhaps \['motion'\]$"),
+        ({"effects": {"adcs": {}}}, r"expected perhaps \['adc'\]$"),
+        ({"effects": None}, r"effects: value None, expected type object"),
+        ({"motion": {"tilt_deg": math.nan}}, r"motion.tilt_deg: value 'nan', expected type number"),
+        ({"noise": {"snr_db": ["a", "b"]}}, r"refused: noise.snr_db.0: value 'a', expected number or inf$"),
+        ({"noise": {"snr_db": [500]}}, r"noise.snr_db.0: value 500, expected at most 300$"),
+        ({"network": {"stations": {1: {}}}}, r"key 1 among .*, expected text"),
+        (
+            {"network": {"stations": {"D": {"position_m": [1, 2, 3]}}}},
+            "[^\n]*expected position_m together with normal_deg$",
+        ),
     ],
 )
 def test_a_wrong_value_is_refused_by_key_value_and_expectation(overlay, words):
     with pytest.raises(InputError, match=words):
         check(merge(DEFAULT, overlay), SCHEMA)
+
+
+def test_a_null_takes_out_what_a_lower_layer_has_wherever_the_key_may_be_left_out():
+    layers = {"effects": {"adc": {"bits": 8}}, "recognition": {"processes": 3}, "targets": {"own": {"x": "x.yaml"}}}
+    nulls = {"effects": {"adc": None}, "recognition": {"processes": None}, "targets": {"own": {"x": None}},
+             "network": {"stations": {"C": None}}, "spectra": {"vt": None}, "echo": {"tolerance": None}}  # fmt: skip
+    found = check(merge(merge(copy.deepcopy(DEFAULT), layers), nulls), SCHEMA)
+    assert found["effects"] == found["targets"].pop("own") == {} and "processes" not in found["recognition"]
+    assert list(found["network"]["stations"]) == ["A", "B"] and list(found["spectra"]) == ["vrp", "trp"]
+    assert found["echo"] == DEFAULT["echo"]
+
+
+def test_a_number_is_a_number_however_it_is_written(tmp_path):
+    path = tmp_path / "overlay.yaml"
+    path.write_text(
+        "run: 1e5\nnetwork: {carrier_hz: 28e9, symbols: 4.0e+2, subcarriers: 256.0}\n"
+        "noise: {snr_db: [1e1, .inf]}\nmotion: {height_m: {UAV: [3e1, 150]}}\neffects: {cell_noise: {snr_db: 2e1}}\n"
+    )
+    found = load([ROOT / "config/default.yaml", path], SCHEMA)
+    network = found["network"]
+    assert [repr(network[key]) for key in ("carrier_hz", "symbols", "subcarriers")] == ["28000000000.0", "400", "256"]
+    assert found["noise"]["snr_db"] == [10.0, math.inf] and found["motion"]["height_m"]["UAV"] == [30.0, 150]
+    assert found["effects"] == {"cell_noise": {"snr_db": 20.0}} and found["run"] == "1e5"
 
 
 def test_a_missing_key_is_refused():
@@ -56,7 +91,14 @@ def test_a_missing_key_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("text", "words"), [("a: 1\na: 2\n", "stands twice"), ("- 1\n", "expected a mapping"), ("a: [\n", "not YAML")]
+    ("text", "words"),
+    [
+        ("a: 1\na: 2\n", "stands twice"),
+        ("- 1\n", "expected a mapping"),
+        ("a: [\n", "not YAML"),
+        ("a: \0", r"not YAML [^\n]*$"),
+        ("__use_yte__: true\n?print(1): 2\n", "run code in it, expected a plain"),
+    ],
 )
 def test_a_broken_file_is_refused(tmp_path, text, words):
     path = tmp_path / "config.yaml"

@@ -8,7 +8,7 @@ import pytest
 
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.effects.catalogue import called
 from lowalt.effects.channel import fluctuation, mean_cross_section
 from lowalt.effects.checks import CheckedScene
@@ -16,12 +16,14 @@ from lowalt.effects.explain import samples
 from lowalt.effects.interface import SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.effects.levels import levels
 from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
+from lowalt.motion.cross_section import mean_cross_section as over_aspects
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 from test_effects import network, target
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"
+WAVE_M = SPEED_OF_LIGHT / 4.9e9
 OWN = (SetsCrossSections, ShapesElements, WeighsPoints)
 """Protocols of the effects that act on the target's own echo on the direct path."""
 CAR_ROW = {"x_m": 100.0, "y_m": 0.0, "z_m": 0.5, "vx_mps": 0.0, "vy_mps": 0.0, "vz_mps": 0.0, "yaw_rad": 0.0,
@@ -37,15 +39,18 @@ def builtin():
     return {name: make(records[name], None, 1) for name in names}
 
 
+def section(cloud, settings=mean_cross_section.DEFAULTS):
+    """The cross sections (m2) that the effect gives a target's points, and the mean of all together (dBsm)."""
+    own = mean_cross_section.cross_sections(settings, cloud, WAVE_M)
+    return own, 10 * np.log10(over_aspects(replace(cloud, rcs_m2=own), WAVE_M))
+
+
 def scene(effects, radio=None):
     return Scene(radio or network(), 5, None, tuple(called(effects)))
 
 
 def test_a_target_has_the_mean_cross_section_of_its_class_and_size(builtin):
-    levels = {
-        name: 10 * np.log10(mean_cross_section.cross_sections(mean_cross_section.DEFAULTS, cloud).sum())
-        for name, cloud in builtin.items()
-    }
+    levels = {name: section(cloud)[1] for name, cloud in builtin.items()}
     assert levels["Audi A6L 2019"] == pytest.approx(11.25) and levels["Walking Pedestrian 1"] == pytest.approx(-1.37)
     assert levels["DJI Mavic 3 Pro"] == pytest.approx(-12.81, abs=3.0)
     assert levels["DJI Mini 2"] < levels["DJI Mavic 3 Pro"] < -5.85 < levels["EH 216 S"] < 3.0
@@ -57,17 +62,17 @@ def test_a_target_has_the_mean_cross_section_of_its_class_and_size(builtin):
 def test_a_body_of_one_point_has_no_size_and_is_refused():
     cloud, _ = target(np.random.default_rng(3), points=2)
     with pytest.raises(InputError, match="one point, which has no size"):
-        mean_cross_section.cross_sections(mean_cross_section.DEFAULTS, cloud)
-    assert mean_cross_section.cross_sections({"dbsm": {"Thing": 0.0}, "blades_db": -3.0}, cloud).sum() == 1.0
+        section(cloud)
+    assert section(cloud, {"dbsm": {"Thing": 0.0}, "blades_db": -3.0})[1] == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("blades_db", [-10.0, -20.0])
 def test_blades_lie_below_the_body_and_points_keep_their_ratios(builtin, blades_db):
     cloud = builtin["DJI Mini 2"]
     cloud = replace(cloud, rcs_m2=np.linspace(1.0, 2.0, len(cloud.points)))
-    own = mean_cross_section.cross_sections({"dbsm": {"DJI Mini 2": -10.0}, "blades_db": blades_db}, cloud)
+    own, mean = section(cloud, {"dbsm": {"DJI Mini 2": -10.0}, "blades_db": blades_db})
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
-    assert own.sum() == pytest.approx(0.1)
+    assert mean == pytest.approx(-10.0)
     assert own[blades].sum() / own[~blades].sum() == pytest.approx(10 ** (blades_db / 10))
     for group in (blades, ~blades):
         ratio = own[group] / cloud.rcs_m2[group]

@@ -223,5 +223,5 @@ def test_an_extra_run_of_the_same_seed_or_of_other_images_is_refused_and_a_good_
     class Input(dict):
         __getattr__ = dict.__getitem__
 
-    assert options.extra(job, Input(extra="a b")) == "--extra a b"
-    assert options.extra(job, Input()) == ""
+    assert options.extra(job, Input(extra=["a", "b"])) == ["--extra", "a", "b"]
+    assert options.extra(job, Input()) == []

@@ -5,14 +5,20 @@ import math
 import numpy as np
 import pytest
 
+from builtin_records import CONFIG, TABLE
+from lowalt.common.classes import AIRBORNE
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.motion import read_table, write_table
+from lowalt.motion import positions, read_table, write_table
+from lowalt.motion.rotations import attitude
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
+from lowalt.targets.records import load_records
 from moving_clouds import rigid_cloud, row
 
+KINDS = "uav", "bird", "vehicle", "pedestrian"
 MASTS = np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0127018922193]])
 MOTION = {
     "region": {"polygon_m": None, "mast_clearance_m": 10.0},
@@ -60,11 +66,32 @@ def test_models_stay_in_their_ranges_and_streams_are_named():
         assert 30 <= drawn["z_m"] <= 150
         assert np.hypot(*(MASTS - [drawn["x_m"], drawn["y_m"]]).T).min() >= 10
         assert 0 <= drawn["y_m"] <= min(math.sqrt(3) * drawn["x_m"], math.sqrt(3) * (500 - drawn["x_m"])) + 1e-9
+    tilt_deg = np.degrees([[drawn["pitch_rad"], drawn["roll_rad"]] for drawn in rows])
+    assert (abs(tilt_deg).max(axis=0) > 19).all() and abs(tilt_deg).max() <= 20
     # Uniform over the triangle: the mean sits at the centroid, within five standard errors.
     mean = np.mean([[drawn["x_m"], drawn["y_m"]] for drawn in rows], axis=0)
     assert np.abs(mean - corners.mean(axis=0)).max() < 5 * 125 / math.sqrt(300)
     again = draw(stream(7, "motion", "test", 4), cloud, ranges, MASTS, corners, MOTION)
     assert {k: v for k, v in again.items() if v == v} == {k: v for k, v in rows[4].items() if v == v}
+
+
+@pytest.mark.parametrize("name", [name for name, given in TABLE.items() if given["category"] not in AIRBORNE])
+def test_every_ground_target_moves_to_its_front_and_its_wheels_roll(name):
+    records = load_records(CONFIG / "targets.csv", [CONFIG / f"targets/{kind}.yaml" for kind in KINDS])
+    cloud, corners = make(records[name], None, 1), region_polygon(MASTS, None)
+    for index in range(4):
+        drawn = draw(stream(1, name, index), cloud, TABLE[name], MASTS, corners, MOTION)
+        velocity = np.array([drawn[f"v{axis}_mps"] for axis in "xyz"])
+        speed = float(np.linalg.norm(velocity))
+        assert TABLE[name]["speed_lo"] <= speed <= TABLE[name]["speed_hi"]
+        front = attitude(drawn["yaw_rad"], 0.0, 0.0) @ [0.0, 1.0, 0.0]
+        np.testing.assert_allclose(velocity, speed * front, atol=1e-12)
+        # A rolling wheel stands still on the road, and its top has twice the car's speed.
+        mine = np.isin(cloud.part, cloud.parts_of("wheel"))
+        before, now, after = positions(cloud, drawn | {"model": 0}, np.array([-1e-6, 0.0, 1e-6]))[:, mine]
+        along = (after - before) @ front / 2e-6
+        rad_per_m = 2.0 / cloud.record.get("wheel_diameter_m", 1.0)
+        np.testing.assert_allclose(along, speed * rad_per_m * now[:, 2], atol=1e-5 * speed)
 
 
 def test_two_stations_need_a_polygon():

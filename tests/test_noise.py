@@ -17,8 +17,8 @@ from moving_clouds import row
 
 
 def measured_snr_db(snr_db: float, scale: float = 1.0) -> float:
-    """SNR read back from a long tone with noise."""
-    signal = scale * np.exp(1j * np.arange(200_000))
+    """SNR read back from a long tone of changing strength with noise."""
+    signal = scale * np.exp(1j * np.arange(200_000)) * np.linspace(0.5, 2.0, 200_000)
     noise = add_noise(signal, snr_db, np.random.default_rng(3)) - signal
     return 10 * math.log10(np.mean(np.abs(signal) ** 2) / np.mean(np.abs(noise) ** 2))
 
@@ -107,6 +107,14 @@ def test_streams_do_not_depend_on_what_else_is_there():
     assert np.array_equal(full[1, 1, 2], some[0, 0, 0])
     assert np.array_equal(full[:, 2].transpose(1, 0, 2), echoes)
     assert not np.array_equal(full[0, 0], full[0, 1])
+
+
+def test_noise_of_models_snrs_and_stations_is_independent():
+    rows = [{"subtype": "crow", "model": model} for model in range(2)]
+    noise = noisy_signals(np.zeros((2, 2, 4000)), rows, ["A", "B"], [3.0, 8.0], seed=1, powers=np.ones((2, 2)))
+    draws = noise.reshape(8, 4000) / np.linalg.norm(noise.reshape(8, 4000), axis=1, keepdims=True)
+    # The correlation of 4000 independent pairs is 1 / sqrt(4000) = 0.016 rms.
+    assert abs(draws @ draws.conj().T - np.eye(8)).max() < 0.08
 
 
 def test_many_normals_drawn_at_once_are_those_drawn_few_at_a_time():

@@ -8,14 +8,21 @@ import pytest
 
 from lowalt.common.config import load_yaml
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.common.streams import stream
 from lowalt.echo import Rigid, echo_signal
-from lowalt.motion import poses
+from lowalt.motion import poses, positions
+from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
 from lowalt.spectra import Spectra, trp, vrp
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.make import make
+from lowalt.targets.records import load_records
+from lowalt.targets.skeleton import FEET
 
 NETWORK = Network.from_settings(load_yaml("config/default.yaml")["network"])
 NOTHING = np.full(3, np.nan)
+KINDS = "uav", "bird", "vehicle", "pedestrian"
+RECORDS = load_records("config/targets.csv", [f"config/targets/{name}.yaml" for name in KINDS])
 
 
 def spinning(kind: str, category: str, radius_m: float, blades: int, **record) -> Cloud:
@@ -40,6 +47,15 @@ def signal(cloud: Cloud, network: Network = NETWORK, station: str = "A", **value
     motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
     aim = np.array([row["x_m"], row["y_m"], row["z_m"]])
     return echo_signal(network, network.station(station), motion, cloud.rcs_m2, aim).signal
+
+
+def test_arrays_of_the_default_look_at_the_middle_and_sub_bands_follow_each_other():
+    middle = np.mean([station.position_m for station in NETWORK.stations], axis=0)
+    for number, station in enumerate(NETWORK.stations):
+        assert station.frequency_hz == 4.9e9 + number * (255 + 10) * 120e3
+        ahead = (middle - station.position_m) / np.linalg.norm(middle - station.position_m)
+        # The horizontal axis points to the left of where the array looks.
+        np.testing.assert_allclose(station.horizontal, np.cross([0, 0, 1], ahead), atol=1e-9)
 
 
 def fold(frequency_hz: float, rate_hz: float = 400.0) -> float:
@@ -110,6 +126,48 @@ def test_a_receding_target_has_negative_doppler_at_the_effective_carrier(speed):
     step = np.angle(found[1:] * found[:-1].conj())
     doppler_hz = np.median(step) / (2 * math.pi * 2.5e-3)
     assert doppler_hz == pytest.approx(-2 * speed * carrier / SPEED_OF_LIGHT, abs=1e-6)
+
+
+def doppler_hz(cloud: Cloud, row: dict, point: int, symbols: int) -> float:
+    """The mean Doppler of one point of a target, for a station 300 m ahead of it."""
+    front = np.array([-math.sin(row["yaw_rad"]), math.cos(row["yaw_rad"]), 0.0])
+    place = np.array([row["x_m"], row["y_m"], row["z_m"]]) + 300.0 * front
+    station = replace(NETWORK.station("A"), position_m=tuple(place))
+    network = replace(NETWORK, subcarriers=1, symbols=symbols, symbol_interval_s=1e-4, transmit=(1, 1), receive=(1, 1))
+    motion = Rigid(*poses(cloud, row, network.times_s), cloud.points, cloud.part)
+    own = (np.arange(len(cloud.points)) == point).astype(float)
+    found = echo_signal(replace(network, stations=(station,)), station, motion, own, place - 300.0 * front).signal
+    return float(np.angle(found[1:] * found[:-1].conj()).mean() / (2 * math.pi * 1e-4))
+
+
+@pytest.mark.parametrize("name", ["Audi A6L 2019", "Walking Pedestrian 1"])
+def test_a_ground_target_that_faces_the_station_approaches_and_the_top_of_its_wheels_is_faster(name):
+    cloud = make(RECORDS[name], None, 1)
+    corners = region_polygon(np.array([[0.0, 0.0], [500.0, 0.0], [250.0, 433.0]]), None)
+    settings = load_yaml("config/default.yaml")["motion"]
+    row = draw(stream(1, name), cloud, RECORDS[name]["published"], np.full((1, 2), -1e4), corners, settings)
+    row["model"] = 0
+    speed = math.hypot(row["vx_mps"], row["vy_mps"])
+    one_mps = 2 * NETWORK.station("A").frequency_hz / SPEED_OF_LIGHT
+    # Ten seconds of one point in the middle: a walker's root sways, but gets no farther.
+    assert doppler_hz(cloud, row, 0, 100_000) == pytest.approx(speed * one_mps, rel=0.02)
+    for wheel in cloud.parts_of("wheel"):
+        mine = np.flatnonzero(cloud.part == wheel)
+        height = positions(cloud, row, np.zeros(1))[0, mine, 2] / cloud.record["wheel_diameter_m"]
+        top, bottom = (doppler_hz(cloud, row, mine[at], 3) for at in (height.argmax(), height.argmin()))
+        assert top == pytest.approx(2 * speed * one_mps * height.max(), rel=0.05)
+        assert bottom < 0.5 * speed * one_mps < speed * one_mps < top
+
+
+def test_a_walkers_foot_on_the_ground_stays_there():
+    cloud = make(RECORDS["Walking Pedestrian 1"], None, 1)
+    speed = cloud.record["track_speed_mps"]
+    times = np.arange(400) * 2.5e-3
+    row = {"subtype": "test", "model": 0, **dict.fromkeys(NUMBERS, 0.0), "playback": 1.0, "vy_mps": speed}
+    feet = positions(cloud, row, times)[:, FEET]
+    lowest = feet[:-1, :, 2].argmin(axis=1)
+    along = np.take_along_axis(np.diff(feet[..., 1], axis=0), lowest[:, None], axis=1)[:, 0] / 2.5e-3
+    assert abs(np.median(along)) < 0.3 * speed
 
 
 def test_doppler_of_200_hz_sits_on_the_fold():

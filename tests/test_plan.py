@@ -54,6 +54,13 @@ def test_all_samples_stand_in_one_chunk_each_whatever_is_added(config, count):
         assert (chunk.members, chunk.first, chunk.count) == (source.members, source.first, source.count)
 
 
+def test_groups_are_the_table_s(config):
+    plan = Plan.of(config | {"added": STEPS}, PUBLISHED)
+    assert plan.groups == {"seen": ("a", "c", "e"), "unseen": ("b", "d", "f")}
+    for name in plan.chunks:
+        assert {PUBLISHED[member]["unseen_protocol"] for member in plan.chunk(name).members} == {name.split("-")[0]}
+
+
 def test_a_step_moves_no_chunk_that_was_there(config):
     plans = []
     for count in range(4):

@@ -164,6 +164,10 @@ def test_frozen_inputs_are_held_to_their_checksums(tmp_path):
         freeze.verify(sums)
     with pytest.raises(InputError, match="not below"):
         freeze.freeze([sys.executable], sums)
+    for name in (sys.executable, "../motion.csv", "clouds/../../motion.csv"):
+        sums.write_text(f"{'0' * 64}  {name}\n")
+        with pytest.raises(InputError, match=f"SHA256SUMS line 1: '{name}', expected a file below {tmp_path}"):
+            freeze.verify(sums)
 
 
 def test_a_file_of_predictions_is_scored_against_the_shards_alone(tmp_path, monkeypatch):

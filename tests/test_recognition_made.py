@@ -123,7 +123,7 @@ def test_the_configuration_names_the_source():
     _, products, _ = parts(overlay)
     found = products.samples(SimpleNamespace(scheme="a-vrp-trp-vt"))
     assert found["dataset"] == "results/default/config.yaml" and len(found["clouds"]) == len(found["surfaces"]) == 40
-    assert options.samples(None, Inputs(found)) == "--dataset results/default/config.yaml"
+    assert options.samples(None, Inputs(found)) == ["--dataset", "results/default/config.yaml"]
     with pytest.raises(InputError, match=r"recognition\.input"):
         parts({"recognition": {"input": "dataset"}})
 

@@ -47,7 +47,7 @@ def test_the_workflow_s_launcher_trains_to_the_bytes_of_plain_torchrun(views, tm
     table.write_text(",".join(schemes.COLUMNS) + "\nA:VRP,A,VRP,attention,,seen\n")
     line += ["--stations", "A", "B", "C", "--schemes", str(table), "--out"]
     trained([[*line, str(tmp_path / "plain")]], 2)
-    words = Launch.of({"processes": 2}).words.split()
+    words = Launch.of({"processes": 2}).words
     command = [sys.executable, "-m", *words, "lowalt.recognition", *line, str(tmp_path / "rule")]
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "GLOO_SOCKET_IFNAME": "lo"}
     run = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300)

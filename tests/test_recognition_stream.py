@@ -179,8 +179,8 @@ def test_the_configuration_asks_for_a_stream():
     assert found["stream"] == "results/default/config.yaml" and len(found["clouds"]) == 40
     assert found["views"] == plain["views"] and not {"stream", "clouds"} & set(plain)
     assert (
-        options.stream(None, Inputs({"stream": "c.yaml"})) == "--stream c.yaml"
-        and options.stream(None, Inputs({})) == ""
+        options.stream(None, Inputs({"stream": "c.yaml"})) == ["--stream", "c.yaml"]
+        and options.stream(None, Inputs({})) == []
     )
     with pytest.raises(InputError, match="stream"):
         recipe.check({**TRAINING, "stream": 1.5})

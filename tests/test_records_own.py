@@ -41,6 +41,12 @@ def test_one_record_with_its_row_adds_one_target(tmp_path):
     assert len(records_of(config["targets"])) == 40
 
 
+def test_a_craft_may_hover_and_a_car_stand():
+    still = dict.fromkeys(("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_lo", "speed_hi"), 0)
+    row = with_row(None, "mine", {"category": "UAV", **still}, "here")
+    assert {key: row[key] for key in still} == still
+
+
 def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row(tmp_path):
     crow = yaml.safe_load((ROOT / "config/targets/bird.yaml").read_text())["Crow"]
     own = records(tmp_path, {"Crow": {**crow, "points": 77, "row": {"freq_hi_hz": 6}}})
@@ -57,6 +63,7 @@ def test_a_single_record_replaces_that_of_its_subtype_alone_and_cells_of_its_row
         ({"colour": "red"}, "expected cells of the columns"),
         ([1], "expected cells of the columns"),
         ({"len_m": -1}, r"here: row: len_m is '-1', expected a positive number"),
+        ({"speed_lo": -1}, r"here: row: speed_lo is '-1', expected a number of at least 0"),
         ({"category": "Vehicle", "unseen_protocol": "both"}, "seen or unseen"),
         ({"len_m": 4}, "expected a category"),
     ],

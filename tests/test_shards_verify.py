@@ -8,8 +8,10 @@ import pytest
 
 from dataset import build, publish
 from lowalt.common.errors import InputError
+from lowalt.recognition.freeze import freeze
 from lowalt.shards import faults
 from lowalt.shards.__main__ import main
+from lowalt.shards.verify import frozen
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +110,20 @@ def test_exchanged_files_are_found(copy):
     one.write_bytes(before[1])
     other.write_bytes(before[0])
     assert {line.partition(":")[0] for line in lines(copy)} == {one.name, other.name}
+
+
+def test_clouds_and_motion_tables_of_the_run_are_held_to_the_checksums_that_froze_them(copy):
+    run, names = copy.parent, ("clouds/a.npz", "clouds/b.npz", "motion/seen-00000.csv")
+    for name in names:
+        (run / name).parent.mkdir(exist_ok=True)
+        (run / name).write_text(name)
+    assert lines(copy) == [] and frozen(copy / "index.json") == {}
+    freeze([run / name for name in names], run / "SHA256SUMS")
+    with (run / "SHA256SUMS").open("a") as file:
+        file.write(f"{'0' * 64}  elsewhere.tar\n{'0' * 64}  clouds/../../secret\n")
+    (run.parent / "secret").write_text("not read")
+    assert lines(copy) == ["../clouds/../../secret: missing"] and len(frozen(copy / "index.json")) == 4
+    (run / names[0]).write_text("other")
+    (run / names[2]).unlink()
+    assert lines(copy)[:-1] == [f"../{names[0]}: has changed since it was frozen in ../SHA256SUMS",
+                                f"../{names[2]}: missing"]  # fmt: skip

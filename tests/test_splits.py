@@ -15,6 +15,8 @@ def test_full_blocks_have_exact_shares():
     folds = [fold(SPLIT, 5, "Crow", model) for model in range(200)]
     assert [folds.count(name) for name in ("train", "val", "test")] == [160, 20, 20]
     assert [folds[:10].count(name) for name in ("train", "val", "test")] == [8, 1, 1]
+    unequal = [fold({**SPLIT, "val": 2, "test": 5}, 5, "Crow", model) for model in range(150)]
+    assert [unequal.count(name) for name in ("train", "val", "test")] == [80, 20, 50]
 
 
 def test_a_motion_model_never_leaks_and_the_papers_way_does():

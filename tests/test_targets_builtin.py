@@ -87,6 +87,8 @@ def test_cars_have_their_published_sizes_and_stand_on_the_ground(clouds, name):
     figure = RECORDS[name]["figures"]
     wheels = cloud.parts_of("wheel")
     assert len(wheels) == 4
+    axle = cloud.hinges[cloud.names.index("front left wheel"), 1]
+    assert row["len_m"] / 2 - axle == pytest.approx(figure["front_overhang"]["si"])
     base = np.ptp(cloud.hinges[wheels, 1])
     assert base == pytest.approx(figure["wheel_base"]["si"], rel=1e-12)
     assert np.ptp(cloud.hinges[wheels, 0]) == pytest.approx(figure["track"]["si"], rel=0.02)

@@ -138,3 +138,9 @@ def test_bytes_of_an_image_are_fixed():
     image = (np.add.outer(np.arange(64) ** 2, 3 * np.arange(96)) // 7 % 256).astype(np.uint8)
     image[20:40] = 9
     assert zlib.crc32(encode(image, colour_map("gray"))) == 4084249925
+
+
+def test_weak_is_dark_violet_and_strong_is_yellow():
+    # The ends of viridis in red, green and blue (Smith and van der Walt 2015).
+    colours = paint(np.array([[0, 255]], np.uint8), colour_map("viridis"))
+    assert colours.tolist() == [[[68, 1, 84], [253, 231, 36]]]

@@ -12,14 +12,13 @@ from lowalt.common.errors import InputError
 from lowalt.recognition import nodes
 from lowalt.workflow.launch import Launch
 
-WorkflowError = pytest.importorskip("snakemake.exceptions").WorkflowError
-
 
 def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_is_not():
-    assert run_of().launch == Launch(1, 1, False) and run_of().launch.words == ""
+    assert run_of().launch == Launch(1, 1, False) and run_of().launch.words == []
     assert Launch.of({}) == Launch(1, 1, False)
     launch = run_of({"recognition": {"processes": 4}}).launch
-    assert launch.words == "lowalt.recognition.gpus 4 torch.distributed.run --standalone --nproc-per-node 4 -m"
+    torchrun = ["torch.distributed.run", "--standalone", "--nproc-per-node", "4", "-m"]
+    assert launch.words == ["lowalt.recognition.gpus", "4", *torchrun]
     assert launch.training == {"gpu": 0} and launch.per_node == 4
     launch = run_of({"recognition": {"processes": 4, "gpu": True}}).launch
     assert (launch.training, launch.evaluation) == ({"gpu": 4}, {"gpu": 1})
@@ -29,7 +28,7 @@ def test_a_training_of_several_processes_is_launched_by_torchrun_and_one_of_one_
 
 def test_nodes_share_the_processes_evenly_and_ask_for_a_task_and_gpus_a_node():
     launch = run_of({"recognition": {"processes": 6, "nodes": 2}}).launch
-    assert (launch.words, launch.per_node) == ("lowalt.recognition.nodes 2 3", 3)
+    assert (launch.words, launch.per_node) == (["lowalt.recognition.nodes", "2", "3"], 3)
     tasks = {"nodes": 2, "tasks": 2, "mpi": "srun", "tasks_per_gpu": 0, "gpu": 0}
     assert (launch.training, launch.evaluation) == (tasks, {"gpu": 0})
     launch = Launch(6, 2, True)
@@ -44,7 +43,7 @@ def test_nodes_without_slurm_are_refused_before_the_first_job(monkeypatch):
     here, elsewhere = SimpleNamespace(local_exec=True), SimpleNamespace(local_exec=False)
     Launch(2, 1, False).before(here)
     Launch(2, 2, False).before(elsewhere)
-    with pytest.raises(WorkflowError, match=r"recognition\.nodes: 2, but .*--workflow-profile profiles/slurm"):
+    with pytest.raises(InputError, match=r"recognition\.nodes: 2, but .*--workflow-profile profiles/slurm"):
         Launch(2, 2, False).before(here)
     monkeypatch.setenv("SLURM_JOB_ID", "7")
     Launch(2, 2, False).before(here)

@@ -2,6 +2,7 @@
 
 import fcntl
 import os
+import re
 import signal
 from types import SimpleNamespace
 
@@ -62,9 +63,8 @@ def test_what_a_crash_left_of_a_lock_is_removed(left, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["1.output.lock"]
 
 
-def test_snakemake_s_lock_is_one_with_an_owner_for_the_length_of_its_block(tmp_path, monkeypatch):
+def test_snakemake_s_lock_is_one_with_an_owner_for_the_length_of_its_block(tmp_path, monkeypatch, capsys):
     persistence = pytest.importorskip("snakemake.persistence.file").FilePersistence
-    from snakemake.exceptions import WorkflowError
     from snakemake.logging import logger
 
     for name in ("lock", "lock_warn_only", "cleanup_locks"):
@@ -86,11 +86,13 @@ def test_snakemake_s_lock_is_one_with_an_owner_for_the_length_of_its_block(tmp_p
     with persistence.lock(kept):
         assert (folder / "0.input.lock").read_text() == "a\nb\n" and (folder / "0.output.lock").read_text() == "c\n"
         assert Owner.read(folder / "0.owner.json") == Owner.current() and os.environ[TOKEN] == Owner.current().token
-        with pytest.raises(WorkflowError, match=f"process {os.getpid()} of .* is running"), persistence.lock(kept):
+        with pytest.raises(SystemExit, match=r"^2$"), persistence.lock(kept):
             pytest.fail("two runs at once")
+        assert re.fullmatch(rf"error: .*process {os.getpid()} of .* is running.*\n", capsys.readouterr().err)
         with persistence.lock_warn_only(kept):
             assert f"process {os.getpid()}" in said[0]
     assert locks.numbers(folder) == []
     kept.path = tmp_path / "none"
-    with pytest.raises(WorkflowError, match="cannot write a lock"), persistence.lock(kept):
+    with pytest.raises(SystemExit, match=r"^2$"), persistence.lock(kept):
         pytest.fail("a lock in a folder that is not there")
+    assert "cannot write a lock" in capsys.readouterr().err

@@ -50,24 +50,24 @@ def test_a_training_reads_what_its_method_sees_from_the_data_set_s_own_run():
     }
     assert [list(files) for files in found.values()] == [["signals"], ["views"], ["signals"]]
     assert found["signal-cnn"]["signals"][0].startswith("results/default/slow_time/seen-train-")
-    assert options.samples(None, Inputs(signals="a b")) == "--signals a b"
+    assert options.samples(None, Inputs(signals=["a", "b"])) == ["--signals", "a", "b"]
     assert products.own_views(None)[0].startswith("results/mine/views/24/")
     # A run on another's data has no table of echoes at a tolerance; only a classical model is timed as trained.
-    assert products.fidelity(None) == [] and options.fidelity(None, Inputs(fidelity=[])) == ""
+    assert products.fidelity(None) == [] and options.fidelity(None, Inputs(fidelity=[])) == []
     assert products.timed_model(SimpleNamespace(run="mine", scheme="signal-cnn")) == []
     (model,) = products.timed_model(SimpleNamespace(run="mine", scheme="rbf-svm-on-features"))
     assert model == "results/mine/models/unseen/rbf-svm-on-features/0/model.pt"
-    assert options.timed_model(None, Inputs(model=model)) == f"--model {model}"
+    assert options.timed_model(None, Inputs(model=model)) == ["--model", model]
 
 
 def test_signals_come_from_the_noise_stage_where_shards_hold_images():
     job = SimpleNamespace(run="default", group="seen", part="00001", fold="train")
     _, products, settings = parts({"recognition": METHODS})
     assert products.noisy_chunk(job)["noisy"] == "results/default/noisy/seen-00001.npy"
-    assert options.noisy_chunk(job, Inputs(products.noisy_chunk(job))).startswith("--noisy results/default/noisy/")
+    assert options.noisy_chunk(job, Inputs(products.noisy_chunk(job)))[0] == "--noisy"
     assert "inf" in settings.slow_time(job)
     _, products, _ = parts({"recognition": METHODS, "shards": {"kind": "signal"}, "tiles": {"reduced": []}})
-    assert products.noisy_chunk(job) == {} and options.noisy_chunk(job, Inputs()) == ""
+    assert products.noisy_chunk(job) == {} and options.noisy_chunk(job, Inputs()) == []
 
 
 HEIGHT = {"table": "config/track.csv", "schemes": ["A:VRP+TRP+VT with height"]}
@@ -80,10 +80,10 @@ def test_tracks_are_read_by_schemes_with_the_cue_alone_from_the_data_set_s_own_r
     found = products.training_samples(job)
     assert list(found) == ["views", "tracks"] and len(found["tracks"]) == len(run.plan.shards)
     assert found["tracks"][0] == "results/default/tracks/seen-train-00000.npz"
-    assert options.samples(None, Inputs(views="a", tracks="b c")) == "--views a --tracks b c"
+    assert options.samples(None, Inputs(views="a", tracks=["b", "c"])) == ["--views", "a", "--tracks", "b", "c"]
     _, products, _ = parts({"recognition": HEIGHT | {"cache": False}})
     assert list(products.samples(job)) == ["index", "tracks"]
-    assert options.samples(None, Inputs(index="a", tracks="b c")) == "--index a --tracks b c"
+    assert options.samples(None, Inputs(index="a", tracks=["b", "c"])) == ["--index", "a", "--tracks", "b", "c"]
     _, products, _ = parts()
     assert list(products.samples(SimpleNamespace(run="default", scheme="a-vrp-trp-vt"))) == ["views"]
     assert products.tracks(None)[0] == "results/default/tracks/seen-train-00000.npz"
@@ -135,7 +135,8 @@ def test_heights_of_another_run_come_from_its_own_tracks_shard_by_shard(overlay,
         assert found[key] == [f"results/invented/{kind}/seen-train-0000{part}.npz" for part in (0, 1)]
     assert list(products.samples(job)) == ["views", "tracks"]
     assert products.frozen(job)[1] == "results/invented/SHA256SUMS"
-    assert options.extra(None, Inputs(extra="a b", extra_tracks="c d")) == "--extra a b --extra-tracks c d"
+    more = {"extra": ["a"], "extra_tracks": ["c", "d"]}
+    assert options.extra(None, Inputs(more)) == ["--extra", "a", "--extra-tracks", "c", "d"]
 
 
 @pytest.mark.parametrize("name", ["invented", "track-invented", "methods"])

@@ -1,6 +1,7 @@
 """Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `lowalt.workflow.settings`)."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,35 +27,43 @@ def checkout(monkeypatch):
 
 
 GIVEN = {
-    "occluders": ({"occluders": "a b"}, "--occluders a b"),
-    "powers": ({"powers": "a b"}, "--powers a b"),
-    "motion": ({"motion": "a"}, "--motion a"),
-    "content": ({"signals": "a", "echoes": "b c"}, "--signals a --echoes b c"),
-    "reduced_chunk": ({"reduced": "a", "motion": "b"}, "--reduced a --motion b"),
-    "extra": ({"extra": "a b"}, "--extra a b"),
-    "noisy_chunk": ({"noisy": "a", "motion": "b"}, "--noisy a --motion b"),
-    "timed_model": ({"model": "a"}, "--model a"),
-    "fidelity": ({"fidelity": "a"}, "--fidelity a"),
-    "stream": ({"stream": "a"}, "--stream a"),
-    "start": ({"start": "a"}, "--start a"),
+    "occluders": ({"occluders": ["a b", "c"]}, ["--occluders", "a b", "c"]),
+    "powers": ({"powers": ["a", "b"]}, ["--powers", "a", "b"]),
+    "motion": ({"motion": "a"}, ["--motion", "a"]),
+    "clouds": ({"clouds": ["a"]}, ["--clouds", "a"]),
+    "content": ({"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
+    "reduced_chunk": ({"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
+    "extra": ({"extra": ["a", "b"]}, ["--extra", "a", "b"]),
+    "noisy_chunk": ({"noisy": "a", "motion": "b"}, ["--noisy", "a", "--motion", "b"]),
+    "timed_model": ({"model": "a"}, ["--model", "a"]),
+    "fidelity": ({"fidelity": "a"}, ["--fidelity", "a"]),
+    "stream": ({"stream": "a"}, ["--stream", "a"]),
+    "start": ({"start": "a"}, ["--start", "a"]),
 }
 
 
 @pytest.mark.parametrize("name", GIVEN)
 def test_an_option_stands_where_the_job_has_its_input_and_is_empty_elsewhere(name):
-    given, text = GIVEN[name]
-    assert getattr(options, name)(None, Inputs(given)) == text
-    assert getattr(options, name)(None, Inputs(dict.fromkeys(given, ""))) == ""
+    given, words = GIVEN[name]
+    assert getattr(options, name)(None, Inputs(given)) == words
+    assert getattr(options, name)(None, Inputs(dict.fromkeys(given, ""))) == []
+
+
+def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_commands():
+    text = "\n".join(path.read_text() for path in [Path("Snakefile"), *Path("workflow/rules").glob("*.smk")])
+    commands = "".join(re.findall(r"^    shell:\n((?:        .*\n)+)", text, re.MULTILINE))
+    fields = re.findall(r"(?<!\{)\{([^{}]+)\}(?!\})", commands)
+    assert len(fields) > 100 and {field for field in fields if not field.endswith(":q")} == {"threads"}
+    assert not re.findall(r"^    (?:script|run|notebook|wrapper|cwl):", text, re.MULTILINE)
 
 
 def test_samples_are_named_by_their_kind_with_the_heights_that_images_come_with():
     every = {"dataset": "d", "signals": "s", "views": "v", "index": "i", "tracks": "t"}
-    for kind, text in (("dataset", "--dataset d"), ("signals", "--signals s"), ("views", "--views v --tracks t"),
-                       ("index", "--index i --tracks t")):  # fmt: skip
-        assert options.samples(None, Inputs(every)) == text
+    for kind, more in (("dataset", []), ("signals", []), ("views", ["--tracks", "t"]), ("index", ["--tracks", "t"])):
+        assert options.samples(None, Inputs(every)) == [f"--{kind}", every[kind], *more]
         del every[kind]
-    assert options.samples(None, Inputs(index="i")) == "--index i"
-    assert options.extra(None, Inputs(extra_tracks="t")) == ""
+    assert options.samples(None, Inputs(index="i")) == ["--index", "i"]
+    assert options.extra(None, Inputs(extra_tracks="t")) == []
 
 
 def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
@@ -136,9 +145,8 @@ def test_companions_bring_their_clouds_once_and_strangers_are_refused():
     assert products.scene_clouds(CHUNK) == [*own, f"results/default/clouds/{slug(other)}.npz"]
     products, _ = scene({"companions": None})
     assert products.scene_clouds(CHUNK) == own
-    products, _ = scene({"companions": {"subtypes": ["Kite"]}})
     with pytest.raises(InputError, match=r"companions\.subtypes: \['Kite'\], expected subtypes of the run"):
-        products.scene_clouds(CHUNK)
+        run_of({"effects": {"companions": {"subtypes": ["Kite"]}}})
 
 
 def test_effects_that_do_not_fit_together_are_refused_and_so_are_links_without_a_direct_path():

@@ -55,13 +55,14 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
     assert not {"transfer", "echo_cost", "effects", "accuracy_cost", "measured"} & set(page)
-    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": "a.csv", "measured": "m.csv"},
+    accuracy, measured = "config/accuracy.csv", "config/schemes.csv"
+    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": accuracy, "measured": measured},
                             "recognition": {"transfer": ["other"]}})  # fmt: skip
     more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
     assert more == {
         "transfer": f"{base}/transfer.csv", "echo_cost": f"{base}/cost.csv", "echo_pixels": f"{base}/cost_pixels.csv",
-        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": "a.csv",
-        "effects_figure": f"{base}/effects.png", "measured": "m.csv",
+        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": accuracy,
+        "effects_figure": f"{base}/effects.png", "measured": measured,
     }  # fmt: skip
 
 
@@ -86,10 +87,10 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
     base = "results/default"
     assert products.chunk_echoes(CHUNK) == [f"{base}/echo/seen-00001/{name}.npy" for name in "ABCD"]
     assert products.listening(CHUNK) == ["B"]
-    assert products.span(CHUNK) == "--first 50 --count 50"
+    assert products.span(CHUNK) == ["--first", "50", "--count", "50"]
     content = {"signals": f"{base}/noisy/seen-00001.npy", "tiles": f"{base}/tiles/seen-00001.npz"}
     assert products.shard_content(CHUNK) == content
-    assert options.content(None, content) == f"--signals {content['signals']} --tiles {content['tiles']}"
+    assert options.content(None, content) == ["--signals", content["signals"], "--tiles", content["tiles"]]
     clouds = products.group_clouds(CHUNK)
     assert len(clouds) == len(run.plan.groups["seen"]) and len(set(clouds)) == len(clouds)
     assert all(Path(path).stem in run.subtypes for path in clouds)
@@ -171,9 +172,9 @@ def test_fresh_samples_are_made_only_where_asked_for_and_an_own_backbone_is_read
     for training, keys in (({"stream": 0}, []), ({"stream": 0.5}, ["stream", "clouds"])):
         _, products, _ = parts({"recognition": {"training": training}})
         assert list(products.training_samples(job)) == ["views", *keys]
-    own = {"network": {"backbone": "mine/net.py:made"}}
+    own = {"network": {"backbone": "docs/notebooks.py:made"}}
     _, products, _ = parts({"recognition": own})
-    assert products.training_samples(job)["backbone"] == "mine/net.py"
+    assert products.training_samples(job)["backbone"] == "docs/notebooks.py"
     run = run_of()
     run.config["recognition"]["training"].pop("stream", None)
     assert list(Products(run, EffectCalls(run)).training_samples(job)) == ["views"]
@@ -189,8 +190,8 @@ def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signal
     _, products, texts = parts({"shards": {"kind": "signal"}})
     assert products.reduced(SimpleNamespace(size="24")) == {}
     output = SimpleNamespace(reduced=["results/default/reduced/24/seen-00001.npy"])
-    assert options.reduced(None, output) == "--reduced 24=results/default/reduced/24/seen-00001.npy"
-    assert options.reduced(None, SimpleNamespace(reduced=[])) == ""
+    assert options.reduced(None, output) == ["--reduced", "24=results/default/reduced/24/seen-00001.npy"]
+    assert options.reduced(None, SimpleNamespace(reduced=[])) == []
 
 
 def test_training_reads_images_of_the_scheme_s_own_size():

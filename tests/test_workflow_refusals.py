@@ -1,8 +1,11 @@
 """Refusals: each contradiction is refused by its words, and the same configuration without it is taken."""
 
+import re
+
 import pytest
 import yaml
 
+from configured import run_of
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
 from lowalt.recognition.schemes import Scheme
@@ -34,6 +37,7 @@ def test_sizes_of_motion_models_rise_and_stand_without_effects():
     )
     given["motion"]["sizes_m"]["Bird"] = [0.4, 0.1]
     assert_refused("Bird from 0.4 to 0.1 m", refusals.refuse_sizes, given)
+    assert_refused("expected some of the classes", refusals.refuse_sizes, {"motion": {"sizes_m": {"Boat": [1, 2]}}})
 
 
 def test_samples_made_on_the_spot_have_no_cache():
@@ -104,9 +108,11 @@ def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_
     refusals.refuse_no_files({"where_missing": "builtin"}, "folder")
 
 
-def test_flight_heights_are_of_subtypes_and_classes():
-    refusals.refuse_heights({"Crow": 1, "UAV": 2, "Glider": 3}, {"Crow": {}}, ("Glider",))
-    assert_refused(r"height_m: \['Kite'\]", refusals.refuse_heights, {"Crow": 1, "Kite": 2}, {"Crow": {}}, ("Glider",))
+def test_flight_heights_are_of_subtypes_and_classes_the_lower_first():
+    good = {"Crow": [1, 1], "UAV": [1, 2], "Glider": [3, 4]}
+    refusals.refuse_heights(good, {"Crow": {}}, ("Glider",))
+    for more, words in (({"Kite": [1, 2]}, r"height_m: \['Kite'\]"), ({"Crow": [2, 1]}, "Crow from 2 to 1 m")):
+        assert_refused(words, refusals.refuse_heights, good | more, {"Crow": {}}, ("Glider",))
 
 
 def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, monkeypatch):
@@ -127,3 +133,33 @@ def test_a_run_to_train_on_too_that_has_no_shards_is_named_with_what_makes_its_f
     for folder, target in (("views/24", "training_samples"), ("slow_time", "slow_times"), ("tracks", "tracks")):
         words = f"no results/other/shards; expected what the target `{target}` makes in the run 'other'"
         assert_refused(words, extra_runs.files, "other", folder)
+
+
+def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not():
+    config = {
+        "recognition": {"table": "my 'table'.csv"},
+        "report": dict.fromkeys(("published", "accuracy", "measured")),
+    }
+    refusals.refuse_braces(config, "in$(touch y)")
+    refusals.refuse_braces(config, None)
+    assert_refused(r"inputs: 'in\{x\}', expected a path without braces", refusals.refuse_braces, config, "in{x}")
+    config["report"]["accuracy"] = "a}.csv"
+    assert_refused(r"report\.accuracy: 'a\}\.csv'", refusals.refuse_braces, config, None)
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"noise": {"snr_db": []}}, "noise.snr_db: value [], expected at least 1 item(s)"),
+        ({"targets": {"select": ["Dodo"]}}, "targets.select: ['Dodo']"),
+        ({"network": {"carrier_hz": 4.9}}, "network.carrier_hz: value 4.9"),
+        ({"network": {"symbols": 256}}, "256"),
+        ({"targets": {"records": ["config/targets/none.yaml"]}}, "none.yaml"),
+        ({"recogniton": {}}, "unknown key(s) ['recogniton']"),
+        ({"effects": {"receiver_noise": {}}}, "a link budget or set SNRs, not both"),
+        ({"effects": {"ground_reflection": {"permittivity": 0.9}}}, "effects.ground_reflection"),
+    ],
+)
+def test_a_wrong_configuration_makes_no_run(overlay, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        run_of(overlay)

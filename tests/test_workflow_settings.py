@@ -7,14 +7,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from configured import Inputs, parts
+from configured import parts
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.effects.catalogue import PLACES
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
-from lowalt.workflow import options
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.settings import Settings
 from snakemake_texts import body
@@ -138,19 +137,13 @@ def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
         calls.named("nothing")
 
 
-def test_options_stand_only_where_their_input_does():
-    none = Inputs(occluders="", powers="", index="i")
-    every = Inputs(occluders="o", powers="p", views="v w", tiles="t")
-    found = {name: getattr(options, name) for name in ("occluders", "powers", "content")}
-    assert {name: build(CHUNK, none) for name, build in found.items()} == dict.fromkeys(found, "")
-    assert [build(CHUNK, every) for build in found.values()] == [
-        "--occluders o", "--powers p", "--tiles t --powers p",
-    ]  # fmt: skip
-    assert (options.samples(CHUNK, none), options.samples(CHUNK, every)) == ("--index i", "--views v w")
-
-
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
-    shown = {"cost": True, "effects": True, "accuracy": "a.csv", "published": "config/published_accuracy.csv"}
+    shown = {
+        "cost": True,
+        "effects": True,
+        "accuracy": "config/accuracy.csv",
+        "published": "config/published_accuracy.csv",
+    }
     for overlay, names in (
         ({"report": {"cost": False}}, set()),
         (

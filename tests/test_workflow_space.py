@@ -205,23 +205,23 @@ def test_a_full_disk_names_the_file_the_need_and_what_is_free(small_disk, name):
 
 
 def test_a_working_directory_that_cannot_be_written_is_refused_by_name_and_reason(small_disk):
-    space_check.writable(small_disk)
+    space_check.writable(small_disk, "a")
     assert list(small_disk.iterdir()) == []
     (small_disk / "other").write_bytes(bytes(2**21 - 2**15))
     with pytest.raises(InputError, match=rf"{small_disk}: .*No space left on device, 0\.0 MB free"):
-        space_check.writable(small_disk)
+        space_check.writable(small_disk, "a")
     (small_disk / "other").unlink()
     subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
     with pytest.raises(InputError, match="Read-only file system"):
-        space_check.writable(small_disk)
+        space_check.writable(small_disk, "a")
 
 
 def test_results_on_a_disk_that_is_not_mounted_are_refused(tmp_path):
     (tmp_path / "results").symlink_to(tmp_path / "disk")
     with pytest.raises(InputError, match=rf"results: a link to {tmp_path}/disk, which is not there"):
-        space_check.writable(tmp_path)
+        space_check.writable(tmp_path, "a")
     (tmp_path / "disk").mkdir()
-    space_check.writable(tmp_path)
+    space_check.writable(tmp_path, "a")
 
 
 def test_a_known_size_is_refused_before_anything_is_written(small_disk):

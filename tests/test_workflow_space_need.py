@@ -1,6 +1,7 @@
 """What a run needs at the limits: what just fits is no fault, and jobs run together as far as the cores reach."""
 
 import json
+import subprocess
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,7 +10,13 @@ import yaml
 
 from lowalt.common.errors import InputError, SpaceError
 from lowalt.workflow import space, space_check, space_measured
-from test_workflow_space import CHUNK, CONFIG, FIGURES, PLAN
+from test_workflow_space import (
+    CHUNK,
+    CONFIG,
+    FIGURES,
+    PLAN,
+    small_disk,  # noqa: F401
+)
 
 
 def test_a_verdict_changes_where_more_is_needed_than_there_is_and_not_before():
@@ -107,7 +114,6 @@ def test_jobs_on_other_machines_need_no_memory_here_and_no_table_no_check(tmp_pa
 def test_planned_jobs_come_with_what_is_there_of_their_files_and_like_the_rule_that_was_measured(
     local, cores, tmp_path, monkeypatch, caplog
 ):
-    from snakemake.exceptions import WorkflowError
     from snakemake.logging import logger
 
     monkeypatch.setattr(logger, "propagate", True)
@@ -131,14 +137,14 @@ def test_planned_jobs_come_with_what_is_there_of_their_files_and_like_the_rule_t
         raise InputError("too much")
 
     monkeypatch.setattr(space_check, "check", refuse)
-    with pytest.raises(WorkflowError, match="too much"):
+    with pytest.raises(InputError, match="too much"):
         space_check.before(workflow, PLAN, CONFIG)
 
 
 def test_a_directory_that_cannot_be_written_tells_what_is_free_to_a_tenth_of_a_megabyte(tmp_path, monkeypatch):
     monkeypatch.setattr(space_check, "free_bytes", lambda folder: 10**12)
     with pytest.raises(InputError, match=r"No such file or directory, 1000000\.0 MB free"):
-        space_check.writable(tmp_path / "none")
+        space_check.writable(tmp_path / "none", "a")
 
 
 def test_a_working_directory_needs_room_for_sixty_four_kilobytes(tmp_path, monkeypatch):
@@ -152,7 +158,7 @@ def test_a_working_directory_needs_room_for_sixty_four_kilobytes(tmp_path, monke
             return None
 
     monkeypatch.setattr(space_check.tempfile, "TemporaryFile", lambda dir: File())
-    space_check.writable(tmp_path)
+    space_check.writable(tmp_path, "a")
     assert sizes == [65536]
 
 
@@ -186,3 +192,16 @@ def test_jobs_on_other_machines_share_this_one_s_disk_as_on_one_core_and_none_of
     monkeypatch.setenv(space_check.VARIABLE, "warn")
     (told,) = space_check.check([space.PlannedJob("noise", CHUNK)] * 5, PLAN, CONFIG, None, table, tmp_path)
     assert told.startswith("the run will write 2000000000.0 GB, ")
+
+
+@pytest.mark.parametrize("place", ["results", "results/a", "results/a/echo"])
+def test_a_folder_of_results_that_cannot_be_written_is_refused(small_disk, tmp_path_factory, place):  # noqa: F811
+    tmp_path = tmp_path_factory.mktemp("large_disk")
+    (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
+    (tmp_path / place).symlink_to(small_disk)
+    space_check.writable(tmp_path, "a")
+    subprocess.run(["mount", "-o", "remount,ro", small_disk], check=True)
+    with pytest.raises(InputError, match=rf"{small_disk}: cannot write into this folder \(Read-only file system"):
+        space_check.writable(tmp_path, "a")
+    if place != "results":
+        space_check.writable(tmp_path, "b")

@@ -51,7 +51,7 @@ def test_a_started_training_reads_its_start_and_has_steps_of_its_own():
     assert json.loads(settings.training(three))["training"]["steps"] == 20
     assert settings.training(other) == before.training(other)
     assert settings.training(Job(run="default", scheme="a-vrp-trp-vt")) == before.training(Job(run="default"))
-    assert options.start(one, Inputs(start="a.pt")) == "--start a.pt" and options.start(one, Inputs()) == ""
+    assert options.start(one, Inputs(start="a.pt")) == ["--start", "a.pt"] and options.start(one, Inputs()) == []
 
 
 def test_an_overlay_that_trains_less_or_takes_a_start_out_has_none():

@@ -22,9 +22,6 @@ from xml.etree import ElementTree
 
 from coverage import CoverageData
 
-ROOM_WIDE = {"test_kept_numbers.py": ("echo", "effects")}
-"""Files of tests that hold all functions of some rooms, whatever modules their text names."""
-
 
 class Coverage(NamedTuple):
     """`lines[file][line]`: names of tests; `seconds[test]`: what a test took; files from the root of the repository."""
@@ -128,9 +125,8 @@ def _module(file: str) -> str:
 
 
 def naming(root: Path, names: list[str], file: str) -> set[str]:
-    """Files of tests among `names` whose text names the module of a source file, or else a module that imports it; all
-    where there are none. Those that hold the whole room are always among them."""
-    wide = {name for name in names if _room(file) in ROOM_WIDE.get(name, ())}
+    """Files of tests among `names` whose text names the module of a source file, or else a module that imports it;
+    all where there are none."""
     texts = {name: (root / "tests" / name).read_text(encoding="utf-8") for name in names}
     for files in ({file}, importers(root, file)):
         parts = [_module(each).removeprefix("lowalt.").rpartition(".") for each in files]
@@ -139,7 +135,7 @@ def naming(root: Path, names: list[str], file: str) -> set[str]:
                     for package, _, name in parts]  # fmt: skip
         found = {name for name, text in texts.items() if any(pattern.search(text) for pattern in patterns)}
         if found:
-            return found | wide
+            return found
     return set(names)
 
 
@@ -168,9 +164,9 @@ def _room(file: str) -> str:
 
 
 def _of_room(test: str, file: str) -> bool:
-    """Whether a file of tests is named after the room of `file`, tests/test_ROOM..., or holds all of it."""
-    room, name = _room(file), test.partition("::")[0].removeprefix("tests/")
-    return bool(room) and (name.startswith(f"test_{room}") or room in ROOM_WIDE.get(name, ()))
+    """Whether a file of tests is named after the room of `file`, tests/test_ROOM..."""
+    room = _room(file)
+    return bool(room) and test.startswith(f"tests/test_{room}")
 
 
 def _in_function(path: Path, line: int) -> bool:

@@ -24,7 +24,7 @@ from snakemake_interface_logger_plugins.common import LogEvent
 from lowalt.common import progress
 from lowalt.common.errors import InputError
 from lowalt.common.files import FULL, NEARLY_FULL_BYTES, free_bytes
-from lowalt.workflow import status
+from lowalt.workflow import closing, status
 from lowalt.workflow.board import Board, Job
 
 EVERY_S = {True: 1.0, False: 30.0}
@@ -79,6 +79,7 @@ class LogHandler(LogHandlerBase):
         self._board: Board | None = None
         self._drawn, self._shown = 0, 0.0
         self._full, self._outcome = False, "ended"
+        self._page: Path | None = None
         # Snakemake keeps its own log on the run's disk.
         logging.FileHandler.handleError = quiet_on_a_full_disk
         self._guard, self._stop = threading.RLock(), threading.Event()
@@ -104,9 +105,16 @@ class LogHandler(LogHandlerBase):
             if self._board:
                 self._erase()
                 self._keep(self._outcome)
-                print(self._board.total(time.time()), file=self._stream, flush=True)
+                print("\n".join([self._board.total(time.time()), *self._closing()]), file=self._stream, flush=True)
                 self._board = None
         super().close()
+
+    def _closing(self) -> list[str]:
+        """The last lines of a run that has made its page; none where its tables cannot be read."""
+        if self._page and self._outcome == "ended":
+            with contextlib.suppress(OSError, InputError, KeyError, ValueError):
+                return closing.lines(self._page.parent)
+        return []
 
     def _plan(self, record: logging.LogRecord) -> None:
         """Add a job that would run to the file that `status.PLANNED_JOBS` names; rules without files only collect."""
@@ -164,6 +172,8 @@ class LogHandler(LogHandlerBase):
             # The rule only collects files; it makes none itself.
             self._board.totals.pop(record.rule_name, None)
             return
+        if record.rule_name == "report":
+            self._page = Path(record.output[0])
         label = "/".join(str(value) for name, value in record.wildcards.items() if name != "run")
         job = Job(record.rule_name, label, record.log[0] if record.log else "", record.created)
         first = self._board.start(record.jobid, job)

@@ -1,7 +1,6 @@
 """Every reader of files with a good file of its kind, for `fuzzing` to damage."""
 
 import hashlib
-import io
 import json
 import tempfile
 from collections.abc import Callable
@@ -12,7 +11,9 @@ import numpy as np
 import yaml
 from scipy.io import savemat, wavfile
 
+from chain import IMAGES, SPECTRA, WAVE
 from craft import craft, row
+from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG, RECIPE, tar
 from fuzzing import Reader
 
 
@@ -45,9 +46,9 @@ def _recordings() -> list[Reader]:
         ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
         ".csv": text.encode(),
     }
-    shares = {".mat": 0.1}
+    special = {".mat": {"share": 0.1, "seal": MATLAB}}
     return [
-        Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), shares.get(kind, 1.0))
+        Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))
         for kind, data in files.items()
     ]
 
@@ -89,7 +90,8 @@ def _texts() -> list[Reader]:
         return Run.of(merge(config, load_yaml(path)), schema, None)
 
     def sums(path: Path) -> object:
-        """Verify a file of checksums."""
+        """Verify a file of checksums of one empty file."""
+        (path.parent / "a").touch()
         return freeze.verify(path)
 
     record = yaml.safe_dump({"file": "a.wav", "carrier_hz": 24e9, "channel": "complex", "source": "x", "licence": "y"})
@@ -144,6 +146,7 @@ def _arrays() -> list[Reader]:
     from lowalt.shards import recipe, table
     from lowalt.shards.index import load as load_index
     from lowalt.shards.table import map_samples, read_header
+    from lowalt.targets import occluders
     from lowalt.targets.cloud import read as read_cloud
     from lowalt.targets.cloud import write as write_cloud
     from lowalt.tiles.files import Tiles
@@ -167,24 +170,33 @@ def _arrays() -> list[Reader]:
     heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    index = {"format": "lowalt-shards-2", "shards": [], "kind": "image"}
-    index["sha256"] = hashlib.sha256(json.dumps(index, sort_keys=True).encode()).hexdigest()
+    surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
+    tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
     said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])
     return [
-        Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud),
-        Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")})),
-        Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1))),
-        Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p))),
-        Reader("index", "index.json", json.dumps(index).encode(), load_index),
-        Reader("tiles", "a.npz", _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"), lambda p: [*_all(Tiles(p))]),
-        Reader("image", "a.png", png, lambda p: decode(p.read_bytes())),
-        Reader("tile to predict", "a.png", tile, lambda p: images_of(p, render)),
+        Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud, seal=ARCHIVE),
+        Reader("occluders", "a.npz", surfaces, occluders.read, seal=ARCHIVE),
+        Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")}), seal=ARCHIVE),
+        Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1)), seal=ARCHIVE),
+        Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p)), seal=ARCHIVE),
+        Reader("index", "index.json", _index(render), load_index, seal=INDEX),
+        Reader("tiles", "a.npz", tiles, lambda p: _all(Tiles(p)), seal=ARCHIVE),
+        Reader("image", "a.png", png, lambda p: decode(p.read_bytes()), seal=PNG),
+        Reader("tile to predict", "a.png", tile, lambda p: images_of(p, render), seal=PNG),
         Reader("signals to predict", "a.npy", signals, lambda p: images_of(p, render)),
         Reader("checkpoint", "a.pt", model, checkpoint.load),
         Reader("predictions", "a.csv", _bytes(lambda p: predictions.write(p, said), "a.csv"), predictions.read),
-        Reader("recipe", "a.tar", _recipe(), lambda p: recipe.unpack(p, p.parent / "out")),
+        Reader("recipe", "a.tar", _recipe(), lambda p: recipe.unpack(p, p.parent / "out"), 0.1, RECIPE),
     ]
+
+
+def _index(render: dict) -> bytes:
+    """The bytes of an index of one shard."""
+    entry = {"name": "a", "path": "a.tar", "group": "seen", "fold": "train", "samples": 6, "bytes": 1,
+             "kind": "image", "table_sha256": "0" * 64, "sha256": "0" * 64}  # fmt: skip
+    index = {"format": "lowalt-shards-2", "shards": [entry], "kind": "image", "samples": 6, "render": render}
+    return INDEX.closed({"index": json.dumps(index).encode()})
 
 
 def _all(tiles) -> list[bytes]:
@@ -193,24 +205,25 @@ def _all(tiles) -> list[bytes]:
 
 
 def _recipe() -> bytes:
-    """The bytes of a small recipe of a data set."""
-    import tarfile
-
+    """The bytes of a recipe of a data set of one subtype, four motion models and two short signals of each."""
     from lowalt import __version__
-    from lowalt.common.config import plain
+    from lowalt.common.config import merge, plain
     from lowalt.common.yaml_files import load_yaml
+    from lowalt.targets.cloud import write as write_cloud
+    from lowalt.targets.records import records_of
 
-    head = {"format": "lowalt-recipe-1", "lowalt": __version__, "config": plain(load_yaml("config/default.yaml")),
-            "published": {}}  # fmt: skip
-    members = {"recipe.json": json.dumps(head).encode(), "manifest.sha256": b"0" * 64 + b"  clouds/a.npz\n",
-               "clouds/a.npz": b"nothing"}  # fmt: skip
-    buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w") as archive:
-        for name, data in members.items():
-            info = tarfile.TarInfo(name)
-            info.size = len(data)
-            archive.addfile(info, io.BytesIO(data))
-    return buffer.getvalue()
+    changes = {
+        "targets": {"select": ["DJI Mini 2"]}, "network": WAVE, "motion": {"models": 4, "models_per_chunk": 4},
+        "split": {"train": 2, "val": 1, "test": 1}, "noise": {"snr_db": [8, float("inf")]},
+        "shards": {"kind": "signal"}, "tiles": {"reduced": []}, "spectra": SPECTRA, "images": IMAGES,
+    }  # fmt: skip
+    config = merge(load_yaml("config/default.yaml"), changes)
+    published = {"DJI Mini 2": records_of(config["targets"], None)["DJI Mini 2"]["published"]}
+    head = {"format": "lowalt-recipe-1", "lowalt": __version__, "config": plain(config), "published": published}
+    cloud = _bytes(lambda p: write_cloud(p, craft()), "a.npz")
+    line = f"{hashlib.sha256(cloud).hexdigest()}  clouds/dji-mini-2.npz\n"
+    return tar({"recipe.json": json.dumps(head).encode(), "manifest.sha256": line.encode(),
+                "clouds/dji-mini-2.npz": cloud})  # fmt: skip
 
 
 def readers() -> list[Reader]:

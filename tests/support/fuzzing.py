@@ -2,8 +2,9 @@
 
     PYTHONPATH=src:tests/support python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
 
-A reader may accept a file or refuse it with one `InputError`. Every other end is a fault: another exception, a crash of
-the process, more than LIMIT_S seconds or more than LIMIT_MB of memory.
+A reader must accept its good file. A damaged one it may accept or refuse with one `InputError`. Every other end is a
+fault: another exception, a crash of the process, more than LIMIT_S seconds or more than LIMIT_MB of memory. Where a
+file has checksums, every second one is damaged behind them: its parts are changed and sealed again (`fuzzed_seals`).
 """
 
 import argparse
@@ -20,6 +21,7 @@ import time
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -75,11 +77,22 @@ def _words(data: bytes) -> list[tuple[int, int]]:
 class Reader:
     """One reader of files: its name, a good file's name and bytes, and the function that reads a path.
 
-    share: of the damaged files of a run; a reader that starts a process for each file gets fewer.
+    share: of the damaged files of a run; a reader that starts a process for each file gets fewer. seal: how files with
+    checksums are taken apart and sealed again.
     """
 
-    def __init__(self, name: str, file: str, data: bytes, read: Callable[[Path], object], share: float = 1.0) -> None:
-        self.name, self.file, self.data, self.read, self.share = name, file, data, read, share
+    def __init__(
+        self, name: str, file: str, data: bytes, read: Callable[[Path], object], share: float = 1.0, seal: Any = None
+    ) -> None:
+        self.name, self.file, self.data, self.read, self.share, self.seal = name, file, data, read, share, seal
+
+    def damaged(self, rng: np.random.Generator, sealed: bool) -> bytes:
+        """The good file with seeded damage: `sealed` in one of its parts, under right checksums, else anywhere."""
+        if not (sealed and self.seal):
+            return mutated(self.data, rng)
+        parts = self.seal.opened(self.data)
+        name = list(parts)[int(rng.integers(len(parts)))]
+        return self.seal.closed(parts | {name: mutated(parts[name], rng)})
 
     def outcome(self, data: bytes, folder: Path) -> str:
         """Return "accepted", "refused" or the fault that reading these bytes ends with."""
@@ -97,12 +110,15 @@ class Reader:
 
 
 def attack(reader: Reader, count: int, seed: int, folder: Path) -> dict:
-    """Return a row (keys COLUMNS) of what becomes of `count` damaged files."""
+    """Return a row (keys COLUMNS) of what becomes of `count` damaged files; a good file that is refused is a fault."""
     found = dict.fromkeys(COLUMNS, 0) | {"reader": reader.name, "inputs": count, "first_fault": ""}
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     digest = int.from_bytes(hashlib.sha256(reader.name.encode()).digest()[:4], "big")
+    good = [reader.data, *([reader.seal.closed(reader.seal.opened(reader.data))] if reader.seal else [])]
+    if controls := {outcome for data in good if (outcome := reader.outcome(data, folder)) != "accepted"}:
+        return found | {"faults": 1, "first_fault": f"the good file: {', '.join(sorted(controls))}"}
     for number in range(count):
-        data = mutated(reader.data, np.random.default_rng([seed, digest, number]))
+        data = reader.damaged(np.random.default_rng([seed, digest, number]), number % 2 == 1)
         start = time.monotonic()
         outcome = reader.outcome(data, folder)
         spent = time.monotonic() - start

@@ -24,8 +24,8 @@ rule speed:
         stations=RUN.stations,
         model=options.timed_model,
     shell:
-        "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme}"
-        " --schemes {input.schemes:q} --stations {params.stations} {params.model} --out {output:q} 2> {log:q}"
+        "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme:q}"
+        " --schemes {input.schemes:q} --stations {params.stations:q} {params.model:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_table:
@@ -50,7 +50,7 @@ rule accuracy_cost_table:
         fidelity=options.fidelity,
     shell:
         "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --speeds {input.speeds:q} --index {input.index:q} {params.fidelity}"
+        " --speeds {input.speeds:q} --index {input.index:q} {params.fidelity:q}"
         " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 

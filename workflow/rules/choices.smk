@@ -30,9 +30,9 @@ rule trial:
         extra=options.extra,
     shell:
         "python -m lowalt.recognition.trial --settings {params.settings:q} --views {input.views:q}"
-        " {params.extra}"
-        " --candidates {input.candidates:q} --candidate {wildcards.candidate} --fold {wildcards.held}"
-        " --schemes {input.schemes:q} --stations {params.stations:q} --out $(dirname {output.table:q}) 2> {log:q}"
+        " {params.extra:q}"
+        " --candidates {input.candidates:q} --candidate {wildcards.candidate:q} --fold {wildcards.held:q}"
+        ' --schemes {input.schemes:q} --stations {params.stations:q} --out "$(dirname {output.table:q})" 2> {log:q}'
 
 
 rule choices_tables:
@@ -51,4 +51,4 @@ rule choices_tables:
         settings=settings.seed,
     shell:
         "python -m lowalt.recognition.choose --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --out results/{wildcards.run} 2> {log:q}"
+        " --out results/{wildcards.run:q} 2> {log:q}"

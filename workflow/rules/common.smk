@@ -4,10 +4,8 @@
 from functools import partial
 from pathlib import Path
 
-from snakemake.exceptions import WorkflowError
-
+from lowalt.common.command import refusing
 from lowalt.common.environment import prepare
-from lowalt.common.errors import InputError
 from lowalt.common.plan import PART
 from lowalt.effects.catalogue import dotted
 from lowalt.workflow import interrupts, locks, options, polling, scheduling, space_check
@@ -24,11 +22,9 @@ scheduling.install()
 polling.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
-try:
-    space_check.writable(Path.cwd())
+with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
-except InputError as error:
-    raise WorkflowError(str(error)) from None
+    space_check.writable(Path.cwd(), RUN.name)
 
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)

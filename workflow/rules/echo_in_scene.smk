@@ -26,4 +26,4 @@ rule echo_in_scene:
         stations=products.listening,
     shell:
         "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
-        " {params.occluders} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"
+        " {params.occluders:q} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"

@@ -22,7 +22,7 @@ rule effect_samples:
         occluders=options.occluders,
     shell:
         "python -m lowalt.measure.effects_samples --settings {params.settings:q} --motion {input.motion:q}"
-        " --clouds {input.clouds:q} {params.occluders} --out {output:q} 2> {log:q}"
+        " --clouds {input.clouds:q} {params.occluders:q} --out {output:q} 2> {log:q}"
 
 
 rule effects_table:

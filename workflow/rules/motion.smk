@@ -20,4 +20,4 @@ rule motion:
         span=products.span,
     shell:
         "python -m lowalt.motion --settings {params.settings:q} --clouds {input.clouds:q}"
-        " --group {wildcards.group} {params.span} --out {output:q} 2> {log:q}"
+        " --group {wildcards.group:q} {params.span:q} --out {output:q} 2> {log:q}"

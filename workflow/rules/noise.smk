@@ -22,4 +22,4 @@ rule noise:
         powers=options.powers,
     shell:
         "python -m lowalt.noise --settings {params.settings:q} --motion {input.motion:q}"
-        " --echoes {input.echoes:q} {params.powers} --out {output:q} 2> {log:q}"
+        " --echoes {input.echoes:q} {params.powers:q} --out {output:q} 2> {log:q}"

@@ -17,6 +17,5 @@ rule occluders:
         "../../envs/environment.yaml"
     params:
         settings=settings.cloud,
-        inputs=f"--inputs {RUN.inputs}" if RUN.inputs else "",
     shell:
-        "python -m lowalt.targets.occluders --settings {params.settings:q} {params.inputs} --out {output:q} 2> {log:q}"
+        "python -m lowalt.targets.occluders --settings {params.settings:q} --out {output:q} 2> {log:q}"

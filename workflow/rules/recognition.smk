@@ -25,7 +25,7 @@ rule views:
         reduced=options.reduced_chunk,
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.reduced} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
 
 
 rule slow_time:
@@ -48,7 +48,7 @@ rule slow_time:
         noisy=options.noisy_chunk,
     shell:
         "python -m lowalt.recognition.slow_time --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar {params.noisy} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar {params.noisy:q} --out {output:q} 2> {log:q}"
 
 
 rule track:
@@ -68,7 +68,7 @@ rule track:
         render=settings.index,
     shell:
         "python -m lowalt.recognition.track --settings '{{}}' --index {input.index:q}"
-        " --shard {wildcards.group}-{wildcards.fold}-{wildcards.part}.tar --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar --out {output:q} 2> {log:q}"
 
 
 rule freeze:
@@ -139,13 +139,13 @@ rule train:
         extra=options.extra,
         stream=options.stream,
         start=options.start,
-        events="--tensorboard" if config["recognition"]["tensorboard"] else "",
+        events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
         stations=RUN.stations,
     shell:
-        "python -m {params.launcher} lowalt.recognition train --settings {params.settings:q} {params.source} {params.extra}"
-        " {params.stream} {params.start} --frozen {input.frozen:q}"
-        " --schemes {input.schemes:q} --stations {params.stations} --protocol {wildcards.protocol} --scheme {wildcards.scheme}"
-        " {params.events} --out $(dirname {output.model:q}) 2> {log:q}"
+        "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q} {params.extra:q}"
+        " {params.stream:q} {params.start:q} --frozen {input.frozen:q}"
+        " --schemes {input.schemes:q} --stations {params.stations:q} --protocol {wildcards.protocol:q} --scheme {wildcards.scheme:q}"
+        ' {params.events:q} --out "$(dirname {output.model:q})" 2> {log:q}'
 
 
 rule evaluate:
@@ -176,7 +176,7 @@ rule evaluate:
         settings=settings.evaluation,
         source=options.samples,
     shell:
-        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
+        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
         " --frozen {input.frozen:q} --model {input.model:q} --out {output.table:q} 2> {log:q}"
 
 
@@ -203,7 +203,7 @@ rule tables:
         settings=settings.seed,
     shell:
         "python -m lowalt.recognition tables --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run} 2> {log:q}"
+        " --published {input.published:q} --schemes {input.schemes:q} --out results/{wildcards.run:q} 2> {log:q}"
 
 
 rule transfer_evaluate:
@@ -234,8 +234,8 @@ rule transfer_evaluate:
         settings=settings.evaluation,
         source=options.samples,
     shell:
-        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source}"
-        " --frozen {input.frozen:q} --model {input.model:q} --trained-on {wildcards.other} --out {output.table:q} 2> {log:q}"
+        "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
 
 
 rule transfer:

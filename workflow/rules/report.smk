@@ -14,10 +14,9 @@ rule report_manifest:
     conda:
         "../../envs/environment.yaml"
     params:
-        files=products.report,
-    # A script and no command line: the names of a large run's files are longer than a command may be.
-    script:
-        "../scripts/report_manifest.py"
+        manifest=products.manifest,
+    shell:
+        "printf '%s\\n' {params.manifest:q} > {output:q} 2> {log:q}"
 
 
 rule report:

@@ -24,7 +24,7 @@ rule shard:
         content=options.content,
     shell:
         "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
-        " {params.content} --fold {wildcards.fold} --out {output.tar:q} 2> {log:q}"
+        " {params.content:q} --fold {wildcards.fold:q} --out {output.tar:q} 2> {log:q}"
 
 
 rule index:

@@ -26,6 +26,6 @@ rule tiles:
         motion=options.motion,
         clouds=options.clouds,
     shell:
-        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced}"
-        " {params.motion} {params.clouds}"
+        "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced:q}"
+        " {params.motion:q} {params.clouds:q}"
         " --out {output.tiles:q} 2> {log:q}"

@@ -7,7 +7,7 @@ from lowalt.commands.for_programs import as_json, json_option
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
-from lowalt.shards.verify import faults
+from lowalt.shards.verify import faults, frozen
 
 
 def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
@@ -67,7 +67,11 @@ def verify(given: argparse.Namespace) -> str:
         remaker = opened(given.index, given.clouds, given.occluders)
         lines = [line for number in some(remaker.shards, given.remake) for line in remaker.faults(number)]
     again = f", {given.remake} samples made again" if given.remake else ""
-    return _ended(lines, f"{given.index}: every byte is as it was written{again}", given.json)
+    more = frozen(given.index)
+    clouds = (
+        f"also of {len(more)} clouds and motion tables" if more else "clouds and motion tables have no checksums here"
+    )
+    return _ended(lines, f"{given.index}: every byte is as it was written, {clouds}{again}", given.json)
 
 
 def remake(given: argparse.Namespace) -> str:

@@ -44,7 +44,8 @@ def add_to(commands: argparse._SubParsersAction) -> None:
 def command(given: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
-    Raises: InputError naming an overlay that is missing or no YAML mapping, or where there is no Snakefile.
+    Raises: InputError naming an overlay that is missing or no YAML mapping, wrong cores, a profile that is not there,
+    or where there is no Snakefile.
     """
     if not SNAKEFILE.is_file():
         raise InputError(f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a clone")
@@ -54,6 +55,11 @@ def command(given: argparse.Namespace) -> list[str]:
             raise InputError(f"configuration: no file at {path} (a rule or file to make is named by --target)")
         load_yaml(path)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
+    if given.cores not in (None, "all") and not (given.cores.isdecimal() and int(given.cores)):
+        raise InputError(f"--cores {given.cores!r}, expected a whole number of at least 1, or all")
+    # A profile that is not there is no error to Snakemake: the run would go on without it.
+    if given.profile and not any(given.profile.glob("config*.yaml")):
+        raise InputError(f"--profile {given.profile}: no config.yaml there, expected a folder such as profiles/slurm")
     cores = given.cores or (None if given.profile else "all")
     line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), *(["--cores", cores] if cores else [])]
     profile = given.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))

@@ -5,12 +5,13 @@ The workflow passes the object itself, so that Snakemake sees every change in it
 """
 
 import argparse
+import contextlib
 import errno
 import json
 import resource
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 from lowalt.common.errors import InputError, InputWarning
@@ -92,25 +93,25 @@ def refusal(error: OSError) -> str:
     return f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
 
 
-def run(main: Callable[[list[str]], None]) -> None:
-    """Run a stage's `main` on the process's arguments.
+@contextlib.contextmanager
+def refusing() -> Iterator[None]:
+    """Turn an InputError, or a path that the operating system refuses, into one line and exit status 2."""
+    try:
+        yield
+    except (InputError, OSError) as error:
+        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        raise SystemExit(2) from None
 
-    An InputError or a path that the operating system refuses becomes one line and exit status 2, an InputWarning one
-    line.
-    """
+
+def run(main: Callable[[list[str]], None]) -> None:
+    """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes one line."""
     keep_freed_memory()
     usual = warnings.formatwarning
     warnings.formatwarning = lambda message, category, *place, **more: (
         f"warning: {message}\n" if issubclass(category, InputWarning) else usual(message, category, *place, **more)
     )
-    try:
+    with refusing():
         main(sys.argv[1:])
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise SystemExit(2) from None
-    except OSError as error:
-        print(f"error: {refusal(error)}", file=sys.stderr)
-        raise SystemExit(2) from None
     # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"{Path(sys.argv[0]).parent.name}: done, peak memory {peak:.0f} MiB", file=sys.stderr)

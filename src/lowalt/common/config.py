@@ -5,15 +5,17 @@ This module does not depend on any stage. Faults are found before any job starts
 
 import json
 import math
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import yaml
 
 from lowalt.common.command import parser, run
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, instead
 from lowalt.common.files import replacing
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
@@ -29,14 +31,12 @@ def merge(base: dict, overlay: dict) -> dict:
 
 
 def plain(value: object) -> object:
-    """Return `value` with infinities as the string "inf" (JSON has none) and integral floats unchanged."""
+    """Return `value` with infinities and NaN as the texts "inf" and "nan", which JSON has not as numbers."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
-    if isinstance(value, float) and math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return value
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def canonical(value: object) -> str:
@@ -44,9 +44,19 @@ def canonical(value: object) -> str:
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
 
 
-def _expected(error: jsonschema.ValidationError) -> str:
+COUNTS = ("minProperties", "maxProperties")
+"""Rules of a schema on the number of a block's keys."""
+
+
+def _expected(error: Any) -> str:
     """Return the schema's expectation in words."""
     rule, wanted = error.validator, error.validator_value
+    if rule == "oneOf":
+        # A number out of its range is told that; anything else, which types there are.
+        ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
+        return _expected(ranges[0]) if ranges else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
+    if rule == "dependentRequired":
+        return " together with ".join(next([key, *others] for key, others in wanted.items() if key in error.instance))
     words = {
         "type": f"type {wanted}",
         "minimum": f"at least {wanted}",
@@ -56,51 +66,98 @@ def _expected(error: jsonschema.ValidationError) -> str:
         "enum": f"one of {wanted}",
         "minItems": f"at least {wanted} item(s)",
         "maxItems": f"at most {wanted} items",
-        "minProperties": f"at least {wanted} entry",
+        "minProperties": f"at least {wanted} key(s)",
+        "maxProperties": f"at most {wanted} key(s)",
         "uniqueItems": "every item once",
         "pattern": f"text like {wanted}",
+        "not": f"none of {wanted.get('enum')}" if isinstance(wanted, dict) else "",
     }
     return words.get(str(rule), error.message)
 
 
 def faults(config: dict, schema: dict) -> list[str]:
-    """Return one line a fault of `config` against a JSON schema: key, value and what was expected."""
-    lines = []
+    """Return one line a fault of `config` against a JSON schema: key, value and what was expected.
+
+    Of the items of a list with the same fault, the first is named.
+    """
+    lines: dict[tuple, str] = {}
     errors = jsonschema.Draft202012Validator(schema).iter_errors(plain(config))
-    for error in sorted(errors, key=lambda error: list(map(str, error.absolute_path))):
-        key = ".".join(map(str, error.absolute_path)) or "configuration"
-        meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-        if error.validator == "additionalProperties":
-            known = error.schema.get("properties", {})
-            unknown = [name for name in error.instance if name not in known]
-            lines.append(f"{key}: unknown key(s) {unknown}, expected only {sorted(known)}")
-        elif error.validator == "required":
-            missing = [name for name in error.validator_value if name not in error.instance]
-            lines.append(f"{key}: missing key(s) {missing}")
+    for error in sorted(errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)):
+        block = tuple(part for part in error.absolute_path if isinstance(part, str))
+        # Of a block with another fault, the number of its keys says nothing more.
+        if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
+            key = ".".join(map(str, error.absolute_path)) or "configuration"
+            lines.setdefault((*block, error.validator), f"{key}: {_fault(error)}")
+    return list(lines.values())
+
+
+def _fault(error: Any) -> str:
+    """Return what is wrong with a value and what was expected."""
+    if error.validator == "additionalProperties":
+        known = sorted(error.schema.get("properties", {}))
+        unknown = [name for name in error.instance if name not in known]
+        return f"unknown key(s) {unknown}, expected {instead(unknown, known)}"
+    if error.validator == "required":
+        return f"missing key(s) {[name for name in error.validator_value if name not in error.instance]}"
+    meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
+    return f"value {error.instance!r}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
+
+
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+"""A number in the YAML of today; that of 2005, which the library reads, takes 28e9 for a text."""
+
+
+def _kinds(entry: dict) -> set[str]:
+    """The types that a schema's entry allows, those of its choices too."""
+    kinds = entry.get("type", [])
+    return (
+        {kinds}
+        if isinstance(kinds, str)
+        else {*kinds, *(kind for one in entry.get("oneOf", ()) for kind in _kinds(one))}
+    )
+
+
+def _as_meant(value: object, entry: dict) -> object:
+    """The value with texts such as 28e9 as numbers, and whole numbers as integers, where the entry wants these."""
+    kinds = _kinds(entry)
+    if isinstance(value, dict):
+        _settle(value, entry)
+    elif isinstance(value, list):
+        return [_as_meant(item, entry.get("items", {})) for item in value]
+    elif isinstance(value, str) and kinds & {"number", "integer"} and "string" not in kinds and NUMBER.fullmatch(value):
+        value = float(value)
+    if isinstance(value, float) and value.is_integer() and "integer" in kinds and "number" not in kinds:
+        return int(value)
+    return value
+
+
+def _settle(block: dict, schema: dict) -> None:
+    """Take the nulls out of a block whose keys may be left out and hold no null, and read its numbers (`_as_meant`)."""
+    needed, known, further = (schema.get(key, {}) for key in ("required", "properties", "additionalProperties"))
+    for key, value in list(block.items()):
+        if not isinstance(key, str):
+            raise InputError(f"configuration: key {key!r} among {list(block)}, expected text: put it in quotes")
+        entry = known.get(key, further)
+        if not isinstance(entry, dict):
+            continue
+        if value is None and key not in needed and "null" not in _kinds(entry):
+            del block[key]
         else:
-            lines.append(
-                f"{key}: value {error.instance!r}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
-            )
-    return list(dict.fromkeys(lines))
+            block[key] = _as_meant(value, entry)
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without the stations, spectra and starts that are null.
+    """Return the configuration if it fits the schema, without nulls that take out what a lower layer has.
 
-    A layer of configuration can only add keys to a mapping, so a null removes one of a lower layer.
+    A layer of configuration can only add keys to a mapping, so a null removes one that may be left out, such as a
+    station, a spectrum, a start or an effect. A number may be written 28e9.
     The configuration is changed in place. Raises: InputError with one line a fault.
     """
-    network, recognition = config.get("network"), config.get("recognition")
-    inner = [
-        block.get(key) for block, key in ((network, "stations"), (recognition, "start")) if isinstance(block, dict)
-    ]
-    for block in (*inner, config.get("spectra")):
-        if isinstance(block, dict):
-            for name in [name for name, value in block.items() if value is None]:
-                del block[name]
-    found = faults(config, load_yaml(schema_path))
+    schema = load_yaml(schema_path)
+    _settle(config, schema)
+    found = faults(config, schema)
     if found:
-        raise InputError("configuration refused:\n  " + "\n  ".join(found))
+        raise InputError("configuration refused: " + "\n  ".join(found))
     return config
 
 

@@ -1,5 +1,15 @@
 """The exceptions for bad input: their message names the file, key or value, and what was expected instead."""
 
+import difflib
+from collections.abc import Iterable
+
+
+def instead(unknown: Iterable[object], known: Iterable[str], otherwise: str = "") -> str:
+    """Return what was expected instead of unknown names: the known ones like them, else `otherwise` or all."""
+    known = list(known)
+    near = dict.fromkeys(other for name in unknown for other in difflib.get_close_matches(str(name), known, 1))
+    return f"perhaps {list(near)}" if near else otherwise or f"only {known}"
+
 
 class InputError(ValueError):
     """Bad input from outside; the message names the file, key or value and what was expected instead."""

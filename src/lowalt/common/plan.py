@@ -9,7 +9,7 @@ echoes.
 from dataclasses import dataclass
 from functools import cached_property
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, instead
 from lowalt.common.splits import FOLDS, fold
 
 GROUPS = ("seen", "unseen")
@@ -68,9 +68,8 @@ class Plan:
         more = [name for step in later for name in step]
         unknown = [name for name in (*select, *more) if name not in published]
         if unknown:
-            raise InputError(
-                f"targets.select: {unknown}, expected names of the table, such as {next(iter(published))!r}"
-            )
+            otherwise = f"names of the table, such as {next(iter(published))!r}"
+            raise InputError(f"targets.select: {unknown}, expected {instead(unknown, published, otherwise)}")
         twice = sorted({name for name in more if more.count(name) > 1 or name in select})
         if twice:
             raise InputError(f"added: subtypes {twice}, expected each once, either selected or added")

@@ -43,6 +43,9 @@ DEEPEST = 10_000
 MOST_NODES = 1_000_000
 """Values that a file may hold, counted as often as anchors repeat them: ten lines can stand for billions."""
 
+TEMPLATE = "__use_yte__"
+"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it."""
+
 
 def _check_size(root: yaml.Node | None, path: str | Path) -> None:
     """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain itself."""
@@ -65,7 +68,7 @@ def _check_size(root: yaml.Node | None, path: str | Path) -> None:
 def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
     """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in messages.
 
-    Raises: InputError naming the file where it is missing, not YAML, no mapping, or has a key twice.
+    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has a key twice.
     """
     text = text_of(path, what)
     try:
@@ -79,9 +82,11 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         raise
     # The library also raises errors of its converters, as for a date of month 99 or a number of 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(f"{path}: not YAML ({error})") from error
+        raise InputError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
     except RecursionError:
         raise InputError(f"{path}: mappings and lists stand in each other too deeply, expected a few levels") from None
     if not isinstance(value, dict):
         raise InputError(f"{path}: {type(value).__name__}, expected a mapping of {holds}")
+    if TEMPLATE in value:
+        raise InputError(f"{path}: key {TEMPLATE!r} makes Snakemake run code in it, expected a plain document")
     return value

@@ -14,7 +14,7 @@ import numpy as np
 
 from lowalt.common.blas_threads import one_blas_thread
 from lowalt.common.memory import keep_freed_arrays
-from lowalt.common.network import Network, Station
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.common.power import rms
 from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
@@ -164,8 +164,9 @@ def seen_alone(chain: Chain) -> np.ndarray:
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
+    wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
     for effect in providing(scene.effects, SetsCrossSections):
-        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud))
+        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud, wavelength_m))
     return cloud
 
 

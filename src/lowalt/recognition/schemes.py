@@ -215,7 +215,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
 def _rows(path: str | Path) -> dict[str, tuple[dict, str]]:
     """Rows of a table, each with its place in words, by the scheme's name; no name stands twice."""
     found: dict[str, tuple[dict, str]] = {}
-    for number, row in enumerate(read_csv(path, "scheme"), start=2):
+    for number, row in enumerate(read_csv(path, "scheme", what="table of schemes"), start=2):
         name, where = row["scheme"], f"{path} line {number}"
         if slug(name) in map(slug, found):
             raise InputError(f"{where}: scheme {name!r} stands twice")

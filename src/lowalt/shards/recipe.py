@@ -10,15 +10,17 @@ Members: recipe.json (version, configuration, published rows of the targets), ma
 import argparse
 import io
 import json
+import re
 import tarfile
 import tempfile
 from pathlib import Path
 
 from lowalt import __version__
 from lowalt.common.command import run
-from lowalt.common.config import plain
+from lowalt.common.config import check, plain
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256, text_of
+from lowalt.common.shipped import shipped
 from lowalt.common.yaml_files import load_yaml
 from lowalt.shards import manifest
 from lowalt.shards.build import write_run
@@ -26,8 +28,11 @@ from lowalt.shards.dataset import Dataset
 from lowalt.shards.remake import CloudFolder
 
 FORMAT = "lowalt-recipe-1"
+SCHEMA = "workflow/schemas/config.schema.yaml"
 COVERED = ("clouds", "motion", "shards")
 """Stages whose files are unpacked; echoes and noisy signals stay in memory."""
+MEMBER = re.compile(r"recipe\.json|manifest\.sha256|clouds/[^/]+\.npz")
+"""Names of a recipe's members."""
 
 
 def pack(folder: str | Path, path: str | Path) -> int:
@@ -63,11 +68,13 @@ def _extracted(path: Path, folder: Path) -> dict:
     try:
         # Refuse compression and sparse members: the unpacked files are then never larger than the tar.
         with tarfile.open(existing(path, "recipe"), "r:") as archive:
-            if any(not (member.isfile() or member.isdir()) or member.issparse() for member in archive):
-                raise InputError(f"{path}: has members that are no plain files, expected a recipe")
+            for member in archive:
+                if not member.isfile() or member.issparse() or not MEMBER.fullmatch(member.name):
+                    raise InputError(f"{path}: member {member.name!r} is no plain file of a recipe")
             archive.extractall(folder, filter="data")
         head = json.loads(text_of(folder / "recipe.json", "recipe"))
         found, version = head["format"], head["lowalt"]
+        head["config"] = check(dict(head["config"]), shipped(SCHEMA))
     except (tarfile.TarError, OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not a recipe ({error})") from error
     if found != FORMAT:

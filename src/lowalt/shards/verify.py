@@ -8,7 +8,7 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import sha256
-from lowalt.shards import sums
+from lowalt.shards import manifest, sums
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
 from lowalt.shards.tar import BLOCK
@@ -17,8 +17,8 @@ from lowalt.shards.tar import BLOCK
 def faults(index_path: str | Path) -> Iterator[str]:
     """Yield one line a fault of a published data set: the file, the sample where it lies in one, and what is wrong.
 
-    First the shards and their tables against the index, then all other files of the folder against SHA256SUMS. A file
-    that no checksum covers is a fault too.
+    First the shards and their tables against the index, then all other files of the folder against SHA256SUMS; a file
+    that no checksum covers is a fault too. Then the clouds and motion tables of the run against `frozen`.
     Raises: InputError where the index itself cannot be read.
     """
     index = load(index_path)
@@ -26,6 +26,23 @@ def faults(index_path: str | Path) -> Iterator[str]:
     for entry in index["shards"]:
         yield from shard_faults(folder / entry["path"], entry)
     yield from sums.faults(index_path, index)
+    run = folder.resolve().parent
+    present = set(manifest.files(run))
+    for name, checksum in frozen(index_path).items():
+        if name not in present:
+            yield f"../{name}: missing"
+        elif sha256(run / name) != checksum:
+            yield f"../{name}: has changed since it was frozen in ../{sums.NAME}"
+
+
+def frozen(index_path: str | Path) -> dict[str, str]:
+    """Return the checksums of the clouds and motion tables of the run whose folder holds that of the index, by file.
+
+    The first training writes them into SHA256SUMS of the run's folder; without that file there are none.
+    """
+    path = Path(index_path).resolve().parent.parent / sums.NAME
+    lines = sums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
+    return {name: checksum for checksum, name in lines if manifest.stage_of(name) in ("clouds", "motion")}
 
 
 def shard_faults(path: Path, entry: dict) -> Iterator[str]:

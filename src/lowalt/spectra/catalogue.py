@@ -91,7 +91,10 @@ class Spectra(Mapping[str, Any]):
         found = {}
         for name in named(block):
             kind = spectrum(name).Settings
-            found[name] = kind(*pick(block[name], *(entry.name for entry in fields(kind))))
+            try:
+                found[name] = kind(*pick(block[name], *(entry.name for entry in fields(kind))))
+            except InputError as error:
+                raise InputError(f"spectra.{name}: {error}") from None
         return cls(block.get(TIMES, "even"), **found)
 
     def __getitem__(self, name: str) -> Any:

@@ -6,6 +6,9 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 
+MOST_SPEEDS = 65_536
+"""Most matched speeds, as many as a transform may have points."""
+
 
 def whole(where: str, value: object, least: int) -> int:
     """Return an integer of at least `least`. Raises: InputError naming `where`."""
@@ -32,9 +35,9 @@ class Fourier:
     points: int
 
     def __post_init__(self) -> None:
-        _power_of_two("spectra: window", self.window, 2)
-        whole("spectra: hop", self.hop, 1)
-        _power_of_two("spectra: points", self.points, self.window)
+        _power_of_two("window", self.window, 2)
+        whole("hop", self.hop, 1)
+        _power_of_two("points", self.points, self.window)
 
 
 @dataclass(frozen=True)
@@ -48,14 +51,18 @@ class Transfer:
     speed_step_mps: float
 
     def __post_init__(self) -> None:
-        whole("spectra.vt.window", self.window, 1)
-        whole("spectra.vt.hop", self.hop, 1)
+        whole("window", self.window, 1)
+        whole("hop", self.hop, 1)
         values = (self.speed_min_mps, self.speed_max_mps, self.speed_step_mps)
         for name, value in zip(("speed_min_mps", "speed_max_mps", "speed_step_mps"), values, strict=True):
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-                raise InputError(f"spectra.vt.{name} is {value!r}, expected a finite speed in m/s")
+                raise InputError(f"{name} is {value!r}, expected a finite speed in m/s")
         if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
-            raise InputError(f"spectra.vt: speeds {values}, expected min < max and a positive step")
+            raise InputError(f"speeds {values}, expected min < max and a positive step")
+        if len(self.speeds_mps) > MOST_SPEEDS:
+            raise InputError(
+                f"speeds {values}, min, max and step: {len(self.speeds_mps)} in all, expected at most {MOST_SPEEDS}"
+            )
 
     @property
     def speeds_mps(self) -> np.ndarray:
@@ -75,10 +82,10 @@ class RangeCells:
     cells: int
 
     def __post_init__(self) -> None:
-        whole("spectra.hrrp.window", self.window, 1)
-        whole("spectra.hrrp.hop", self.hop, 1)
-        if whole("spectra.hrrp.cells", self.cells, 3) % 2 == 0:
-            raise InputError(f"spectra.hrrp.cells is {self.cells}, expected an odd number: the strongest is the middle")
+        whole("window", self.window, 1)
+        whole("hop", self.hop, 1)
+        if whole("cells", self.cells, 3) % 2 == 0:
+            raise InputError(f"cells is {self.cells}, expected an odd number: the strongest is the middle")
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:

@@ -35,6 +35,8 @@ MOST_TURNING_PARTS = 16
 """Most rotors or wheels of a cloud, each with a phase of its own (EH216-S flown as coaxial pairs has 16 rotors)."""
 
 LARGEST_RATE_FACTOR = 100
+LARGEST_M, LARGEST_RCS_M2 = 1e3, 1e9
+"""Bounds of coordinates and cross sections: far more than any target has, and far less than what overflows."""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,11 @@ def _need(good: bool, what: str) -> None:
         raise InputError(what)
 
 
+def _near(places: np.ndarray) -> bool:
+    """Whether all coordinates are numbers within LARGEST_M."""
+    return bool((abs(places) <= LARGEST_M).all())
+
+
 def check(cloud: Cloud, where: str) -> Cloud:
     """Return the cloud if it keeps the contract.
 
@@ -109,14 +116,13 @@ def _check_points(cloud: Cloud) -> None:
         "points": (count, 3), "normals": (count, 3), "rcs_m2": (count,), "part": (count,),
         "parents": (parts,), "hinges": (parts, 3), "axes": (parts, 3),
     }.items():  # fmt: skip
-        found = np.shape(getattr(cloud, name))
-        _need(found == shape, f"{name} has shape {found}, expected {shape}")
-    _need(
-        bool(np.isfinite(cloud.points).all()),
-        "points has a NaN or infinite coordinate, expected finite metres",
-    )
-    good_rcs = np.isfinite(cloud.rcs_m2).all() and (cloud.rcs_m2 >= 0).all()
-    _need(bool(good_rcs), "rcs_m2 has a negative or non-finite value, expected square metres >= 0")
+        array = getattr(cloud, name)
+        _need(np.shape(array) == shape, f"{name} has shape {np.shape(array)}, expected {shape}")
+        numbers = "iu" if name in ("part", "parents") else "iuf"
+        _need(array.dtype.kind in numbers, f"{name} has values of type {array.dtype}, expected numbers")
+    _need(_near(cloud.points), f"points has a coordinate that is no number within {LARGEST_M:g} m")
+    good_rcs = ((cloud.rcs_m2 >= 0) & (cloud.rcs_m2 <= LARGEST_RCS_M2)).all()
+    _need(bool(good_rcs), f"rcs_m2 has a value that is no number from 0 to {LARGEST_RCS_M2:g} m2")
     lengths = np.linalg.norm(cloud.normals, axis=1)
     _need(
         bool((np.isnan(lengths) | (abs(lengths - 1) < 1e-9)).all()),
@@ -145,8 +151,8 @@ def _check_parts(cloud: Cloud) -> None:
                 f"axes[{index}] ({cloud.names[index]}) has length {length}, expected 1",
             )
             _need(
-                bool(np.isfinite(cloud.hinges[index]).all()),
-                f"hinges[{index}] ({cloud.names[index]}) is not finite",
+                _near(cloud.hinges[index]),
+                f"hinges[{index}] ({cloud.names[index]}) is no place within {LARGEST_M:g} m",
             )
 
 
@@ -163,7 +169,7 @@ def _check_nodes(cloud: Cloud) -> None:
     count = len(cloud.points)
     _need(cloud.track.ndim == 3 and cloud.track.shape[1:] == (count, 3) and len(cloud.track) >= 2,
          f"track has shape {cloud.track.shape}, expected (frames >= 2, {count}, 3)")  # fmt: skip
-    _need(bool(np.isfinite(cloud.track).all()), "track has a NaN or infinite coordinate")
+    _need(_near(cloud.track), f"track has a coordinate that is no number within {LARGEST_M:g} m")
     _need(
         cloud.record.get("track_rate_hz", 0) > 0,
         "record.track_rate_hz is missing, expected a positive rate",

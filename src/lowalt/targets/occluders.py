@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.archives import write_arrays
-from lowalt.common.array_files import UNREADABLE
+from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.classes import like
 from lowalt.common.command import parser, pick, run
 from lowalt.common.environment import INPUTS
 from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.common.files import replacing
 from lowalt.targets.assemble import Part, turn
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged
@@ -149,7 +149,7 @@ def read(path: str | Path) -> dict:
 
     Raises: InputError where the file is missing or holds no occluders.
     """
-    existing(path, "occluders")
+    checked_archive(path, "occluders")
     try:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in ARRAYS} | {"subtype": json.loads(str(data["subtype"]))}

@@ -30,12 +30,15 @@ _NUMBERS = (
     "size_m", "freq_lo_hz", "freq_hi_hz", "vx_abs_max", "vy_abs_max", "vz_abs_max", "len_m", "wid_m", "hgt_m",
     "wheel_diam_m", "speed_lo", "speed_hi",
 )  # fmt: skip
+_SPEEDS = ("vx_abs_max", "vy_abs_max", "vz_abs_max", "speed_lo", "speed_hi")
+"""Columns of speeds, which may be 0: a craft that hovers, a car that stands."""
 
 
 def load_table(path: str | Path) -> dict[str, dict]:
     """Return the published table by name, in its order: metres, hertz and m/s as numbers, empty cells as None.
 
-    Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive number.
+    Raises: InputError naming the file, the subtype and the column that is missing, unknown or no positive
+    number; a speed may be 0.
     """
     rows = read_csv(path, what="table of published targets")
     if not rows:
@@ -68,8 +71,9 @@ def _cell(where: str, column: str, text: str) -> str | int | float | None:
         value = int(text) if column in _WHOLE else float(text)
     except ValueError:
         value = math.nan
-    if not (math.isfinite(value) and value > 0):
-        raise InputError(f"{where}: {column} is {text!r}, expected a positive number")
+    least = "a number of at least 0" if column in _SPEEDS else "a positive number"
+    if not (math.isfinite(value) and (value > 0 or (value == 0 and column in _SPEEDS))):
+        raise InputError(f"{where}: {column} is {text!r}, expected {least}")
     return value
 
 
@@ -92,7 +96,7 @@ def records_of(targets: dict, inputs: str | Path | None = None) -> dict[str, dic
     inputs: the folder of the user's files, in which a record's files must stand where `where_missing` is "builtin".
     Raises: InputError as `load_records`.
     """
-    own = [path for path in targets.get("own", {}).values() if path is not None]
+    own = targets.get("own", {}).values()
     falls = targets.get("where_missing") == "builtin"
     return load_records(targets["table"], [*targets["records"], *own], inputs, falls)
 

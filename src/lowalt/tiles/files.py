@@ -72,6 +72,8 @@ def stored_array(path: Path, name: str) -> tuple[np.dtype, int, int]:
             start = file.tell()
         if info.compress_type != zipfile.ZIP_STORED or len(shape) != 1:
             raise ValueError(f"{name} is compressed or not one-dimensional")
+        if not 0 <= shape[0] * dtype.itemsize <= path.stat().st_size - start:
+            raise ValueError(f"{name} is said to have {shape[0]} values")
         return dtype, shape[0], start
     except UNREADABLE as error:
         raise InputError(f"{path}: no array {name} ({error})") from error

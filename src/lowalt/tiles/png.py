@@ -89,8 +89,11 @@ def decode(data: bytes) -> tuple[np.ndarray, np.ndarray]:
     if not width * height or pixels > MOST_EXPANSION * (len(packed) + 1):
         raise InputError(f"image: {width} x {height} pixels in {len(packed)} bytes, expected a size that fits them")
     if interlace:
-        with Image.open(io.BytesIO(data)) as picture:
-            return np.array(picture), palette
+        try:
+            with Image.open(io.BytesIO(data)) as picture:
+                return np.array(picture), palette
+        except (OSError, ValueError, SyntaxError) as error:
+            raise InputError(f"image: the interlaced PNG cannot be unpacked ({error})") from error
     try:
         plain = deflate.zlib_decompress(packed, pixels)
     except (deflate.DeflateError, ValueError) as error:

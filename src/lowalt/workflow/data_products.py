@@ -5,7 +5,6 @@ Each method takes the wildcards of a job and can stand in a rule's `input:`. Not
 
 from typing import Any
 
-from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.effects.lateness import timed
 from lowalt.spectra.catalogue import profiled
@@ -64,14 +63,8 @@ class DataProducts:
         return self._of_group("clouds", wildcards)
 
     def scene_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them.
-
-        Raises: InputError for a companion that the run does not have.
-        """
+        """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them."""
         companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
-        unknown = sorted(set(companions) - set(self._run.records))
-        if unknown:
-            raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
         own = self.chunk_clouds(wildcards)
         more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
         return [*own, *(path for path in more if path not in own)]
@@ -85,10 +78,10 @@ class DataProducts:
         hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
         return self._of_group("occluders", wildcards) if hidden else []
 
-    def span(self, wildcards: Any) -> str:
-        """The part of a group's motion models that one chunk holds, as options of the stage."""
+    def span(self, wildcards: Any) -> list[str]:
+        """The part of a group's motion models that one chunk holds, as words of the stage's command line."""
         first, count = self._run.plan.span(f"{wildcards.group}-{wildcards.part}")
-        return f"--first {first} --count {count}"
+        return ["--first", str(first), "--count", str(count)]
 
     def cost_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of the first subtype of each category, in the table's order."""

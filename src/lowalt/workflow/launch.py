@@ -40,15 +40,16 @@ class Launch:
         return self.processes // self.nodes
 
     @property
-    def words(self) -> str:
+    def words(self) -> list[str]:
         """The words between `python -m` and the training's module; none for one process, which chooses its GPU
         itself."""
         if self.nodes > 1:
-            return f"lowalt.recognition.nodes {self.nodes} {self.per_node}"
+            return ["lowalt.recognition.nodes", str(self.nodes), str(self.per_node)]
         if self.processes > 1:
-            count = self.processes
-            return f"lowalt.recognition.gpus {count} torch.distributed.run --standalone --nproc-per-node {count} -m"
-        return ""
+            count = str(self.processes)
+            torchrun = ["torch.distributed.run", "--standalone", "--nproc-per-node", count, "-m"]
+            return ["lowalt.recognition.gpus", count, *torchrun]
+        return []
 
     @property
     def training(self) -> dict:
@@ -70,12 +71,10 @@ class Launch:
     def before(self, workflow: Any) -> None:
         """Refuse a run over nodes whose jobs run on this machine, where it is no part of a Slurm job.
 
-        workflow: Snakemake's own, before its first job. Raises: WorkflowError.
+        workflow: Snakemake's own, before its first job. Raises: InputError.
         """
-        from snakemake.exceptions import WorkflowError
-
         if self.nodes > 1 and workflow.local_exec and "SLURM_JOB_ID" not in os.environ:
-            raise WorkflowError(
+            raise InputError(
                 f"recognition.nodes: {self.nodes}, but jobs run on this machine alone, outside Slurm; expected "
                 "--workflow-profile profiles/slurm, or recognition.nodes: 1"
             )

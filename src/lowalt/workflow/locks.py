@@ -102,7 +102,7 @@ def living(locks: Path) -> list[str]:
 
 
 def holders(locks: Path) -> str:
-    """Return who holds the locks of a folder, a line each, and what a person can do about it."""
+    """Return who holds the locks of a folder, and what a person can do about it, in one line."""
     lines = []
     for number in numbers(locks):
         path, owner = _owner_path(locks, number), Owner.read(_owner_path(locks, number))
@@ -115,7 +115,7 @@ def holders(locks: Path) -> str:
         else:
             lines.append(f"process {owner.pid} of {owner.host} has died; the next run takes its lock over")
     away = "if nothing of this runs any more: snakemake --unlock"
-    return "the working directory is locked:\n  " + "\n  ".join([*lines, away])
+    return f"the working directory is locked: {'; '.join([*lines, away])}"
 
 
 def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> int:
@@ -135,38 +135,41 @@ def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> int:
 def cleanup_locks(self: Any) -> None:
     """Remove all locks of a persistence of Snakemake's, as `--unlock` asks.
 
-    Raises: WorkflowError naming a holder that is seen to live.
+    Raises: SystemExit after one line that names a holder which is seen to live.
     """
-    from snakemake.exceptions import WorkflowError
+    from lowalt.common.command import refusing
 
-    with guarded(Path(self.path)):
+    with refusing(), guarded(Path(self.path)):
         alive = living(Path(self._lockdir))
         if alive:
-            raise WorkflowError("not unlocked: " + "; ".join(alive))
+            raise InputError("not unlocked: " + "; ".join(alive))
         self.unlock()
 
 
 def install() -> None:
     """Put locks with owners in the place of those of Snakemake's file backend."""
-    from snakemake.exceptions import WorkflowError
     from snakemake.logging import logger
     from snakemake.persistence.file import FilePersistence
 
+    from lowalt.common.command import refusing
+
     @contextlib.contextmanager
     def lock(self: FilePersistence) -> Iterator[None]:
-        """Hold the lock of a working directory for the length of a block. Raises: WorkflowError naming the holders."""
+        """Hold the lock of a working directory for the length of a block.
+
+        Raises: SystemExit after one line that names the holders, or the folder that no lock can be written into.
+        """
         folder, locks, owner = Path(self.path), Path(self._lockdir), Owner.current()
-        try:
-            with guarded(folder):
-                take_over(locks, logger.warning)
-                if self.locked:
-                    raise WorkflowError(holders(locks))
-                keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
-                number = take(locks, owner, {kind: [str(key) for key in found] for kind, found in keys.items()})
-        except OSError as error:
-            raise WorkflowError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
-        except InputError as error:
-            raise WorkflowError(str(error)) from None
+        with refusing():
+            try:
+                with guarded(folder):
+                    take_over(locks, logger.warning)
+                    if self.locked:
+                        raise InputError(holders(locks))
+                    keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
+                    number = take(locks, owner, {kind: [str(key) for key in found] for kind, found in keys.items()})
+            except OSError as error:
+                raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
         os.environ[TOKEN] = owner.token
         try:
             yield

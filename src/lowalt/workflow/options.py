@@ -1,6 +1,7 @@
-"""Options of a stage's command line that depend on the job: each is an empty text where the job lacks its input.
+"""Options of a stage's command line that depend on the job: a list of words, empty where the job lacks its input.
 
-Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`.
+Each function takes the wildcards and the inputs of a job and can stand in a rule's `params:`. Snakemake's format `:q`
+quotes every word of a list for the shell.
 """
 
 from pathlib import Path
@@ -11,19 +12,24 @@ from lowalt.effects.lateness import timed
 from lowalt.spectra.catalogue import profiled
 
 
-def occluders(wildcards: Any, input: Any) -> str:
+def _option(name: str, files: str | list[str] | None) -> list[str]:
+    """An option with the files that it names, nothing where there are none."""
+    return [f"--{name}", *([files] if isinstance(files, str) else files)] if files else []
+
+
+def occluders(wildcards: Any, input: Any) -> list[str]:
     """The surfaces of a group, where points are hidden behind them."""
-    return f"--occluders {input.occluders}" if input.occluders else ""
+    return _option("occluders", input.occluders)
 
 
-def powers(wildcards: Any, input: Any) -> str:
+def powers(wildcards: Any, input: Any) -> list[str]:
     """The powers to which set SNRs refer, in a scene with effects."""
-    return f"--powers {input.powers}" if input.powers else ""
+    return _option("powers", input.powers)
 
 
-def motion(wildcards: Any, input: Any) -> str:
+def motion(wildcards: Any, input: Any) -> list[str]:
     """The motion table of a chunk, where the job has it."""
-    return f"--motion {input.motion}" if input.motion else ""
+    return _option("motion", input.motion)
 
 
 def noise_modules(config: dict) -> list[str]:
@@ -31,9 +37,9 @@ def noise_modules(config: dict) -> list[str]:
     return ["lowalt.effects.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
-def clouds(wildcards: Any, input: Any) -> str:
+def clouds(wildcards: Any, input: Any) -> list[str]:
     """The clouds of a chunk, where the job has them."""
-    return f"--clouds {input.clouds}" if input.clouds else ""
+    return _option("clouds", input.clouds)
 
 
 def tile_modules(config: dict) -> list[str]:
@@ -42,60 +48,55 @@ def tile_modules(config: dict) -> list[str]:
     return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late
 
 
-def content(wildcards: Any, input: Any) -> str:
+def content(wildcards: Any, input: Any) -> list[str]:
     """Options that name the files that a shard is packed from, by its kind."""
-    found = {name: input.get(name) for name in ("signals", "tiles", "echoes", "powers")}
-    return " ".join(f"--{name} {paths}" for name, paths in found.items() if paths)
+    return [word for name in ("signals", "tiles", "echoes", "powers") for word in _option(name, input.get(name))]
 
 
-def reduced(wildcards: Any, output: Any) -> str:
+def reduced(wildcards: Any, output: Any) -> list[str]:
     """The reduced images of a chunk that the tiles stage writes, by their size, which is the name of their folder."""
-    targets = [f"{Path(path).parent.name}={path}" for path in output.reduced]
-    return f"--reduced {' '.join(targets)}" if targets else ""
+    return _option("reduced", [f"{Path(path).parent.name}={path}" for path in output.reduced])
 
 
-def reduced_chunk(wildcards: Any, input: Any) -> str:
+def reduced_chunk(wildcards: Any, input: Any) -> list[str]:
     """The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
-    return f"--reduced {input.reduced} --motion {input.motion}" if input.get("reduced") else ""
+    return [*_option("reduced", input.reduced), *_option("motion", input.motion)] if input.get("reduced") else []
 
 
-def extra(wildcards: Any, input: Any) -> str:
+def extra(wildcards: Any, input: Any) -> list[str]:
     """The shrunk images or the signals of other runs that are trained on too, and their measured heights."""
-    tracks = f" --extra-tracks {input.extra_tracks}" if input.get("extra_tracks") else ""
-    return f"--extra {input.extra}{tracks}" if input.get("extra") else ""
+    tracks = _option("extra-tracks", input.get("extra_tracks"))
+    return [*_option("extra", input.extra), *tracks] if input.get("extra") else []
 
 
-def noisy_chunk(wildcards: Any, input: Any) -> str:
+def noisy_chunk(wildcards: Any, input: Any) -> list[str]:
     """The noisy signals of a chunk and its motion table, where shards hold images alone."""
-    return f"--noisy {input.noisy} --motion {input.motion}" if input.get("noisy") else ""
+    return [*_option("noisy", input.noisy), *_option("motion", input.motion)] if input.get("noisy") else []
 
 
-def timed_model(wildcards: Any, input: Any) -> str:
+def timed_model(wildcards: Any, input: Any) -> list[str]:
     """The trained model to time, where its time depends on its training."""
-    return f"--model {input.model}" if input.model else ""
+    return _option("model", input.model)
 
 
-def fidelity(wildcards: Any, input: Any) -> str:
+def fidelity(wildcards: Any, input: Any) -> list[str]:
     """The table of models trained on echoes at a tolerance, where there is one."""
-    return f"--fidelity {input.fidelity}" if input.fidelity else ""
+    return _option("fidelity", input.fidelity)
 
 
-def stream(wildcards: Any, input: Any) -> str:
+def stream(wildcards: Any, input: Any) -> list[str]:
     """The configuration whose fresh motion models are trained on."""
-    return f"--stream {input.stream}" if input.get("stream") else ""
+    return _option("stream", input.get("stream"))
 
 
-def start(wildcards: Any, input: Any) -> str:
+def start(wildcards: Any, input: Any) -> list[str]:
     """The trained model whose weights a training starts from."""
-    return f"--start {input.start}" if input.get("start") else ""
+    return _option("start", input.get("start"))
 
 
-def samples(wildcards: Any, input: Any) -> str:
+def samples(wildcards: Any, input: Any) -> list[str]:
     """Options that name the signals, the shrunk images, the index of the shards, or the configuration to make samples
     from; and the measured heights, for a scheme with the cue."""
-    tracks = f" --tracks {input.tracks}" if input.get("tracks") else ""
-    if input.get("dataset"):
-        return f"--dataset {input.dataset}"
-    if input.get("signals"):
-        return f"--signals {input.signals}"
-    return (f"--views {input.views}" if input.get("views") else f"--index {input.index}") + tracks
+    kind = next(name for name in ("dataset", "signals", "views", "index") if input.get(name))
+    tracks = _option("tracks", input.get("tracks")) if kind in ("views", "index") else []
+    return [*_option(kind, input.get(kind)), *tracks]

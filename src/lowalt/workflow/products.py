@@ -4,6 +4,7 @@ Each method takes the wildcards of a job and can stand in a rule's `input:`. Not
 whether a file exists only where no rule of the run can make it.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -186,6 +187,10 @@ class Products(DataProducts):
         if block["effects"]:
             files["effects"], files["effects_figure"] = f"{base}/effects.csv", f"{base}/effects.png"
         return files
+
+    def manifest(self, wildcards: Any) -> str:
+        """The files of the report as the JSON text of its manifest."""
+        return json.dumps(self.report(wildcards), indent=1)
 
     def prepared(self, wildcards: Any) -> list[str]:
         """Files that the run makes without torch before its first training; none where its data are another run's.

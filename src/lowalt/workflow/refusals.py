@@ -3,12 +3,13 @@
 Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
 """
 
+from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
-from lowalt.common.shipped import as_named, located
+from lowalt.common.shipped import SHIPPED, as_named, located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import Scheme
@@ -20,9 +21,28 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 """Blocks of the configuration that may differ between a run and the run whose data set it trains on."""
 
 
-def refuse_sizes(config: dict) -> None:
-    """Refuse sizes of motion models whose range is reversed, and sizes together with effects."""
+def refuse_braces(config: dict, inputs: str | None) -> None:
+    """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
+    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"))
+    paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
+    paths |= {f"{block}.{key}": config[block][key] for block, key in keys}
+    for name, path in paths.items():
+        if path and {"{", "}"} & {*path}:
+            raise InputError(f"{name}: {path!r}, expected a path without braces")
+
+
+def refuse_companions(config: dict, subtypes: Collection[str]) -> None:
+    """Refuse companions that the run does not have."""
+    named = (config["effects"].get("companions") or {}).get("subtypes", [])
+    if unknown := sorted(set(named) - set(subtypes)):
+        raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
+
+
+def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:
+    """Refuse sizes of unknown classes or whose range is reversed, and sizes together with effects."""
     sizes = config["motion"].get("sizes_m", {})
+    if set(sizes) - set(classes):
+        raise InputError(f"motion.sizes_m: {sorted(sizes)}, expected some of the classes {list(classes)}")
     for category, (low, high) in sizes.items():
         if low > high:
             raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
@@ -139,10 +159,13 @@ def refuse_no_files(targets: dict, inputs: str | None) -> None:
 
 
 def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
-    """Refuse flight heights for names that are neither subtypes nor classes."""
+    """Refuse flight heights for names that are neither subtypes nor classes, and a range that is reversed."""
     unknown = sorted(set(heights) - {*published, *classes, *CATEGORIES})
     if unknown:
         raise InputError(f"motion.height_m: {unknown}, expected subtypes, classes {list(classes)} or {list(AIRBORNE)}")
+    for name, (low, high) in heights.items():
+        if low > high:
+            raise InputError(f"motion.height_m: {name} from {low} to {high} m, expected the lower height first")
 
 
 def refuse_data(config: dict) -> None:
@@ -157,3 +180,21 @@ def refuse_data(config: dict) -> None:
     differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
     if differ:
         raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
+
+
+def refuse_missing(config: dict) -> None:
+    """Refuse a file or folder that the configuration names and that is not there: jobs ask for some of them last."""
+    report, network = config["report"], config["recognition"]["network"]
+    backbone, colon, _ = network["backbone"].rpartition(":")
+    files = {
+        "inputs": [config["inputs"]],
+        "recognition.table": [config["recognition"]["table"]],
+        "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
+        "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],
+        "report.effect_scenes": report["effect_scenes"],
+        **{f"report.{key}": [report[key]] for key in ("published", "accuracy", "measured")},
+    }
+    for key, paths in files.items():
+        missing = [path for path in paths if path is not None and not Path(path).exists()]
+        if missing:
+            raise InputError(f"{key}: {missing[0]!r} is not there, expected the path of a file or folder that is")

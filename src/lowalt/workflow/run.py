@@ -15,25 +15,28 @@ from lowalt.common.files import slug
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
 from lowalt.effects.set_noise import in_all_cells
-from lowalt.recognition.schemes import Scheme, columns_in, named
+from lowalt.recognition.schemes import Scheme, named
 from lowalt.spectra import Spectra
-from lowalt.spectra.catalogue import named as spectra_named
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
+    refuse_braces,
+    refuse_companions,
     refuse_data,
     refuse_extra,
     refuse_height,
     refuse_heights,
     refuse_input,
+    refuse_missing,
     refuse_no_files,
     refuse_profiles,
     refuse_signals,
     refuse_sizes,
     refuse_starts,
 )
+from lowalt.workflow.suited import refuse_region, refuse_speeds, schemes_of
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,7 @@ class Run:
         Raises: InputError naming the key, its value and the expected one, or the missing files of the user.
         """
         check(config, schema)
+        refuse_braces(config, inputs)
         records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
         classes, plan = classes_of(published), Plan.of(config, published)
@@ -69,23 +73,23 @@ class Run:
         profile_cells(spectra, network)
         Images.from_settings(config["images"])
         block = config["recognition"]
-        schemes = {
-            name: named(block["table"], name, station_names(config["network"]))
-            for name in (*block["schemes"], *block["timed"])
-        }
-        for name, scheme in schemes.items():
+        refuse_missing(config)
+        refuse_region(config)
+        refuse_speeds(config)
+        schemes = schemes_of(config)
+        for scheme in schemes.values():
             refuse_height(config, scheme)
-            if scheme.sees == "images":
-                columns_in(scheme.columns, spectra_named(config["spectra"]), len(config["network"]["stations"]), name)
-            else:
+            if scheme.sees != "images":
                 refuse_signals(config, scheme)
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
-        refuse_sizes(config)
-        if config["effects"] or any("transmit" in place for place in config["network"]["stations"].values()):
+        refuse_sizes(config, classes)
+        links = any("transmit" in place for place in config["network"]["stations"].values())
+        if config["effects"] or links or network.guard_subcarriers < 0:
             from lowalt.effects.checks import check as check_effects
 
             check_effects(config)
+            refuse_companions(config, chosen)
         lacking = missing_inputs(chosen, inputs)
         refuse_no_files(config["targets"], inputs)
         if lacking:
@@ -99,7 +103,10 @@ class Run:
         run = cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
         for name in block.get("start", {}):
             # An overlay may train less; a name that no table has is a slip.
-            named(block["table"], name.partition("/")[2], run.stations)
+            try:
+                named(block["table"], name.partition("/")[2], run.stations)
+            except InputError as error:
+                raise InputError(f"recognition.start: {name}: {error}") from None
         refuse_starts(run.starts, run.pairs)
         Launch.of(block)
         return run

@@ -43,28 +43,30 @@ def check(
     return [*stop, *warn]
 
 
-def writable(folder: Path) -> None:
-    """Write a nameless file of TRIAL_BYTES in the working directory: Snakemake meets a full one with tracebacks.
+def writable(folder: Path, run: str) -> None:
+    """Write a nameless file of TRIAL_BYTES in the working directory, in `results`, in the run's folder and in the
+    folders there: Snakemake meets a full or read-only one with tracebacks.
 
     Raises: InputError with the reason and what is free where that fails, and where `results` is a link to nothing.
     """
     results = folder / "results"
     if results.is_symlink() and not results.exists():
         raise InputError(f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)")
-    try:
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(bytes(TRIAL_BYTES))
-    except OSError as error:
-        facts = f"{error.strerror}, {free_bytes(folder) / 1e6:.1f} MB free"
-        raise InputError(f"{folder.resolve()}: cannot write to the working directory ({facts})") from None
+    own = results / run
+    for place in (folder, *(place for place in (results, own, *sorted(own.glob("*/"))) if place.exists())):
+        try:
+            with tempfile.TemporaryFile(dir=place) as file:
+                file.write(bytes(TRIAL_BYTES))
+        except OSError as error:
+            facts = f"{error.strerror}, {free_bytes(place) / 1e6:.1f} MB free"
+            raise InputError(f"{place.resolve()}: cannot write into this folder ({facts})") from None
 
 
 def before(workflow: object, plan: Plan, config: dict) -> None:
     """Compare what a run of Snakemake needs with what there is, before its first job.
 
-    Raises: WorkflowError with figures where the run cannot fit.
+    Raises: SpaceError with figures where the run cannot fit.
     """
-    from snakemake.exceptions import WorkflowError
     from snakemake.logging import logger
 
     jobs = [
@@ -77,11 +79,7 @@ def before(workflow: object, plan: Plan, config: dict) -> None:
         for job in workflow.dag.needrun_jobs()
     ]
     cores = workflow.cores if workflow.local_exec else None
-    try:
-        lines = check(jobs, plan, config, cores, Path(workflow.basedir) / TABLE, Path.cwd() / "results")
-    except InputError as error:
-        raise WorkflowError(str(error)) from None
-    for line in lines:
+    for line in check(jobs, plan, config, cores, Path(workflow.basedir) / TABLE, Path.cwd() / "results"):
         logger.warning(f"warning: {line}")
 
 

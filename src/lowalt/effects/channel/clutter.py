@@ -21,6 +21,7 @@ from lowalt.effects.channel import clutter_loops, land_between, patches
 from lowalt.effects.channel.windblown import parts, windblown
 from lowalt.effects.checks import CheckedScene, above_ground
 from lowalt.effects.view import View
+from lowalt.motion.cross_section import mean_cross_section
 
 SOURCE = (
     "constant-gamma land: Barton, Land clutter models for radar design and analysis, Proc. IEEE 73, 1985; amplitude "
@@ -147,13 +148,13 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
 
 
 def target_power(view: View) -> float:
-    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
+    """Return the mean power (W) of the target in the middle of both beams, over aspects and motion."""
     radio, ends, shaped = radar(view.network, view.station), view.ends(), [1.0, 1.0]
     elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
     ways_m = [float(np.linalg.norm(end.aim_m - np.asarray(end.station.position_m))) for end in ends]
     if view.element is not None:
         shaped = [float(gain(view.element, end.station, end.aim_m)) for end in ends]
-    total = float(view.cloud.rcs_m2.sum())
+    total = mean_cross_section(view.cloud, SPEED_OF_LIGHT / view.network.carrier_hz)
     if len(ends) == 1:
         return (radio.scale * elements * shaped[0]) ** 2 * total / ways_m[0] ** 4
     return (radio.scale * elements) ** 2 * shaped[0] * shaped[1] * total / (ways_m[0] * ways_m[1]) ** 2

@@ -2,8 +2,10 @@
 
 The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. Here the points share the target's mean
 cross section instead: blades together lie `blades_db` below everything else, and within each group points keep their
-ratios. Adding the points without their phases gives the target's mean.
+ratios. One factor for all points makes the mean power over aspects and motion, phases included, the target's mean.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +19,8 @@ from lowalt.effects.channel.target_classes import (
     VEHICLE_DBSM,
     size_m,
 )
+from lowalt.effects.kept_by_arrays import KeptByArrays
+from lowalt.motion.cross_section import mean_cross_section
 from lowalt.targets.cloud import Cloud
 
 SOURCE = (
@@ -28,6 +32,7 @@ SOURCE = (
 DEFAULTS = {"dbsm": {}, "blades_db": -15.0}
 
 PIGEON_M, PIGEON_DBSM = 0.22, -24.6
+_KEPT = KeptByArrays()
 
 
 def idle(settings: dict) -> bool:
@@ -45,8 +50,8 @@ def mean_dbsm(category: str, size: float) -> float:
     return {"Pedestrian": HUMAN_DBSM, "Vehicle": VEHICLE_DBSM}[category]
 
 
-def cross_sections(settings: dict, cloud: Cloud) -> np.ndarray:
-    """Return each point's cross section (L,) m2; their sum is the target's mean.
+def cross_sections(settings: dict, cloud: Cloud, wavelength_m: float) -> np.ndarray:
+    """Return each point's cross section (L,) m2; `motion.mean_cross_section` of them is the target's mean.
 
     Raises: InputError for a flying target whose size is not known.
     settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together against the rest.
@@ -58,12 +63,18 @@ def cross_sections(settings: dict, cloud: Cloud) -> np.ndarray:
             "mean in dbsm"
         )
     total = 10 ** ((mean_dbsm(cloud.like, size) if given is None else given) / 10)
+    arrays = cloud.points, cloud.part, cloud.hinges, cloud.axes, cloud.track, cloud.rcs_m2
+    blades_db = settings["blades_db"]
+    return _KEPT.of(arrays, lambda: _shared(cloud, total, blades_db, wavelength_m), total, blades_db, wavelength_m)
+
+
+def _shared(cloud: Cloud, total: float, blades_db: float, wavelength_m: float) -> np.ndarray:
+    """Cross sections (L,) m2 in the ratios of the cloud's and of `blades_db`, whose mean is `total` m2."""
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
     weight = np.asarray(cloud.rcs_m2, float)
-    groups, shares = (~blades, blades), (1.0, 10 ** (settings["blades_db"] / 10))
-    present = [share if weight[mine].sum() > 0 else 0.0 for mine, share in zip(groups, shares, strict=True)]
-    result = np.zeros(len(weight))
-    for mine, share in zip(groups, present, strict=True):
-        if share > 0:
-            result[mine] = total * share / sum(present) * weight[mine] / weight[mine].sum()
-    return result
+    shares = np.zeros(len(weight))
+    for mine, share in ((~blades, 1.0), (blades, 10 ** (blades_db / 10))):
+        if weight[mine].sum() > 0:
+            shares[mine] = share * weight[mine] / weight[mine].sum()
+    mean = mean_cross_section(replace(cloud, rcs_m2=shares), wavelength_m)
+    return total / mean * shares if mean > 0 else shares

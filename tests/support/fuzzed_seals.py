@@ -1,0 +1,130 @@
+"""Seals of files: how a file is taken apart and put together again with right checksums, so that damage reaches the
+reader behind them."""
+
+import hashlib
+import io
+import json
+import re
+import struct
+import tarfile
+import zipfile
+import zlib
+from collections.abc import Callable
+from typing import NamedTuple
+
+from scipy.io import loadmat, savemat
+
+from lowalt.tiles.png import SIGNATURE
+
+Parts = dict[str, bytes]
+
+
+class Seal(NamedTuple):
+    """The parts of a file's bytes by name, and the bytes of such parts with lengths and checksums that fit them."""
+
+    opened: Callable[[bytes], Parts]
+    closed: Callable[[Parts], bytes]
+
+
+def _members(data: bytes) -> Parts:
+    """The members of an archive of arrays."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def _archive(parts: Parts) -> bytes:
+    """An archive of arrays with these members."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, data in parts.items():
+            archive.writestr(name, data)
+    return out.getvalue()
+
+
+def _chunks(data: bytes) -> Parts:
+    """The chunks of a PNG by place and name, the image data expanded."""
+    parts, place = {}, len(SIGNATURE)
+    while place < len(data):
+        length, name = struct.unpack_from(">I4s", data, place)
+        body = data[place + 8 : place + 8 + length]
+        parts[f"{len(parts)} {name.decode()}"] = zlib.decompress(body) if name == b"IDAT" else body
+        place += 12 + length
+    return parts
+
+
+def _png(parts: Parts) -> bytes:
+    """A PNG of these chunks."""
+    data = SIGNATURE
+    for key, body in parts.items():
+        name = key[-4:].encode()
+        body = zlib.compress(body) if name == b"IDAT" else body
+        data += struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+    return data
+
+
+def _index(parts: Parts) -> bytes:
+    """An index with the SHA-256 of its content; what is no JSON object stays as it is."""
+    try:
+        content = json.loads(parts["index"])
+        signed = hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+        return json.dumps(content | {"sha256": signed}).encode()
+    except (ValueError, TypeError):
+        return parts["index"]
+
+
+def _unsigned(data: bytes) -> Parts:
+    """The content of an index without its checksum."""
+    content = json.loads(data)
+    del content["sha256"]
+    return {"index": json.dumps(content).encode()}
+
+
+def _packed(data: bytes) -> Parts:
+    """The members of a recipe, each array of a cloud on its own."""
+    parts = {}
+    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
+        for member in archive:
+            content = archive.extractfile(member).read()
+            inner = _members(content) if member.name.endswith(".npz") else {"": content}
+            parts |= {f"{member.name}:{name}": array for name, array in inner.items()}
+    return parts
+
+
+def tar(members: Parts) -> bytes:
+    """A tar of these members."""
+    out = io.BytesIO()
+    with tarfile.open(fileobj=out, mode="w") as archive:
+        for name, content in members.items():
+            info = tarfile.TarInfo(name)
+            info.size = len(content)
+            archive.addfile(info, io.BytesIO(content))
+    return out.getvalue()
+
+
+def _recipe(parts: Parts) -> bytes:
+    """A recipe whose manifest has the checksums of its clouds."""
+    grouped: dict[str, Parts] = {}
+    for key, content in parts.items():
+        member, _, name = key.partition(":")
+        grouped.setdefault(member, {})[name] = content
+    members = {name: _archive(inner) if name.endswith(".npz") else inner[""] for name, inner in grouped.items()}
+    for name, content in members.items():
+        if name.endswith(".npz"):
+            line = rb"[0-9a-f]{64}(?=  " + re.escape(name.encode()) + rb")"
+            signed = hashlib.sha256(content).hexdigest().encode()
+            members["manifest.sha256"] = re.sub(line, signed, members["manifest.sha256"])
+    return tar(members)
+
+
+def _plain_matlab(data: bytes) -> Parts:
+    """A MATLAB file without compression."""
+    out = io.BytesIO()
+    savemat(out, {name: array for name, array in loadmat(io.BytesIO(data)).items() if not name.startswith("__")})
+    return {"file": out.getvalue()}
+
+
+ARCHIVE = Seal(_members, _archive)
+PNG = Seal(_chunks, _png)
+INDEX = Seal(_unsigned, _index)
+RECIPE = Seal(_packed, _recipe)
+MATLAB = Seal(_plain_matlab, lambda parts: parts["file"])
