@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene import antenna
 from lowalt.scene.catalogue import NamedEffect
 from lowalt.scene import land
@@ -33,8 +34,8 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     """Return the levels of a sample.
 
     view: the sample, with the cross sections that the scene gives; effects: the scene's, by name; echo_w: mean
-    |Y_bin|^2 of the target's echo as it arrives (W). The expected echo adds the points in mid-beam without their
-    phases.
+    |Y_bin|^2 of the target's echo as it arrives (W). The expected echo is the mean over aspects and motion in mid-beam
+    and in the middle of a range cell.
     Source: radar equation, spec: alpha and a0; Skolnik, Introduction to Radar Systems, 3rd ed. 2001, ch. 1.
     """
     network, station = view.network, view.station
@@ -42,7 +43,6 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     out, back = (float(np.linalg.norm(view.origin_m - np.asarray(end.position_m))) for end in (sender, station))
     range_m, sent = 0.5 * (out + back), dbm(network.power)
     arrays = [10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive)]
-    section = 10 * math.log10(float(view.cloud.rcs_m2.sum()))
     elements = _elements(view)
     expected = expected_dbm(view)
     ways = f"path out and back, {out:.1f} m, 1 m2" if sender is station else f"path, {out:.1f} m and {back:.1f} m, 1 m2"
@@ -53,7 +53,7 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
         Level("receive array", arrays[1], "dB"),
         *elements,
         Level(ways, path_db(view), "dB"),
-        Level("mean cross section", section, "dBsm"),
+        Level("mean cross section", section_dbsm(view), "dBsm"),
         Level("expected echo", expected, "dBm"),
         Level("echo of this sample, mean |Y_bin|^2", dbm(echo_w), "dBm"),
     ]
@@ -90,11 +90,16 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
 
 
 def expected_dbm(view: View) -> float:
-    """Return the power (dBm) of a subcarrier's echo, points in mid-beam added without their phases."""
+    """Return the mean power (dBm) of a subcarrier's echo over aspects and motion, in mid-beam."""
     network, elements = view.network, _elements(view)
     arrays = sum(10 * math.log10(math.prod(shape)) for shape in (network.transmit, network.receive))
     both = 2 * elements[0].value if len(elements) == 1 else sum(level.value for level in elements)
-    return dbm(network.power) + arrays + both + path_db(view) + 10 * math.log10(float(view.cloud.rcs_m2.sum()))
+    return dbm(network.power) + arrays + both + path_db(view) + section_dbsm(view)
+
+
+def section_dbsm(view: View) -> float:
+    """Return the target's mean cross section (dBsm) over aspects and motion."""
+    return 10 * math.log10(mean_cross_section(view.cloud, SPEED_OF_LIGHT / view.network.carrier_hz))
 
 
 def path_db(view: View) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.common.network import Network, Station
+from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.common.streams import stream
 from lowalt.scene import protocols
 from lowalt.scene.catalogue import LOOK_WIDE, PAIR_WIDE, SHARED_STREAMS, NamedEffect, placed, providing
@@ -50,8 +50,9 @@ class Scene:
 
 def with_cross_sections(scene: Scene, cloud: Cloud) -> Cloud:
     """Return the cloud with the cross sections that the scene gives its points."""
+    wavelength_m = SPEED_OF_LIGHT / scene.network.carrier_hz
     for effect in providing(scene.effects, protocols.SetsCrossSections):
-        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud))
+        cloud = replace(cloud, rcs_m2=effect.module.cross_sections(effect.settings, cloud, wavelength_m))
     return cloud
 
 

@@ -88,7 +88,7 @@ class ShapesElements(Protocol):
 class SetsCrossSections(Protocol):
     """Channel: replaces the points' mean cross sections."""
 
-    def cross_sections(self, settings: dict, cloud: Cloud) -> np.ndarray:
+    def cross_sections(self, settings: dict, cloud: Cloud, wavelength_m: float) -> np.ndarray:
         """Return each point's cross section (L,) in m2."""
 
 

@@ -16,6 +16,7 @@ from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.scene import land
 from lowalt.scene.antenna import gain
+from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.effects.channel.windblown import speckle, windblown
 from lowalt.scene.view import View
@@ -82,7 +83,7 @@ def texture(law: str, shape: float, uniform: np.ndarray) -> np.ndarray:
 
 
 def target_power(view: View) -> float:
-    """Return the mean power (W) of the target's points in the middle of both beams, added without their phases."""
+    """Return the mean power (W) of the target in the middle of both beams, over aspects and motion."""
     elements = float(np.prod(view.network.transmit) * np.prod(view.network.receive))
     amplitude = radar(view.network, view.station).scale * elements
     for end in (view.station.transmitter or view.station, view.station):
@@ -90,7 +91,7 @@ def target_power(view: View) -> float:
         amplitude /= np.linalg.norm(aim_m - np.asarray(end.position_m))
         if view.element is not None:
             amplitude *= np.sqrt(gain(view.element, end, aim_m))
-    return float(amplitude**2 * view.cloud.rcs_m2.sum())
+    return float(amplitude**2 * mean_cross_section(view.cloud, SPEED_OF_LIGHT / view.network.carrier_hz))
 
 
 def mean_power(settings: dict, view: View) -> np.ndarray:

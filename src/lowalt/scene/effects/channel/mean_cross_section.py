@@ -2,12 +2,16 @@
 
 The paper gives every point 1 m2, so a sparrow of 158 points has 158 m2. Here the points share the target's mean
 cross section instead: blades together lie `blades_db` below everything else, and within each group points keep their
-ratios. Adding the points without their phases gives the target's mean.
+ratios. One factor for all points makes the mean power over aspects and motion, phases included, the target's mean.
 """
+
+import hashlib
+from dataclasses import replace
 
 import numpy as np
 
 from lowalt.common.errors import InputError
+from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene.target_classes import (
     HUMAN_DBSM,
     LARGE_UAV_DBSM,
@@ -28,6 +32,8 @@ SOURCE = (
 DEFAULTS = {"dbsm": {}, "blades_db": -15.0}
 
 PIGEON_M, PIGEON_DBSM = 0.22, -24.6
+_KEPT: dict[bytes, np.ndarray] = {}
+"""Cross sections of clouds by their content: the mean over thousands of looks takes longer than a sample."""
 
 
 def idle(settings: dict) -> bool:
@@ -45,25 +51,33 @@ def mean_dbsm(category: str, size: float) -> float:
     return {"Pedestrian": HUMAN_DBSM, "Vehicle": VEHICLE_DBSM}[category]
 
 
-def cross_sections(settings: dict, cloud: Cloud) -> np.ndarray:
-    """Return each point's cross section (L,) m2; their sum is the target's mean.
+def cross_sections(settings: dict, cloud: Cloud, wavelength_m: float) -> np.ndarray:
+    """Return each point's cross section (L,) m2; `motion.cross_section.mean_cross_section` of them is the target's.
 
     Raises: InputError for a flying target whose size is not known.
     settings: dbsm: {subtype: dBsm} replaces the class's value; blades_db: all blades together against the rest.
     """
-    size, given = size_m(cloud), settings["dbsm"].get(cloud.subtype)
-    if given is None and size == 0 and cloud.like in ("UAV", "Bird"):
+    size, dbsm = size_m(cloud), settings["dbsm"].get(cloud.subtype)
+    if dbsm is None and size == 0 and cloud.like in ("UAV", "Bird"):
         raise InputError(
             f"effects.mean_cross_section: the body of {cloud.subtype} is one point, which has no size, expected its "
             "mean in dbsm"
         )
-    total = 10 ** ((mean_dbsm(cloud.like, size) if given is None else given) / 10)
+    total = 10 ** ((mean_dbsm(cloud.like, size) if dbsm is None else dbsm) / 10)
+    arrays = cloud.points, cloud.part, cloud.hinges, cloud.axes, cloud.track, cloud.rcs_m2
+    text = repr((cloud.like, cloud.kinds, total, settings["blades_db"], wavelength_m))
+    key = hashlib.sha256(text.encode() + b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)).digest()
+    if key not in _KEPT:
+        _KEPT[key] = shared(cloud, total, settings["blades_db"], wavelength_m)
+    return _KEPT[key]
+
+
+def shared(cloud: Cloud, total_m2: float, blades_db: float, wavelength_m: float) -> np.ndarray:
+    """Return cross sections (L,) m2 in the ratios of the cloud's and of `blades_db`, whose mean is `total_m2`."""
     blades = np.isin(cloud.part, cloud.parts_of("rotor"))
-    weight = np.asarray(cloud.rcs_m2, float)
-    groups, shares = (~blades, blades), (1.0, 10 ** (settings["blades_db"] / 10))
-    present = [share if weight[mine].sum() > 0 else 0.0 for mine, share in zip(groups, shares, strict=True)]
-    result = np.zeros(len(weight))
-    for mine, share in zip(groups, present, strict=True):
-        if share > 0:
-            result[mine] = total * share / sum(present) * weight[mine] / weight[mine].sum()
-    return result
+    weight, shares = np.asarray(cloud.rcs_m2, float), np.zeros(len(cloud.rcs_m2))
+    for mine, share in ((~blades, 1.0), (blades, 10 ** (blades_db / 10))):
+        if weight[mine].sum() > 0:
+            shares[mine] = share * weight[mine] / weight[mine].sum()
+    mean = mean_cross_section(replace(cloud, rcs_m2=shares), wavelength_m)
+    return total_m2 / mean * shares if mean > 0 else shares
