@@ -11,9 +11,8 @@ import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.motion.cross_section import mean_cross_section
-from lowalt.scene import antenna
+from lowalt.scene import antenna, land
 from lowalt.scene.catalogue import NamedEffect
-from lowalt.scene import land
 from lowalt.scene.view import View
 
 
@@ -148,7 +147,7 @@ def _clutter(view: View, effect: NamedEffect, range_m: float) -> list[Level]:
     """Mean levels of the land: all of it, and in the target's range cell."""
     power = effect.module.mean_power(effect.settings, view)
     count = view.network.subcarriers
-    own = patches.with_side_lobes(power, count)[round(range_m / view.network.cell_m) % count]
+    own = land.with_side_lobes(power, count)[round(range_m / view.network.cell_m) % count]
     return [
         Level("land, all range cells", dbm(float(power.sum())), "dBm"),
         Level("land, the target's range cell", dbm(float(own)), "dBm"),

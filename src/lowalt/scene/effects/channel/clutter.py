@@ -14,9 +14,9 @@ from scipy.special import gamma, gammaincinv, ndtr, ndtri
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene import land
 from lowalt.scene.antenna import gain
-from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.effects.channel.windblown import speckle, windblown
 from lowalt.scene.view import View
