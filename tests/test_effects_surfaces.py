@@ -40,7 +40,7 @@ def test_strength_scales_and_a_target_without_its_surfaces_is_refused(tmp_path):
     occluders.write(path, back, "DJI Mini 2")
     assert path.read_bytes() == first
     path.write_bytes(first[:500])
-    with pytest.raises(InputError, match="not a file of occluders"):
+    with pytest.raises(InputError, match="not a surfaces file"):
         occluders.read(path)
 
 

@@ -63,7 +63,7 @@ def test_a_craft_s_surfaces_move_with_their_parts_and_come_back_from_a_file(tmp_
     assert len(found["offset_m"]) == record["points"] and len(set(found["offset_m"].tolist())) == 1
     assert found["offset_m"][0] == pytest.approx(1e-9 * np.ptp(found["vertices"], axis=0).max())
     out.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"mini\.npz: not a file of occluders"):
+    with pytest.raises(InputError, match=r"mini\.npz: not a surfaces file"):
         occluders.read(out)
 
 

@@ -149,7 +149,7 @@ def read(path: str | Path) -> dict:
 
     Raises: InputError where the file is missing or holds no occluders.
     """
-    checked_archive(path, "occluders")
+    checked_archive(path, "surfaces")
     try:
         with np.load(path, allow_pickle=False) as data:
             return {name: data[name] for name in ARRAYS} | {"subtype": json.loads(str(data["subtype"]))}
