@@ -21,13 +21,13 @@ from lowalt.common.config import load
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.streams import stream
-from lowalt.effects.catalogue import called
-from lowalt.effects.channel import mean_cross_section
-from lowalt.effects.explain import samples
-from lowalt.effects.interface import PointsBeams, SamplesTime, SetsCrossSections, ShapesElements, WeighsPoints
-from lowalt.effects.levels import Level, levels
-from lowalt.effects.received import Scene, observe, received_signal, with_cross_sections
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.scene.catalogue import called
+from lowalt.scene.chain import Scene, observe, received_signal, with_cross_sections
+from lowalt.scene.effects.channel import mean_cross_section
+from lowalt.scene.explain import samples
+from lowalt.scene.levels import Level, levels
+from lowalt.scene.protocols import PointsBeams, SamplesTime, SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from emulation import run
-from lowalt.effects.catalogue import PLACES
+from lowalt.scene.catalogue import PLACES
 
 UNEQUAL = {}
 """Effects whose numbers depend on the processor, with the share of all numbers that may differ."""
@@ -15,7 +15,7 @@ PROBE = """
 import sys
 import numpy as np
 from lowalt.common.config import load
-from lowalt.effects.catalogue import PLACES
+from lowalt.scene.catalogue import PLACES
 from lowalt.shards.dataset import Dataset
 from lowalt.targets.occluders import make
 from lowalt.targets.records import records_of

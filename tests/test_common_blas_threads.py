@@ -57,8 +57,9 @@ sys.path.insert(0, "tests/support")
 import numpy as np
 from every_effect import targets
 from lowalt.common.network import Network, Station
-from lowalt.effects.catalogue import called
-from lowalt.effects.received import Scene, received_signal
+from lowalt.scene.catalogue import called
+from lowalt.scene.chain import received_signal
+from lowalt.scene.observe import Scene
 from lowalt.motion.table import NUMBERS
 station = Station("A", (0.0, 0.0, 25.0), 0.3, 4.9e9)
 network = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (16, 4), (16, 4), 1.0, (station,))

@@ -15,7 +15,7 @@ EFFECT = '''"""DC offset: the mixer's own oscillator leaks into its output and a
 
 import numpy as np
 
-from lowalt.effects.waveform import Frame
+from lowalt.scene.waveform import Frame
 
 SOURCE = "T. Schenk, RF Imperfections in High-rate Wireless Systems, Springer 2008, ch. 2"
 DEFAULTS = {"share": 0.5}
@@ -160,7 +160,7 @@ def enter(folder: Path, before: str, entry: str) -> None:
 
 def test_one_new_file_and_its_schema_entry_add_an_effect_that_is_run_documented_and_priced(tree):
     folder, python = tree
-    (folder / "src/lowalt/effects/receiver/dc_offset.py").write_text(EFFECT)
+    (folder / "src/lowalt/scene/effects/receiver/dc_offset.py").write_text(EFFECT)
     enter(folder, "      adc:\n", ENTRY)
     (folder / "scene.yaml").write_text("run: leaky\neffects: {dc_offset: {share: 0.25}}\n")
     found = python("-m", "lowalt", "explain", "scene.yaml", "--sample", "Crow:0", "--station", "A")

@@ -195,7 +195,7 @@ def test_samples_without_end_are_new_and_parts_share_them(dataset):
 
 
 def test_a_scene_with_effects_is_made_as_its_stage_makes_it(dataset, tmp_path):
-    from lowalt.effects.__main__ import main as effects
+    from lowalt.scene.__main__ import main as effects
 
     config = configuration(effects={"ground_reflection": {"permittivity": 5.24, "conductivity_s_m": 0.16}})
     config["echo"] = {**config["echo"], "tolerance": 1e-3}

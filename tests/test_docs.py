@@ -16,7 +16,7 @@ from lowalt.__main__ import main
 from lowalt.common import schema_page
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.effects.catalogue import PLACES
+from lowalt.scene.catalogue import PLACES
 
 ROOT = Path(__file__).parent.parent
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"

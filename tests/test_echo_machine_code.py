@@ -11,7 +11,7 @@ import lowalt
 from forks import printed
 from lowalt.common.jit import INNER, LEAN, _DigestCache, digest
 from lowalt.echo.fast.driver import run
-from lowalt.effects.response_loops import one_way
+from lowalt.scene.response_loops import one_way
 
 PROGRAM = """
 import sys
@@ -27,7 +27,7 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(package).parent))
 from lowalt.common.jit import digest
 from lowalt.echo.fast.driver import run
-from lowalt.effects.response_loops import one_way
+from lowalt.scene.response_loops import one_way
 path.write_text(kept)
 print(digest(run.py_func), digest(one_way.py_func))
 """

@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from forks import printed
 from lowalt.common.street import PACKAGE, STREET, modules, rooms_imported
-from lowalt.effects.catalogue import PLACES
 from lowalt.report.figures import house
+from lowalt.scene.catalogue import PLACES
 
 ROOT = Path(__file__).parent.parent
 STAGES = [name for name in STREET if name not in ("common", "measure", "workflow", "commands")]
@@ -33,10 +33,10 @@ LIGHT = [stage for stage in STAGES if stage not in ("spectra", "recognition")]
 SCENES = [{}, *({name: {}} for name in PLACES)]
 PROGRAMS = {
     **{stage: f"import sys, lowalt.{stage}.__main__; print('torch' in sys.modules)" for stage in LIGHT},
-    "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.effects' in sys.modules)",
+    "plain": "import sys, lowalt.echo.__main__, lowalt.noise.__main__; print('lowalt.scene' in sys.modules)",
     "scenes": (
-        "import os, sys, lowalt.echo.__main__, lowalt.effects.__main__, lowalt.noise.__main__\n"
-        "from lowalt.effects.catalogue import called\n"
+        "import os, sys, lowalt.echo.__main__, lowalt.scene.__main__, lowalt.noise.__main__\n"
+        "from lowalt.scene.catalogue import called\n"
         f"for scene in {SCENES!r}:\n"
         "    if os.fork() == 0:\n"
         "        called(scene)\n"
@@ -44,7 +44,7 @@ PROGRAMS = {
         "    os.wait()\n"
         "else:\n"
         "    sys.exit()\n"
-        "names = [n for n in sys.modules if n.startswith('lowalt.effects.') and n.count('.') == 3]\n"
+        "names = [n for n in sys.modules if n.startswith('lowalt.scene.') and n.count('.') == 3]\n"
         "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
         "os._exit(0)"
     ),

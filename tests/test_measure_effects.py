@@ -13,8 +13,6 @@ from lowalt.common.config import load, merge
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.common.splits import fold
-from lowalt.effects.catalogue import PLACES, called
-from lowalt.effects.received import Scene
 from lowalt.measure.effects_calls import asked_snrs, calls
 from lowalt.measure.effects_samples import (
     held_out,
@@ -27,6 +25,8 @@ from lowalt.measure.effects_samples import (
 )
 from lowalt.motion import write_table
 from lowalt.noise.chunk import noisy_signals
+from lowalt.scene.catalogue import PLACES, called
+from lowalt.scene.observe import Scene
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.tiles import Renderer, resize, split
 

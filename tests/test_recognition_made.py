@@ -12,7 +12,6 @@ import yaml
 from configured import Inputs, parts
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
-from lowalt.effects import chunk
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
@@ -20,6 +19,7 @@ from lowalt.recognition.made import DatasetSamples, opened, stations_of
 from lowalt.recognition.reader import Reader
 from lowalt.recognition.stream import Stream
 from lowalt.recognition.views import ShardSamples
+from lowalt.scene import chunk
 from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from lowalt.common.config import load
-from lowalt.effects.explain import scene_facts
-from lowalt.effects.explain_text import text as explanation
+from lowalt.scene.explain import scene_facts
+from lowalt.scene.explain_text import text as explanation
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "benchmarks"))

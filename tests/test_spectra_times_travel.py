@@ -8,11 +8,11 @@ import pytest
 from lowalt.common.config import canonical
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
-from lowalt.effects.catalogue import called
-from lowalt.effects.checks import check
-from lowalt.effects.lateness import lateness, timed
-from lowalt.effects.received import Scene, observe
 from lowalt.motion import write_table
+from lowalt.scene.catalogue import called
+from lowalt.scene.checks import check
+from lowalt.scene.lateness import lateness, timed
+from lowalt.scene.observe import Scene, observe
 from lowalt.shards import ShardSet
 from lowalt.shards.build import rows_of, write_run
 from lowalt.shards.dataset import Dataset

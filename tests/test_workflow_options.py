@@ -69,11 +69,11 @@ def test_samples_are_named_by_their_kind_with_the_heights_that_images_come_with(
 def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
     late = {"spectra": {"times": "known"}, "effects": {"slow_time": {"jitter_s": 1e-4}}}
     assert options.tile_modules(late) == [
-        "lowalt.effects.lateness", "lowalt.motion", "lowalt.effects.transmitter.slow_time"]  # fmt: skip
+        "lowalt.scene.lateness", "lowalt.motion", "lowalt.scene.effects.transmitter.slow_time"]  # fmt: skip
     for other in (late | {"spectra": {}}, late | {"effects": {}}, late | {"effects": {"slow_time": {"jitter_s": 0.0}}}):
         assert options.tile_modules(other) == []
     assert options.noise_modules({"effects": {"canceller": None}}) == [
-        "lowalt.effects.set_noise", "lowalt.effects.detection.canceller"]  # fmt: skip
+        "lowalt.scene.set_noise", "lowalt.scene.effects.detection.canceller"]  # fmt: skip
     assert options.noise_modules({"effects": {"adc": None}}) == []
 
 

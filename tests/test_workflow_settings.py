@@ -11,9 +11,9 @@ from configured import parts
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.effects.catalogue import PLACES
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
+from lowalt.scene.catalogue import PLACES
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.settings import Settings
 from snakemake_texts import body

@@ -1,7 +1,7 @@
 """The slow truth beyond Eq. 7: every element, path, subcarrier and time sample summed one by one.
 
 Distances from every element to every point are formed as they are; nothing is expanded, interpolated or bounded, and
-no line is shared with `lowalt.effects`.
+no line is shared with `lowalt.scene`.
 """
 
 import numpy as np

@@ -7,7 +7,7 @@ from pathlib import Path
 from lowalt.common.command import refusing
 from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
-from lowalt.effects.catalogue import dotted
+from lowalt.scene.catalogue import dotted
 from lowalt.workflow import interrupts, locks, options, polling, scheduling, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located

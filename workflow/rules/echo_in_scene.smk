@@ -7,7 +7,7 @@
 
 rule echo_in_scene:
     input:
-        code=code("lowalt.effects", *map(dotted, config["effects"])),
+        code=code("lowalt.scene", *map(dotted, config["effects"])),
         motion="results/{run}/motion/{group}-{part}.csv",
         clouds=products.scene_clouds,
         occluders=products.chunk_occluders,
@@ -25,5 +25,5 @@ rule echo_in_scene:
         occluders=options.occluders,
         stations=products.listening,
     shell:
-        "python -m lowalt.effects --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
+        "python -m lowalt.scene --settings {params.settings:q} --motion {input.motion:q} --clouds {input.clouds:q}"
         " {params.occluders:q} --station {params.stations:q} --out {output.signals:q} --power {output.power:q} 2> {log:q}"

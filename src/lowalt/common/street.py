@@ -10,7 +10,7 @@ from pathlib import Path
 
 PACKAGE = Path(__file__).parents[1]
 STREET = (
-    "common", "targets", "motion", "echo", "effects", "noise", "spectra", "tiles", "shards", "recognition",
+    "common", "targets", "motion", "echo", "scene", "noise", "spectra", "tiles", "shards", "recognition",
     "recordings", "measure", "report", "workflow", "commands",
 )  # fmt: skip
 

@@ -5,8 +5,8 @@ from pathlib import Path
 from lowalt.common.config import check, merge
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.effects.catalogue import PLACES
-from lowalt.effects.checks import check as check_effects
+from lowalt.scene.catalogue import PLACES
+from lowalt.scene.checks import check as check_effects
 
 ELSEWHERE = ("network", "targets", "motion", "spectra", "images", "split", "seed")
 """Blocks that a scene may not change here: its samples would no longer be those of the run."""

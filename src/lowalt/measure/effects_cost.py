@@ -17,9 +17,9 @@ from lowalt.common.command import parser, pick, run
 from lowalt.common.csv_tables import short, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
-from lowalt.effects.catalogue import PLACES
 from lowalt.measure.effects_samples import read_samples
 from lowalt.recognition.intervals import paired_difference
+from lowalt.scene.catalogue import PLACES
 
 COLUMNS = (
     "call", "effects", "motion_models", "base_ms", "added_ms", "parts_ms", "signal_change", "pixels_changed_percent",

@@ -24,11 +24,12 @@ from lowalt.common.hardware import describe
 from lowalt.common.network import Network
 from lowalt.common.splits import fold
 from lowalt.common.timing import once
-from lowalt.effects.catalogue import called
-from lowalt.effects.received import Scene, received_signal
-from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
+from lowalt.scene.catalogue import called
+from lowalt.scene.chain import received_signal
+from lowalt.scene.observe import Scene
+from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.targets.cloud import Cloud, cloud_of, read
 from lowalt.tiles import Renderer, resize, split
 

@@ -53,7 +53,7 @@ def main(arguments: list[str]) -> None:
     given = options.parse_args(arguments)
     canceller, behind = given.settings.pop("canceller", None), None
     if canceller is not None:
-        from lowalt.effects.set_noise import behind_canceller
+        from lowalt.scene.set_noise import behind_canceller
 
         behind = functools.partial(behind_canceller, canceller=canceller)
     seed, stations, snrs = pick(given.settings, "seed", "stations", "snr_db")

@@ -14,11 +14,11 @@ import numpy as np
 from lowalt.common.classes import label
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
-from lowalt.effects.set_noise import in_all_cells
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import columns_in
 from lowalt.recognition.views import geometry
+from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.build import rows_of
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.maker import Maker

@@ -13,12 +13,12 @@ from lowalt.common.command import pick
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid, echo_signals
-from lowalt.effects.motion import rotor_spread
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.recordings.channel import SAMPLINGS
 from lowalt.recordings.courses import Course
 from lowalt.recordings.record import CHANNELS
+from lowalt.scene.effects.motion import rotor_spread
 from lowalt.spectra import Fourier, Spectra, Transfer
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import NODES

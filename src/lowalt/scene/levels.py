@@ -74,8 +74,6 @@ def levels(view: View, effects: dict[str, NamedEffect], echo_w: float) -> list[L
     if "transmit_leakage" in effects:
         leaked = sent - effects["transmit_leakage"].settings["isolation_db"]
         result.append(Level("transmit leakage, one subcarrier", leaked, "dBm"))
-    if "interference" in effects:
-        result += _others(view, effects["interference"], expected)
     if "receiver_noise" in effects:
         noisy = effects["receiver_noise"]
         noise = dbm(noisy.module.variance(noisy.settings, network.subcarrier_spacing_hz))
@@ -107,28 +105,6 @@ def path_db(view: View) -> float:
     out, back = (float(np.linalg.norm(view.origin_m - np.asarray(end.position_m))) for end in ends)
     wavelength = SPEED_OF_LIGHT / view.network.carrier_hz
     return 10 * math.log10(wavelength**2 / ((4 * math.pi) ** 3 * out**2 * back**2))
-
-
-def _others(view: View, effect: NamedEffect, expected: float) -> list[Level]:
-    """Levels of other stations' signals: mean over the receiver's subcarriers, then all of them in a range cell."""
-    interference, settings = effect.module, effect.settings
-    result, total = [], 0.0
-    for sends in interference.others(view):
-        share = float(np.mean(interference.lying(settings, view.network, sends, view.station)[0] ** 2))
-        powers = {
-            one.way: float(np.mean(abs(one.response) ** 2))
-            for one in interference.arrivals({**settings, "by_target": False}, view, sends, frozenset(), lambda _: 1.0)
-        }
-        if settings["by_target"]:
-            powers["by the target"] = 10 ** (expected_dbm(interference.pair(view, sends)) / 10 - 3)
-        result += [
-            Level(f"station {sends.name} {way}, one subcarrier", dbm(share * power), "dBm")
-            for way, power in powers.items()
-        ]
-        total += share * sum(powers.values())
-    cell = dbm(total / view.network.subcarriers)
-    other = "expected echo over other stations, in a range cell"
-    return [*result, Level("other stations, one range cell", cell, "dBm"), Level(other, expected - cell, "dB")]
 
 
 def _elements(view: View) -> list[Level]:

@@ -102,11 +102,16 @@ class View:
         """Where the receiver's beams point at first, (3,) m: without pointing errors the target's origin."""
         return self.aim_of(self.station)
 
+    @cached_property
+    def element_gain(self) -> np.ndarray:
+        """The element's power gain (N, L) toward the points."""
+        return gain(self.element, self.station, self.places)
+
     def relative_gain(self, images: np.ndarray) -> np.ndarray | float:
         """Return the element's amplitude gain toward images (N, L, 3) over that toward the points, (N, L) or 1."""
         if self.element is None:
             return 1.0
-        return np.sqrt(gain(self.element, self.station, images) / gain(self.element, self.station, self.places))
+        return np.sqrt(gain(self.element, self.station, images) / self.element_gain)
 
     def at(self, times_s: np.ndarray) -> "View":
         """Return the same target seen at other times (K,) s of the look."""

@@ -11,9 +11,9 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.common.network import Network
 from lowalt.echo.chunk import clean_signals
-from lowalt.effects.lateness import lateness
-from lowalt.effects.set_noise import behind_canceller, in_all_cells
 from lowalt.noise.chunk import noisy_signals
+from lowalt.scene.lateness import lateness
+from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud
 from lowalt.tiles.png import encode
@@ -93,9 +93,9 @@ class Maker:
         tolerance = self.echo["tolerance"]
         if not self.echo["effects"]:
             return clean_signals(self.network, names, self.clouds, [row], tolerance)[:, 0], None
-        from lowalt.effects.catalogue import called
-        from lowalt.effects.chunk import scene_signals
-        from lowalt.effects.received import Scene
+        from lowalt.scene.catalogue import called
+        from lowalt.scene.chunk import scene_signals
+        from lowalt.scene.observe import Scene
 
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
         if snr_db is not None:

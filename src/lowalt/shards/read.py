@@ -18,7 +18,7 @@ from lowalt.common.files import existing, sha256
 from lowalt.common.network import station_names
 from lowalt.common.plan import GROUPS
 from lowalt.common.splits import FOLDS
-from lowalt.effects.lateness import lateness
+from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
 from lowalt.shards.record import npy, row_of

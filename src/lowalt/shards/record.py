@@ -122,7 +122,7 @@ def accompanied(row: dict, effects: dict, seed: int) -> dict:
     if "companions" not in effects:
         return row
     # Most runs have no companions, so the module is loaded only for those that have.
-    from lowalt.effects.channel.companions import listed
+    from lowalt.scene.effects.channel.companions import listed
 
     return {**row, "companions": listed(effects["companions"] or {}, seed, row)}
 

@@ -56,8 +56,8 @@ def main(arguments: list[str]) -> None:
 
 def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
     """How late the symbols of a chunk's models are; drawn: {seed, effects}, from which the scene draws it."""
-    from lowalt.effects.lateness import lateness
     from lowalt.motion import read_table
+    from lowalt.scene.lateness import lateness
 
     rows, (seed, effects) = read_table(motion), pick(drawn, "seed", "effects")
     return lambda model: lateness(spectra, effects, tiles.network, seed, rows[model])

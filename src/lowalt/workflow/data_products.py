@@ -6,7 +6,7 @@ Each method takes the wildcards of a job and can stand in a rule's `input:`. Not
 from typing import Any
 
 from lowalt.common.files import slug
-from lowalt.effects.lateness import timed
+from lowalt.scene.lateness import timed
 from lowalt.spectra.catalogue import profiled
 from lowalt.targets.records import source_files
 from lowalt.workflow.effect_calls import EffectCalls

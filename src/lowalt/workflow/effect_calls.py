@@ -3,7 +3,7 @@
 from functools import cached_property
 
 from lowalt.common.errors import InputError
-from lowalt.effects.catalogue import dotted
+from lowalt.scene.catalogue import dotted
 from lowalt.workflow.run import Run
 
 

@@ -7,8 +7,8 @@ quotes every word of a list for the shell.
 from pathlib import Path
 from typing import Any
 
-from lowalt.effects.catalogue import dotted
-from lowalt.effects.lateness import timed
+from lowalt.scene.catalogue import dotted
+from lowalt.scene.lateness import timed
 from lowalt.spectra.catalogue import profiled
 
 
@@ -34,7 +34,7 @@ def motion(wildcards: Any, input: Any) -> list[str]:
 
 def noise_modules(config: dict) -> list[str]:
     """The modules that the noise stage loads in a scene with a canceller."""
-    return ["lowalt.effects.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
+    return ["lowalt.scene.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
 def clouds(wildcards: Any, input: Any) -> list[str]:
@@ -44,7 +44,7 @@ def clouds(wildcards: Any, input: Any) -> list[str]:
 
 def tile_modules(config: dict) -> list[str]:
     """The modules that the tiles stage loads where spectra know the instants of late symbols or show range profiles."""
-    late = ["lowalt.effects.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
+    late = ["lowalt.scene.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
     return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late
 
 

@@ -14,8 +14,8 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
-from lowalt.effects.set_noise import in_all_cells
 from lowalt.recognition.schemes import Scheme, named
+from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.profiles import profile_cells
@@ -86,7 +86,7 @@ class Run:
         refuse_sizes(config, classes)
         links = any("transmit" in place for place in config["network"]["stations"].values())
         if config["effects"] or links or network.guard_subcarriers < 0:
-            from lowalt.effects.checks import check as check_effects
+            from lowalt.scene.checks import check as check_effects
 
             check_effects(config)
             refuse_companions(config, chosen)

@@ -10,9 +10,9 @@ from lowalt.common.config import canonical
 from lowalt.common.network import as_far_as, masts_m
 from lowalt.common.plan import Chunk
 from lowalt.common.shipped import as_named
-from lowalt.effects.lateness import timed
-from lowalt.effects.set_noise import in_all_cells
 from lowalt.motion.sample import masts_in_reach
+from lowalt.scene.lateness import timed
+from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra.catalogue import profiled
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run

@@ -1,19 +1,25 @@
-"""Section: what the run's scene simulates and leaves out, as `lowalt explain` says it."""
+"""Section: whether the receiver of the run's scene finds its targets, as `lowalt explain` says it."""
 
 import os
 from pathlib import Path
 
 from lowalt.common.errors import InputError
-from lowalt.effects.explain import scene_facts
-from lowalt.effects.explain_text import text
 from lowalt.report.run import ReportedRun
 
 
 def values(run: ReportedRun) -> dict:
-    """Return the explanation without times: those of the effects stand in a table of their own."""
+    """Return the verdict on a scene with effects; without effects every target is found."""
+    if not run.config["effects"]:
+        return {"lines": []}
+    # The effects' modules are loaded only for runs that have some.
+    from lowalt.scene import explain, explain_text
+
     inputs = run.config["inputs"] or os.environ.get("LOWALT_INPUTS")
     try:
-        return {"text": text(scene_facts(run.config, inputs and Path(inputs), [], None, False))}
+        scene, chosen = explain.scene_of(run.config), explain.samples(run.config, inputs and Path(inputs), [])
     except InputError as error:
-        # Show the page without the explanation where, for example, the recordings have been moved.
-        return {"text": f"not explained: {error}"}
+        # Show the page without the verdict where, for example, the recordings have been moved.
+        return {"lines": [f"not explained: {error}"]}
+    clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
+    findings = [explain.finding(scene, end, sample, clouds) for sample in chosen for end in scene.network.stations]
+    return {"lines": explain_text.verdict(findings)}
