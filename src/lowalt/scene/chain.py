@@ -233,10 +233,11 @@ class Sample:
     @cached_property
     def look(self) -> Look:
         """The look as receiver and detection know it."""
-        range_m = float(np.linalg.norm(self.view.aim_m - np.asarray(self.station.position_m)))
+        ends = self.station.transmitter or self.station, self.station
+        ways_m = sum(float(np.linalg.norm(self.view.aim_m - np.asarray(end.position_m))) for end in ends)
         return Look(
             self.scene.network, self.station, self.data, self.aired, self.view.times_s, self.power,
-            2.0 * range_m / SPEED_OF_LIGHT,
+            ways_m / SPEED_OF_LIGHT,
         )  # fmt: skip
 
     @cached_property

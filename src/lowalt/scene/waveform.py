@@ -64,7 +64,7 @@ class Look:
     reference: float
     """The target echo's mean |Y_bin|^2 (W), to which set SNRs refer."""
     delay_s: float
-    """Two-way delay of the target's reference point at n = 0, 2 r / c (s): where the beam was pointed."""
+    """Delay there and back of the place at which the receiver's beam was pointed first (s)."""
 
     @property
     def sample_s(self) -> float:
