@@ -167,7 +167,7 @@ def _arrays() -> list[Reader]:
     heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
-    index = {"format": "lowalt-shards-2", "shards": [], "kind": "image"}
+    index = {"format": "lowalt-shards-2", "shards": [], "kind": "image", "render": render}
     index["sha256"] = hashlib.sha256(json.dumps(index, sort_keys=True).encode()).hexdigest()
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
     said = predictions.from_facts(facts, (0,), np.eye(4)[np.arange(count) % 4])

@@ -4,17 +4,16 @@ This module does not depend on any stage. Faults are found before any job starts
 """
 
 import json
-import math
 import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-import jsonschema
 import yaml
 
 from lowalt.common.command import parser, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.schema import faults, plain
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
@@ -28,60 +27,9 @@ def merge(base: dict, overlay: dict) -> dict:
     return result
 
 
-def plain(value: object) -> object:
-    """Return `value` with infinities as the string "inf" (JSON has none) and integral floats unchanged."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and math.isinf(value):
-        return "inf" if value > 0 else "-inf"
-    return value
-
-
 def canonical(value: object) -> str:
     """Return the one JSON text of a settings block: sorted keys, so equal settings are equal texts."""
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
-
-
-def _expected(error: jsonschema.ValidationError) -> str:
-    """Return the schema's expectation in words."""
-    rule, wanted = error.validator, error.validator_value
-    words = {
-        "type": f"type {wanted}",
-        "minimum": f"at least {wanted}",
-        "maximum": f"at most {wanted}",
-        "exclusiveMinimum": f"more than {wanted}",
-        "exclusiveMaximum": f"less than {wanted}",
-        "enum": f"one of {wanted}",
-        "minItems": f"at least {wanted} item(s)",
-        "maxItems": f"at most {wanted} items",
-        "minProperties": f"at least {wanted} entry",
-        "uniqueItems": "every item once",
-        "pattern": f"text like {wanted}",
-    }
-    return words.get(str(rule), error.message)
-
-
-def faults(config: dict, schema: dict) -> list[str]:
-    """Return one line a fault of `config` against a JSON schema: key, value and what was expected."""
-    lines = []
-    errors = jsonschema.Draft202012Validator(schema).iter_errors(plain(config))
-    for error in sorted(errors, key=lambda error: list(map(str, error.absolute_path))):
-        key = ".".join(map(str, error.absolute_path)) or "configuration"
-        meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-        if error.validator == "additionalProperties":
-            known = error.schema.get("properties", {})
-            unknown = [name for name in error.instance if name not in known]
-            lines.append(f"{key}: unknown key(s) {unknown}, expected only {sorted(known)}")
-        elif error.validator == "required":
-            missing = [name for name in error.validator_value if name not in error.instance]
-            lines.append(f"{key}: missing key(s) {missing}")
-        else:
-            lines.append(
-                f"{key}: value {error.instance!r}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
-            )
-    return list(dict.fromkeys(lines))
 
 
 def check(config: dict, schema_path: str | Path) -> dict:

@@ -6,6 +6,9 @@ import numpy as np
 
 from lowalt.common.errors import InputError
 
+MOST_SPEEDS = 65536
+"""Speeds of a velocity-transfer spectrum: as many as the longest transform has points."""
+
 
 def whole(where: str, value: object, least: int) -> int:
     """Return an integer of at least `least`. Raises: InputError naming `where`."""
@@ -56,6 +59,9 @@ class Transfer:
                 raise InputError(f"spectra.vt.{name} is {value!r}, expected a finite speed in m/s")
         if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
             raise InputError(f"spectra.vt: speeds {values}, expected min < max and a positive step")
+
+        if (self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps >= MOST_SPEEDS:
+            raise InputError(f"spectra.vt: speeds {values}, expected a step that makes at most {MOST_SPEEDS} of them")
 
     @property
     def speeds_mps(self) -> np.ndarray:

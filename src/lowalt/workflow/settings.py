@@ -4,6 +4,7 @@ Snakemake compares these texts, so a changed value re-runs the stages that read 
 wildcards of a job and can stand in a rule's `params:`. A text is made once: Snakemake asks for it again and again.
 """
 
+import shlex
 from typing import Any
 
 from lowalt.common.config import canonical
@@ -170,6 +171,12 @@ class Settings:
     def evaluation(self, wildcards: Any) -> str:
         """Settings with which a network predicts."""
         return self._text("evaluation", **self._config["recognition"]["evaluation"])
+
+    def backbone(self, wildcards: Any) -> str:
+        """The option that names the code of the asked network's backbone, "" where a library has it."""
+        scheme = self._run.schemes_by_slug[wildcards.scheme] if wildcards.get("scheme") else self._run.asked
+        name = self._run.own_backbone(scheme)
+        return f"--backbone {shlex.quote(name)}" if name else ""
 
     def seed(self, wildcards: Any) -> str:
         """The run's seed alone, for tables with intervals."""
