@@ -137,7 +137,7 @@ def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, cap
     with pytest.raises(InputError, match="may not choose"):
         zoo.main(["--model", "a.pt", "--views", "none", "--name", "a"])
     assert not (tmp_path / "made").exists()
-    with pytest.raises(InputError, match="code.py:run"):
+    with pytest.raises(InputError, match=r"code\.py:run"):
         runs.load("a.pt", "code.py:run")
     assert (tmp_path / "made").exists()
 
@@ -164,7 +164,7 @@ def test_a_network_larger_than_its_weights_takes_no_memory(trained, tmp_path):
     for name in ("vit_giant_patch14_224", "test_vit2"):
         state["network"] = {**state["network"], **large, "backbone": name}
         checkpoint.save(tmp_path / "a.pt", identity, state)
-        with pytest.raises(InputError, match="do not fit its network|not a trained model"):
+        with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
             runs.load(tmp_path / "a.pt")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
 
