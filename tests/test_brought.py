@@ -12,9 +12,16 @@ import torch
 
 from lowalt.__main__ import main
 from lowalt.common.errors import InputError
-from lowalt.recognition import checkpoint, model_file, runs, zoo
+from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition import checkpoint, model_file, runs, samples, zoo
 from lowalt.recognition.__main__ import main as recognition
-from trainings import SCHEME, SETTINGS
+from lowalt.shards import ShardSet, index
+from lowalt.shards.build import write_run
+from lowalt.shards.dataset import Dataset
+from lowalt.shards.remake import number_of, opened
+from lowalt.tiles.files import Tiles
+from test_dataset import configuration
+from trainings import SCHEME, SETTINGS, write_views
 
 DAMAGE = (
     None,
@@ -117,6 +124,26 @@ def test_a_checkpoint_with_a_damaged_setting_is_refused_in_one_line_or_the_same(
             assert found == "refused" or torch.equal(found.model(image), good), (where, new)
 
 
+def test_an_index_with_a_damaged_setting_is_refused_in_one_line_or_makes_samples(tmp_path):
+    write_run(Dataset(configuration(effects={"receiver_noise": {}, "adc": {"bits": 8}})), tmp_path, "signal")
+    path = tmp_path / "shards/index.json"
+    whole = json.loads(path.read_text())
+    key = ShardSet(path).keys[0].decode()
+    counted = {"refused": 0, "made": 0}
+    for _, _, block in damaged({name: whole[name] for name in ("kind", "render", "echo")}):
+        content = {**whole, **block}
+        content["sha256"] = index._checksum(content)
+        path.write_text(json.dumps(content))
+
+        def remade():
+            """Faults of a sample made again by the index as it is now."""
+            remaker = opened(path)
+            return remaker.faults(number_of(remaker.shards, key))
+
+        counted["refused" if line_of(remade) == "refused" else "made"] += 1
+    assert counted["refused"] > 3 * counted["made"] > 0
+
+
 def test_no_file_names_code_and_its_user_may(trained, tmp_path, monkeypatch, capsys, signals):
     identity, state = checkpoint.load(trained / "model.pt")
     monkeypatch.chdir(tmp_path)
@@ -167,6 +194,19 @@ def test_a_network_larger_than_its_weights_takes_no_memory(trained, tmp_path):
         with pytest.raises(InputError, match=r"do not fit its network|not a trained model"):
             runs.load(tmp_path / "a.pt")
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000
+
+
+def test_facts_of_other_shapes_offsets_in_words_and_null_bytes_are_refused_in_one_line(tmp_path):
+    views, tiles, text = (tmp_path / name for name in ("views.npz", "tiles.npz", "a.yaml"))
+    with np.load(write_views(views, 5)) as data:
+        good = dict(data)
+    for name, value in (("range_m", np.array(1.0)), ("label", good["label"].astype(str)), ("fold", np.array("train"))):
+        np.savez(views, **{**good, name: value})
+        assert line_of(samples.ViewSamples, [views], [0], {("seen", "train")}) == "refused"
+    np.savez(tiles, data=np.zeros(6, np.uint8), offsets=np.array(["0", "6"]))
+    assert line_of(Tiles, tiles) == "refused"
+    text.write_bytes(bytes(9))
+    assert line_of(load_yaml, text) == "refused"
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])

@@ -95,14 +95,13 @@ def predict(given: argparse.Namespace) -> str:
 
     if given.input.suffix not in (".png", ".npy"):
         raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
-    existing(given.input, "input")
     config = load([given.base, *given.overlay], given.schema) if given.overlay else {}
     own = given.backbone or (config["recognition"]["network"]["backbone"] if config else "")
     model, settings = opened(given.model, own=own)
     if config or not settings:
         config = config or load([given.base], given.schema)
         settings = {key: config[key] for key in ("network", "spectra", "images")}
-    found = probabilities(model, given.input, settings)
+    found = probabilities(model, existing(given.input, "input"), settings)
     if given.json:
         return as_json(found)
     return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))

@@ -75,6 +75,7 @@ class Vectors(Classical):
     ARRAYS = ("mean", "scale", "support", "weights", "offset", "gamma", "temperature")
 
     def _fits(self, features: int) -> bool:
+        """As `Classical._fits`."""
         count, classes = len(self.support), len(self.offset)
         wanted = ((features,), (features,), (count, features), (count, classes), (classes,), (), ())
         arrays = [getattr(self, name) for name in self.ARRAYS]
@@ -100,6 +101,7 @@ class Trees(Classical):
     ARRAYS = ("feature", "threshold", "left", "right", "value", "label", "offset", "depth", "temperature")
 
     def _fits(self, features: int) -> bool:
+        """As `Classical._fits`, with all numbers of nodes, features and classes in range."""
         trees, nodes = self.feature.shape
         limits = {"feature": features, "left": nodes, "right": nodes, "label": len(self.offset), "depth": nodes + 1}
         shapes = {"label": (trees,), "offset": (len(self.offset),), "depth": (), "temperature": ()}
