@@ -82,7 +82,7 @@ def _expected(error: jsonschema.ValidationError) -> str:
     return words.get(str(rule), error.message if len(error.message) <= LONGEST else "another value")
 
 
-def _sentence(error: jsonschema.ValidationError, whole: str) -> str:
+def _sentence(error: Any, whole: str) -> str:
     """One fault in words; whole: the word for all that was checked."""
     key = ".".join(map(str, error.absolute_path)) or whole
     if error.validator == "additionalProperties":
