@@ -195,8 +195,9 @@ def test_a_compressed_recipe_is_refused_unread(tmp_path):
 
 def index_of(folder, **changes):
     entry = {"name": "a", "path": "a.tar", "group": "seen", "fold": "train", "samples": 1, "bytes": 1}
-    entry |= {"table_sha256": "", **changes}
-    content = {"format": index.FORMAT, "kind": "image", "shards": [entry]}
+    entry |= {"table_sha256": "0" * 64, **changes}
+    render = {name: load_yaml("config/default.yaml")[name] for name in ("network", "spectra", "images")}
+    content = {"format": index.FORMAT, "kind": "image", "shards": [entry], "render": render}
     content["sha256"] = index._checksum(content)
     (folder / "index.json").write_text(json.dumps(content))
     return folder / "index.json"
@@ -207,5 +208,5 @@ def test_an_index_whose_shards_lie_elsewhere_or_are_no_shards_is_refused_though_
     for path in ("../a.tar", "/etc/passwd", "b/../../a.tar"):
         with pytest.raises(InputError, match=r"index.json: shard '.*' lies outside the index's folder"):
             index.load(index_of(tmp_path, path=path))
-    with pytest.raises(InputError, match=r"a shard lacks \['samples'\]"):
+    with pytest.raises(InputError, match=r"shards\.0\.samples: value '1', expected type integer"):
         index.load(index_of(tmp_path, samples="1"))

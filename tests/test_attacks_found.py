@@ -95,7 +95,7 @@ def test_a_sound_file_without_format_or_samples_is_refused(chunk, tmp_path):
         ("a.npy", np.zeros(400, complex), r"complex128 \(400,\), expected complex \(stations, symbols\)"),
         ("a.npy", np.zeros((2, 400), complex), r"signals have shape \(2, 400\), expected \(3, 400\)"),
         ("a.npy", np.full((3, 400), np.nan, complex), "NaN or infinite"),
-        ("a.npy", b"x", "not an array file"),
+        ("a.npy", b"x", "not a whole signals file"),
         ("a.wav", b"x", r"expected signals \(.npy\) or a tile \(.png\)"),
     ],
 )  # fmt: skip

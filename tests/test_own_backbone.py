@@ -63,17 +63,6 @@ def test_weights_of_a_library_do_not_fit_a_module_of_one_s_own(file):
         network.backbone(f"{file}:small", "hub", 24)
 
 
-def test_a_file_elsewhere_is_not_run(file, tmp_path, monkeypatch):
-    (tmp_path / "below").mkdir()
-    monkeypatch.chdir(tmp_path / "below")
-    for name in (str(file), "../mine.py"):
-        with pytest.raises(InputError, match="not in this folder"):
-            network.backbone(f"{name}:small", "none", 24)
-    (tmp_path / "below/link.py").symlink_to(file)
-    with pytest.raises(InputError, match="not in this folder"):
-        network.backbone("link.py:small", "none", 24)
-
-
 def test_a_file_with_a_fault_is_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bad.py").write_text("def small(size:\n")

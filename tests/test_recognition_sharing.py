@@ -17,6 +17,7 @@ from lowalt.common.errors import InputError
 from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, upload, zoo
 from lowalt.recognition.export import export
 from made_predictions import facts
+from pictures import IMAGES, NETWORK, SPECTRA
 from trainings import SCHEME, SETTINGS, equal, sources
 
 ROOT = Path(__file__).parent.parent
@@ -33,7 +34,7 @@ def finished(trained, tmp_path):
     """The model.pt of a training inside the folder of a run with a table of accuracy and a configuration."""
     place = tmp_path / "results/mine/models/seen/ab-vrp-vt/3"
     shutil.copytree(trained, place)
-    config = {"network": {"carrier_hz": 1.0}, "spectra": {"vrp": None}, "images": {"size": 32}, "split": {}}
+    config = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES, "split": {}}
     (tmp_path / "results/mine/config.yaml").write_text(yaml.safe_dump(config))
     (tmp_path / "results/mine/accuracy.csv").write_text(TABLE)
     return place / "model.pt"
@@ -58,7 +59,7 @@ def test_a_safetensors_file_holds_the_weights_and_all_that_made_them(finished, v
     assert about["identity"] == json.loads(identity)
     assert about["identity"]["samples"]["train"] == sources(views)["train"].sha256()
     assert about["run"] == json.loads(finished.with_name("run.json").read_text())
-    assert about["input"] == {"network": {"carrier_hz": 1.0}, "spectra": {"vrp": None}, "images": {"size": 32}}
+    assert about["input"] == {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
     again, made = zoo.opened(tmp_path / "one.safetensors")
     assert torch.equal(answers(again, views), answers(model, views)) and made == about["input"]
     assert (again.scheme, again.size, again.seed, again.classes) == (SCHEME, 32, 3, tuple(SETTINGS["classes"]))
@@ -158,7 +159,7 @@ def test_an_entry_that_loses_accuracy_or_is_large_or_ill_named_is_not_written(fi
     with pytest.raises(InputError, match="other samples"):
         zoo.entry(finished, sources(views)["train"], "mine", tmp_path)
     monkeypatch.setattr(zoo, "LARGEST_BYTES", 10_000_000)
-    monkeypatch.setattr(zoo, "small", lambda content: replace(
+    monkeypatch.setattr(zoo, "small", lambda content, own: replace(
         content, tensors={name: value * 0 for name, value in content.tensors.items()}))  # fmt: skip
     with pytest.raises(InputError, match="points less"):
         zoo.entry(finished, samples, "mine", tmp_path)

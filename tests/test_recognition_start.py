@@ -152,7 +152,7 @@ def test_a_killed_started_training_resumes_and_another_start_begins_anew(both, t
 
 def test_a_file_that_is_no_network_is_refused_by_name(tmp_path):
     checkpoint.save(tmp_path / "model.pt", "{}", {"twin": "x"})
-    with pytest.raises(InputError, match=r"model\.pt is not a trained model"):
+    with pytest.raises(InputError, match=r"model\.pt: model: unknown key"):
         opened(tmp_path / "model.pt")
 
 

@@ -145,8 +145,8 @@ def test_the_command_writes_a_line_a_call_and_says_how_many_it_has(monkeypatch, 
     effects_cost.main(["--settings", settings, "--samples", "none.npz", "--model", "model.pt", "--out", out])
     assert capsys.readouterr().err == f"{out}: 1 calls, 6 motion models\n"
     assert [line["call"] for line in read_csv(out, *COLUMNS)] == ["none"]
-    ((path, calls, evaluation),) = asked
-    assert (path, [header["name"] for header, _ in calls], evaluation) == ("model.pt", ["none"], {"batch": 2})
+    ((path, calls, evaluation, own),) = asked
+    assert (path, [header["name"] for header, _ in calls], evaluation, own) == ("model.pt", ["none"], {"batch": 2}, "")
 
 
 def test_the_spectrum_that_changes_most_is_shown():

@@ -41,9 +41,10 @@ rule effects_table:
     threads: config["recognition"]["evaluation"]["threads"]
     params:
         settings=settings.effects_table,
+        backbone=settings.backbone,
     shell:
         "python -m lowalt.measure.effects_cost --settings {params.settings:q} --samples {input.samples:q}"
-        " --model {input.model:q} --out {output:q} 2> {log:q}"
+        " --model {input.model:q} {params.backbone:q} --out {output:q} 2> {log:q}"
 
 
 rule effects_figure:

@@ -175,9 +175,10 @@ rule evaluate:
     params:
         settings=settings.evaluation,
         source=options.samples,
+        backbone=settings.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --out {output.table:q} 2> {log:q}"
 
 
 rule tables:
@@ -233,9 +234,10 @@ rule transfer_evaluate:
     params:
         settings=settings.evaluation,
         source=options.samples,
+        backbone=settings.backbone,
     shell:
         "python -m lowalt.recognition evaluate --settings {params.settings:q} {params.source:q}"
-        " --frozen {input.frozen:q} --model {input.model:q} --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
+        " --frozen {input.frozen:q} --model {input.model:q} {params.backbone:q} --trained-on {wildcards.other:q} --out {output.table:q} 2> {log:q}"
 
 
 rule transfer:

@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from lowalt.commands.for_programs import as_json, json_option
+from lowalt.common.command import name_backbone
 from lowalt.common.config import load
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
@@ -35,6 +36,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     )  # fmt: skip
     predict.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
     predict.add_argument("input", type=Path, help="tile (.png), or signals (stations, symbols) complex (.npy)")
+    name_backbone(predict)
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
     predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
     predict.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
@@ -97,9 +99,11 @@ def predict(given: argparse.Namespace) -> str:
 
     if given.input.suffix not in (".png", ".npy"):
         raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
-    model, settings = opened(given.model)
-    if given.overlay or not settings:
-        config = load([given.base, *given.overlay], given.schema)
+    config = load([given.base, *given.overlay], given.schema) if given.overlay else {}
+    own = given.backbone or (config["recognition"]["network"]["backbone"] if config else "")
+    model, settings = opened(given.model, own=own)
+    if config or not settings:
+        config = config or load([given.base], given.schema)
         settings = {key: config[key] for key in ("network", "spectra", "images")}
     found = probabilities(model, existing(given.input, "input"), settings)
     if given.json:

@@ -32,9 +32,12 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
     """
     path = existing(path, what)
     try:
-        return np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+        found = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a whole {what} file ({error})") from error
+    if not isinstance(found, np.ndarray):
+        raise InputError(f"{path}: an archive of arrays, expected {what}, one array (.npy)")
+    return found
 
 
 def checked_archive(path: str | Path, what: str) -> Path:

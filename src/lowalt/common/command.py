@@ -34,6 +34,13 @@ def parser(module: str, description: str) -> argparse.ArgumentParser:
     return result
 
 
+def name_backbone(line: argparse.ArgumentParser) -> None:
+    """Add the option with which a user names the code of a model's backbone, which the model's file may not choose."""
+    line.add_argument(
+        "--backbone", default="", metavar="FILE.py:FUNCTION", help="for a model on code of its maker's own: that code"
+    )
+
+
 def _argument(text: str) -> dict:
     """Return `settings` of the text and keep its error message: argparse replaces the message of any ValueError."""
     try:

@@ -4,19 +4,17 @@ This module does not depend on any stage. Faults are found before any job starts
 """
 
 import json
-import math
 import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
-import jsonschema
 import yaml
 
 from lowalt.common.command import parser, run
-from lowalt.common.errors import InputError, instead
+from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.common.schema import faults, plain
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
@@ -30,77 +28,9 @@ def merge(base: dict, overlay: dict) -> dict:
     return result
 
 
-def plain(value: object) -> object:
-    """Return `value` with infinities and NaN as the texts "inf" and "nan", which JSON has not as numbers."""
-    if isinstance(value, dict):
-        return {key: plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(item) for item in value]
-    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
-
-
 def canonical(value: object) -> str:
     """Return the one JSON text of a settings block: sorted keys, so equal settings are equal texts."""
     return json.dumps(plain(value), sort_keys=True, allow_nan=False)
-
-
-COUNTS = ("minProperties", "maxProperties")
-"""Rules of a schema on the number of a block's keys."""
-
-
-def _expected(error: Any) -> str:
-    """Return the schema's expectation in words."""
-    rule, wanted = error.validator, error.validator_value
-    if rule == "oneOf":
-        # A number out of its range is told that; anything else, which types there are.
-        ranges = [choice for choice in error.context if choice.validator not in ("type", "const")]
-        return _expected(ranges[0]) if ranges else " or ".join(str(one.get("const", one.get("type"))) for one in wanted)
-    if rule == "dependentRequired":
-        return " together with ".join(next([key, *others] for key, others in wanted.items() if key in error.instance))
-    words = {
-        "type": f"type {wanted}",
-        "minimum": f"at least {wanted}",
-        "maximum": f"at most {wanted}",
-        "exclusiveMinimum": f"more than {wanted}",
-        "exclusiveMaximum": f"less than {wanted}",
-        "enum": f"one of {wanted}",
-        "minItems": f"at least {wanted} item(s)",
-        "maxItems": f"at most {wanted} items",
-        "minProperties": f"at least {wanted} key(s)",
-        "maxProperties": f"at most {wanted} key(s)",
-        "uniqueItems": "every item once",
-        "pattern": f"text like {wanted}",
-        "not": f"none of {wanted.get('enum')}" if isinstance(wanted, dict) else "",
-    }
-    return words.get(str(rule), error.message)
-
-
-def faults(config: dict, schema: dict) -> list[str]:
-    """Return one line a fault of `config` against a JSON schema: key, value and what was expected.
-
-    Of the items of a list with the same fault, the first is named.
-    """
-    lines: dict[tuple, str] = {}
-    errors = jsonschema.Draft202012Validator(schema).iter_errors(plain(config))
-    for error in sorted(errors, key=lambda error: ([*map(str, error.absolute_path)], error.validator in COUNTS)):
-        block = tuple(part for part in error.absolute_path if isinstance(part, str))
-        # Of a block with another fault, the number of its keys says nothing more.
-        if error.validator not in COUNTS or not any(other[:-1] == block for other in lines):
-            key = ".".join(map(str, error.absolute_path)) or "configuration"
-            lines.setdefault((*block, error.validator), f"{key}: {_fault(error)}")
-    return list(lines.values())
-
-
-def _fault(error: Any) -> str:
-    """Return what is wrong with a value and what was expected."""
-    if error.validator == "additionalProperties":
-        known = sorted(error.schema.get("properties", {}))
-        unknown = [name for name in error.instance if name not in known]
-        return f"unknown key(s) {unknown}, expected {instead(unknown, known)}"
-    if error.validator == "required":
-        return f"missing key(s) {[name for name in error.validator_value if name not in error.instance]}"
-    meaning = error.schema.get("description", "") if isinstance(error.schema, dict) else ""
-    return f"value {error.instance!r}, expected {_expected(error)}" + f" ({meaning})" * bool(meaning)
 
 
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")

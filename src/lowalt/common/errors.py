@@ -23,5 +23,10 @@ class SpaceError(InputError):
     """A disk or memory is too small; the message names the file or run, what it needs, and what is free."""
 
 
+def in_one_line(error: Exception) -> str:
+    """Return what a library's error says, as one line of bounded length."""
+    return " ".join(str(error).split())[:200]
+
+
 class InputWarning(UserWarning):
     """The user's input is used as it is, although something in it looks wrong; the message says what and where."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import yaml
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, in_one_line
 from lowalt.common.files import text_of
 
 
@@ -82,7 +82,7 @@ def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys"
         raise
     # The library also raises errors of its converters, as for a date of month 99 or a number of 5000 digits.
     except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
-        raise InputError(f"{path}: not YAML ({' '.join(str(error).split())})") from error
+        raise InputError(f"{path}: not YAML ({in_one_line(error)})") from error
     except RecursionError:
         raise InputError(f"{path}: mappings and lists stand in each other too deeply, expected a few levels") from None
     if not isinstance(value, dict):

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
+from lowalt.common.command import name_backbone, parser, pick, run
 from lowalt.common.csv_tables import short, write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
@@ -156,17 +156,21 @@ class _Held:
         return self.images[numbers]
 
 
-def recognised(model: str, calls: list[tuple[dict, dict]], block: dict) -> tuple[dict[str, np.ndarray], dict]:
+def recognised(
+    model: str, calls: list[tuple[dict, dict]], block: dict, own: str = ""
+) -> tuple[dict[str, np.ndarray], dict]:
     """Return which samples of each call a trained model recognises, (K, S) bool by name, and {scheme, protocol}.
 
-    model: model.pt; block: recognition.evaluation. Raises: InputError where the images are not of the model's size.
+    model: model.pt; block: recognition.evaluation; own: as in `runs.of_state`.
+
+    Raises: InputError where the images are not of the model's size.
     """
     from lowalt.recognition import recipe, runs
     from lowalt.recognition.inference import Machine, evaluation, probabilities
     from lowalt.recognition.schemes import columns_in
 
     batch, threads, precision, mirror, _ = evaluation(block)
-    trained = runs.load(model)
+    trained = runs.load(model, own)
     recipe.seeded(trained.seed, ("evaluate",), threads)
     machine = Machine.here(precision)
     network = trained.model.to(machine.device)
@@ -188,11 +192,12 @@ def main(arguments: list[str]) -> None:
     options = parser("lowalt.measure.effects_cost", __doc__.splitlines()[0])
     options.add_argument("--samples", nargs="+", required=True, help="files of lowalt.measure.effects_samples")
     options.add_argument("--model", required=True, help="model.pt of a network trained without effects")
+    name_backbone(options)
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
     seed, evaluation = pick(given.settings, "seed", "evaluation")
     calls = gathered([read_samples(path) for path in given.samples])
-    right, network = recognised(given.model, calls, evaluation)
+    right, network = recognised(given.model, calls, evaluation, given.backbone)
     table = rows(calls, right, network, seed)
     write(given.out, table)
     print(f"{given.out}: {len(table)} calls, {len(calls[0][1]['label'])} motion models", file=sys.stderr)

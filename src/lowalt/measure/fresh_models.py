@@ -93,7 +93,8 @@ def measure(config: dict, folder: Path, table: choose.Choices, out: Path) -> lis
         if not (into / "predictions.json").is_file():
             shutil.rmtree(into, ignore_errors=True)
             runs.train({"train": train, "validation": parts["validation"]}, scheme, "without fold 0", settings, into)
-            runs.evaluate(runs.load(into / "model.pt"), asked, evaluation, into / "predictions.csv")
+            trained = runs.load(into / "model.pt", scheme.backbone_of(settings["network"]))
+            runs.evaluate(trained, asked, evaluation, into / "predictions.csv")
             about = json.loads((into / "run.json").read_text())
             count = round(training["stream"] * training["batch"]) * training["steps"]
             places = [fresh.place(position) for position in range(count)]

@@ -4,7 +4,7 @@ import json
 import sys
 from pathlib import Path
 
-from lowalt.common.command import dispatch, parser, pick, run
+from lowalt.common.command import dispatch, name_backbone, parser, pick, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
@@ -26,11 +26,8 @@ def _views(arguments: list[str]) -> None:
     given = line.parse_args(arguments)
     if (given.reduced is None) != (given.motion is None):
         raise InputError("expected both --reduced and --motion, or neither")
-    if given.reduced:
-        size, levels = pick(given.settings, "size", "snr_db")
-        source = Reduced(Path(given.reduced), Path(given.motion), tuple(map(float, levels)))
-    else:
-        (size,), source = pick(given.settings, "size"), None
+    size, *levels = pick(given.settings, "size", *(["snr_db"] if given.reduced else []))
+    source = Reduced(Path(given.reduced), Path(given.motion), tuple(map(float, levels[0]))) if levels else None
     count = cache_shard(given.index, given.shard, size, given.out, source)
     print(f"{given.out}: {count} samples", file=sys.stderr)
 
@@ -137,14 +134,15 @@ def _evaluate(arguments: list[str]) -> None:
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
     name_sources(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
+    name_backbone(line)
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
     given = line.parse_args(arguments)
     for sums in given.frozen:
         verify(sums)
-    trained = load(given.model)
-    parts = ("validation", "test", *(("seen_test",) if trained.protocol == "unseen" else ()))
-    pairs = set().union(*(folds(trained.protocol, part) for part in parts))
+    trained = load(given.model, given.backbone)
+    seen = ("seen_test",) if trained.protocol == "unseen" else ()
+    pairs = set().union(*(folds(trained.protocol, part) for part in ("validation", "test", *seen)))
     found = _open(given, pairs, trained.scheme, trained.size, placed=True)
     evaluate(trained, found, given.settings, given.out, given.trained_on)
 
@@ -226,10 +224,11 @@ def _export(arguments: list[str]) -> None:
 
     line = parser("lowalt.recognition export", _export.__doc__)
     line.add_argument("--model", required=True, help="model.pt of a training run")
+    name_backbone(line)
     line.add_argument("--out", required=True, help="file to write: .safetensors (and its card, .md), .pt2 or .onnx")
     given = line.parse_args(arguments)
     pick(given.settings)
-    export(load(given.model), given.out)
+    export(load(given.model, given.backbone), given.out)
 
 
 COMMANDS = {

@@ -10,8 +10,9 @@ from pathlib import Path
 
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, in_one_line
 from lowalt.common.files import existing, replacing
+from lowalt.common.schema import check_brought
 
 
 def _digest(state: object) -> str:
@@ -21,6 +22,9 @@ def _digest(state: object) -> str:
     def walk(value: object) -> None:
         """Feed a value, and all values inside it, to the hasher."""
         if isinstance(value, torch.Tensor):
+            # A tensor may state a size that its bytes do not hold, by repeating them.
+            if value.numel() * value.element_size() > value.untyped_storage().nbytes():
+                raise ValueError(f"a tensor of shape {tuple(value.shape)} in fewer bytes")
             raw = value.detach().cpu().contiguous()
             hasher.update(f"{raw.dtype}{tuple(raw.shape)}".encode())
             hasher.update(raw.flatten().view(torch.uint8).numpy().tobytes())
@@ -61,13 +65,28 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
         # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
         found, digest, state = content["identity"], content["digest"], content["state"]
+        theirs, own = json.loads(found), _digest(state)
     except Exception as error:
         # torch's reader meets damaged bytes with nearly any exception.
-        raise InputError(f"{path}: not a checkpoint ({str(error)[:200]})") from error
-    if _digest(state) != digest:
+        raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
+    if own != digest:
         raise InputError(f"{path}: checkpoint is damaged, its values do not match their SHA-256")
     if name is not None and found != name:
-        theirs, ours = json.loads(found), json.loads(name)
+        ours = json.loads(name)
         differs = sorted(key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key))
         raise InputError(f"{path}: checkpoint of another run, its {', '.join(differs)} differ")
     return found, state
+
+
+def model(path: str | Path) -> tuple[dict, dict]:
+    """Return the identity and the state of a trained model's file; nothing is built, its settings are checked.
+
+    Raises: InputError as `load`, or naming the setting that is wrong.
+    """
+    found, state = load(path)
+    if not isinstance(state, dict) or not isinstance(json.loads(found), dict):
+        raise InputError(f"{path}: not a trained model, expected a model.pt")
+    check_brought("model", {name: value for name, value in state.items() if name != "weights"}, path)
+    if "weights" not in state:
+        raise InputError(f"{path}: not a trained model, it has no weights")
+    return json.loads(found), state

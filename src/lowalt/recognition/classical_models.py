@@ -37,6 +37,22 @@ class Classical(nn.Module):
         """Return the features: a target turned by 180 degrees has the same."""
         return features
 
+    def check(self, features: int, classes: int) -> None:
+        """Refuse arrays of a file that do not fit together.
+
+        features: numbers of a sample; classes: their number. Raises: InputError.
+        """
+        try:
+            good = self._fits(features) and self.classes == classes
+        except (TypeError, ValueError, IndexError, RuntimeError):
+            good = False
+        if not good:
+            raise InputError(f"its arrays do not fit together, {features} features and {classes} classes")
+
+    def _fits(self, features: int) -> bool:
+        """Whether the arrays fit together and to samples of so many features."""
+        raise NotImplementedError
+
     def scores(self, features: torch.Tensor) -> torch.Tensor:
         """Features (B, D) float64 -> scores (B, classes)."""
         raise NotImplementedError
@@ -58,6 +74,14 @@ class Vectors(Classical):
 
     ARRAYS = ("mean", "scale", "support", "weights", "offset", "gamma", "temperature")
 
+    def _fits(self, features: int) -> bool:
+        """As `Classical._fits`."""
+        count, classes = len(self.support), len(self.offset)
+        wanted = ((features,), (features,), (count, features), (count, classes), (classes,), (), ())
+        arrays = [getattr(self, name) for name in self.ARRAYS]
+        return all(array.shape == shape and array.dtype == torch.float64
+                   for array, shape in zip(arrays, wanted, strict=True))  # fmt: skip
+
     def scores(self, features: torch.Tensor) -> torch.Tensor:
         """Features (B, D) float64 -> decision functions (B, classes)."""
         scaled = (features - self.mean) / self.scale
@@ -75,6 +99,18 @@ class Trees(Classical):
     """
 
     ARRAYS = ("feature", "threshold", "left", "right", "value", "label", "offset", "depth", "temperature")
+
+    def _fits(self, features: int) -> bool:
+        """As `Classical._fits`, with all numbers of nodes, features and classes in range."""
+        trees, nodes = self.feature.shape
+        limits = {"feature": features, "left": nodes, "right": nodes, "label": len(self.offset), "depth": nodes + 1}
+        shapes = {"label": (trees,), "offset": (len(self.offset),), "depth": (), "temperature": ()}
+        return all(
+            array.shape == shapes.get(name, (trees, nodes))
+            and array.dtype == (torch.int64 if name in limits else torch.float64)
+            and (name not in limits or bool(((array >= 0) & (array < limits[name])).all()))
+            for name, array in self.named_buffers()
+        )
 
     def scores(self, features: torch.Tensor) -> torch.Tensor:
         """Features (B, D) float64 -> scores (B, classes)."""

@@ -21,8 +21,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
 from lowalt.common.classes import stated
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, in_one_line
 from lowalt.common.files import existing, replacing, text_of
+from lowalt.common.schema import check_brought
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
 from lowalt.recognition.eight_bits import restored
@@ -61,12 +62,12 @@ def of_run(path: str | Path) -> ModelFile:
 
     Raises: InputError where the model is missing or damaged.
     """
-    identity, state = checkpoint.load(path)
+    identity, state = checkpoint.model(path)
     tensors = {name: value.contiguous() for name, value in state.pop("weights").items()}
     record, folder = Path(path).with_name("run.json"), run_folder(path)
     config = load_yaml(folder / "config.yaml") if folder and (folder / "config.yaml").is_file() else {}
     return ModelFile(
-        tensors, json.loads(identity), {**state, "classes": list(stated(state))},
+        tensors, identity, {**state, "classes": list(stated(state))},
         json.loads(text_of(record, "run record")) if record.is_file() else {},
         {name: config[name] for name in INPUT} if config else {},
     )  # fmt: skip
@@ -104,22 +105,24 @@ def read(path: str | Path) -> ModelFile:
         with safe_open(path, framework="pt") as file:
             about = json.loads((file.metadata() or {})["lowalt"])
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        digest = about.pop("digest")
-        content = ModelFile(tensors, **about)
+        digest, own = about.pop("digest"), _digest(tensors, about)
     except (SafetensorError, OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
-        raise InputError(f"{path}: not a model file of lowalt ({type(error).__name__}: {str(error)[:200]})") from error
-    if _digest(tensors, about) != digest:
+        raise InputError(
+            f"{path}: not a model file of lowalt ({type(error).__name__}: {in_one_line(error)})"
+        ) from error
+    if own != digest:
         raise InputError(f"{path}: model file is damaged, its content does not match its SHA-256")
-    return content
+    check_brought("about", about, path)
+    return ModelFile(tensors, **about)
 
 
-def trained(content: ModelFile, path: str | Path) -> Trained:
-    """Return the model of a file's content, ready to answer; path: where it came from.
+def trained(content: ModelFile, path: str | Path, own: str = "") -> Trained:
+    """Return the model of a file's content, ready to answer; path: where it came from; own: as in `runs.of_state`.
 
     Raises: InputError where weights and settings do not fit together.
     """
     try:
         weights = restored(content.tensors) if content.weights == EIGHT else content.tensors
-    except (KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
-    return of_state({**content.model, "weights": weights}, path)
+    except (KeyError, TypeError, IndexError, RuntimeError) as error:
+        raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
+    return of_state({**content.model, "weights": weights}, path, own)

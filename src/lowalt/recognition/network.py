@@ -105,7 +105,7 @@ class Recogniser(Fused):
         """
         super().__init__()
         pick(block, *KEYS)
-        self.backbone = backbone(scheme.backbone or block["backbone"], block["weights"], size)
+        self.backbone = backbone(scheme.backbone_of(block), block["weights"], size)
         # Number of features that enter the classifier: some networks have a wider layer after their last features.
         width = getattr(self.backbone, "head_hidden_size", self.backbone.num_features)
         pre = self.backbone.pretrained_cfg

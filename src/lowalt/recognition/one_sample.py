@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 
+from lowalt.common.array_files import array_of
 from lowalt.common.errors import InputError
+from lowalt.common.files import existing
 from lowalt.common.network import Network
 from lowalt.recognition.runs import Trained
 from lowalt.recognition.schemes import columns_in, refuse_cues
@@ -23,7 +25,7 @@ def images_of(path: Path, settings: dict) -> np.ndarray:
     Raises: InputError naming the file, for another kind of file or a shape that does not fit.
     """
     if path.suffix == ".png":
-        tile, _ = _named(path, decode, path.read_bytes())
+        tile, _ = _named(path, decode, existing(path, "tile").read_bytes())
     else:
         tile = _named(path, Renderer.from_settings(settings).tile, _signals(path))
     return _named(path, split, tile, len(named(settings["spectra"])))
@@ -41,10 +43,7 @@ def _signals(path: Path) -> np.ndarray:
     """Return the complex array of a signal file. Raises: InputError naming the file, for another kind of file."""
     if path.suffix != ".npy":
         raise InputError(f"{path}: expected signals (.npy) or a tile (.png)")
-    try:
-        found = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path}: not an array file ({error})") from error
+    found = array_of(path, "signals")
     if found.dtype.kind != "c" or found.ndim != 2:
         raise InputError(f"{path}: {found.dtype} {found.shape}, expected complex (stations, symbols)")
     return found
@@ -76,4 +75,6 @@ def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     refuse_cues(trained.scheme, "predict")
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
+    if not torch.isfinite(found).all():
+        raise InputError(f"{trained.path}: answers {path} with numbers that are not finite, expected another model")
     return dict(zip(trained.classes, found.tolist(), strict=True))

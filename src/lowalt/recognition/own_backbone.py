@@ -1,8 +1,8 @@
 """A backbone of the user's own: a function of a Python file, which the configuration names as FILE.py:FUNCTION.
 
 The function takes the pixels a side of an image and returns a torch module, RGB images (B, 3, size, size) float32 to
-features (B, features). The file runs with the rights of the user, so it is to be trusted like any program. It lies in
-the folder in which the command runs or below it: a model keeps the name, and must not choose files elsewhere.
+features (B, features). The file runs with the rights of the user, so it is to be trusted like any program: its name
+comes from the user's configuration or command line. A model keeps the name, which is never followed.
 """
 
 import importlib.util
@@ -24,15 +24,28 @@ def file_of(name: str) -> Path | None:
     return Path(path) if colon and path.endswith(".py") else None
 
 
+def allowed(name: str, own: str) -> str:
+    """Return the backbone of a model whose file names `name`; own: the FILE.py:FUNCTION that the user names, or "".
+
+    Raises: InputError where the file names code and the user does not.
+    """
+    if file_of(name) is None:
+        return name
+    if file_of(own) is None:
+        raise InputError(
+            f"its backbone {name!r} is code, which a file may not choose; "
+            "expected `--backbone FILE.py:FUNCTION` with code that you trust"
+        )
+    return own
+
+
 def backbone(name: str, size: int) -> nn.Module:
     """Return the module that FILE.py:FUNCTION makes for size x size images, with its number of features noted.
 
-    Raises: InputError where the file is missing or outside of this folder, has no such function or ends in an error, or
-    where the module gives no features (B, features).
+    Raises: InputError where the file is missing, has no such function or ends in an error, or where the module gives no
+    features (B, features).
     """
     path = file_of(name)
-    if path is not None and not path.resolve().is_relative_to(Path.cwd().resolve()):
-        raise InputError(f"network: backbone {name!r}: {path} is not in this folder, expected a file in or below it")
     if path is None or not path.is_file():
         raise InputError(f"network: backbone {name!r}: no file {path}, expected FILE.py:FUNCTION of a file that exists")
     function = name.rpartition(":")[2]

@@ -7,7 +7,7 @@ palettes and the weights.
 import json
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from torch import nn
 
 from lowalt.common.classes import stated
 from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, in_one_line
 from lowalt.common.files import replacing, sha256
 from lowalt.common.hardware import describe
 from lowalt.recognition import (
@@ -33,6 +33,8 @@ from lowalt.recognition import (
 )  # fmt: skip
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.classical_models import of_arrays
+from lowalt.recognition.features import NAMES
+from lowalt.recognition.height_cue import WithHeight
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.methods import built
 from lowalt.recognition.samples import ViewSamples
@@ -41,6 +43,7 @@ from lowalt.recognition.slow_time import SlowTimeSamples
 from lowalt.recognition.start import Start, carry
 from lowalt.recognition.training import Trainer
 from lowalt.recognition.views import ShardSamples
+from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
 Samples = ViewSamples | ShardSamples | SlowTimeSamples
 
@@ -95,7 +98,7 @@ def train(
     if machine.rank == 0:
         _record(folder / "run.json", {
             "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
-            "backbone": scheme.method or scheme.backbone or settings["network"]["backbone"],
+            "backbone": scheme.method or scheme.backbone_of(settings["network"]),
             "weights": settings["network"]["weights"],
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
@@ -109,7 +112,7 @@ def train(
 
 def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine, begun: dict) -> str:
     """Return the JSON text of all that determines a training's weights."""
-    own = own_backbone.file_of(scheme.backbone or settings["network"]["backbone"])
+    own = own_backbone.file_of(scheme.backbone_of(settings["network"]))
     # Leave out settings that change no weight, and name the precision that this machine computes with.
     kept = {"checkpoint_s": None, "workers": None, "precision": machine.precision}
     return checkpoint.identity(
@@ -138,30 +141,61 @@ class Trained:
     classes: tuple[str, ...]
 
 
-def load(path: str | Path) -> Trained:
-    """Return the trained model of a `model.pt`.
+def load(path: str | Path, own: str = "") -> Trained:
+    """Return the trained model of a `model.pt`; own: as in `of_state`.
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
-    return of_state(checkpoint.load(path)[1], path)
+    return of_state(checkpoint.model(path)[1], path, own)
 
 
-def of_state(state: dict, path: str | Path) -> Trained:
-    """Return the trained model of what a model file keeps: `weights` and the settings of its network; path: its file.
+def of_state(state: dict, path: str | Path, own: str = "") -> Trained:
+    """Return the trained model of what a model file keeps: `weights` and the checked settings of its network.
 
-    Raises: InputError where weights and settings do not fit together.
+    path: its file; own: the user's FILE.py:FUNCTION for a model whose backbone is such code.
+    Raises: InputError where weights and settings do not fit together, or the backbone is code that nobody named.
     """
+    scheme, classes, weights = of_record(state["scheme"]), stated(state), state["weights"]
     try:
-        block = {**state["network"], "weights": "none"}
-        scheme = of_record(state["scheme"])
+        refuse_unfinite(weights, path)
         if scheme.sees == "features":
-            model = of_arrays(state["weights"])
+            model = of_arrays(weights)
+            model.check(len(NAMES) * len(scheme.stations), len(classes))
         else:
-            model = built(scheme, block, state["size"], state["colour_map"], len(stated(state)))
-            model.load_state_dict(state["weights"])
-        return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), stated(state))
-    except (KeyError, TypeError, RuntimeError) as error:
-        raise InputError(f"{path}: not a trained model ({str(error)[:200]})") from error
+            model = _network(scheme, state, len(classes), path, own)
+    except InputError as error:
+        raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
+    except Exception as error:
+        # torch and timm meet settings that do not fit together with nearly any exception.
+        raise InputError(f"{path}: not a trained model ({in_one_line(error)})") from error
+    return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
+
+
+def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: str) -> nn.Module:
+    """The network of a file with its weights; own: as in `of_state`."""
+    named = scheme.backbone_of(state["network"])
+    name = own_backbone.allowed(named, own)
+    block, told = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
+    views, size = len(scheme.columns), state["size"]
+
+    def made() -> nn.Module:
+        """The network with fresh weights."""
+        return built(told, block, size, state["colour_map"], classes)
+
+    def example() -> torch.Tensor | WithHeight:
+        """Two samples of zeros."""
+        if scheme.sees == "signals":
+            return torch.zeros(2, views, size, dtype=torch.complex64)
+        images = torch.zeros(2, views, size, size, dtype=torch.uint8)
+        return WithHeight(images, torch.zeros(2, len(scheme.stations))) if scheme.cues else images
+
+    if name == named:
+        return filled(made, example, state["weights"], path)
+    # The user's own code may not know of the device without memory.
+    model = made()
+    refuse_unfit(state["weights"], model, path)
+    model.load_state_dict(state["weights"])
+    return model
 
 
 def evaluate(

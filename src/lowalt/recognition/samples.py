@@ -48,6 +48,10 @@ class Facts:
 
 
 FACTS = tuple(entry.name for entry in fields(Facts))
+OF_STATIONS = ("range_m", "aspect_rad")
+"""Facts with a column a station."""
+KINDS = dict(zip(FACTS, ("U", "U", "iu", "fiu", "U", "U", "iu", "f", "f"), strict=True))
+"""Kinds of numpy's types that the facts of a file may have."""
 
 
 def joined(parts: list[Facts]) -> Facts:
@@ -99,6 +103,12 @@ def cached(path: Path, what: str, folds: set[tuple[str, str]], *names: str) -> C
     try:
         with np.load(path, allow_pickle=False) as data:
             facts = Facts(*(data[name] for name in FACTS))
+            if any(
+                value.dtype.kind not in KINDS[name] or value.ndim != 1 + (name in OF_STATIONS)
+                or len(value) != len(facts) or (name in OF_STATIONS and value.shape != facts.range_m.shape)
+                for name, value in vars(facts).items()
+            ):  # fmt: skip
+                raise ValueError("facts of other shapes or types than one of each sample")
             pairs = zip(facts.group.tolist(), facts.fold.tolist(), strict=True)
             keep = np.array([pair in folds for pair in pairs], dtype=bool)
             return Cached(facts, keep, {name: data[name] for name in names}) if keep.any() else None

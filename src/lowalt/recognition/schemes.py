@@ -11,8 +11,7 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
 
 A table may have more columns, which a row leaves empty to take the configuration's own:
 
-    size        pixels a side the network sees
-    steps       optimiser steps
+    size, steps pixels a side the network sees; optimiser steps
     share       share of the motion models of each subtype that train, 0..1 (empty: all)
     method      empty: the network on images. Otherwise the scheme sees signals or features and names no spectra:
                 cnn | complex | transformer on the stations' signals (fusion and stations as for images; size: symbols
@@ -34,11 +33,9 @@ TABLE = "config/schemes.csv"
 """Where the table of schemes stands if a command names no other."""
 SPECTRA = tuple(name.upper() for name in NAMES)
 """Spectra as the table of schemes writes them, in the catalogue's order."""
-FUSIONS = ("attention", "mean", "voting", "concatenation")
-PROTOCOLS = ("seen", "unseen")
+FUSIONS, PROTOCOLS = ("attention", "mean", "voting", "concatenation"), ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
-OPTIONAL = ("size", "steps", "share", "method", "cues")
-CUES = ("height",)
+OPTIONAL, CUES = ("size", "steps", "share", "method", "cues"), ("height",)
 SEES = {
     "": "images", "cnn": "signals", "complex": "signals", "transformer": "signals",
     "svm": "features", "boosting": "features", "xgboost": "features",
@@ -73,6 +70,10 @@ class Scheme:
         """Input of the scheme: "images", "signals" or "features"."""
         return SEES[self.method]
 
+    def backbone_of(self, network: dict) -> str:
+        """Return the scheme's own backbone, or that of the block `recognition.network`."""
+        return self.backbone or network["backbone"]
+
     def settled(self, settings: dict) -> dict:
         """Return the settings of a training with this row's own size and steps in them."""
         training = {**settings["training"], **({"steps": self.steps} if self.steps else {})}
@@ -96,7 +97,7 @@ class Scheme:
 
 
 def of_record(record: dict) -> Scheme:
-    """Return the scheme of a record in a trained model, `Scheme.record` with or without JSON's lists."""
+    """Return the scheme of a checked record in a trained model."""
     return Scheme(**{key: tuple(value) if isinstance(value, list) else value for key, value in record.items()})
 
 
@@ -125,8 +126,7 @@ def _indices(text: str, parts: list[str], known: tuple[str, ...], what: str, whe
 
 def _number(row: dict, column: str, kind: type, low: float, high: float, where: str) -> float:
     """Return the number in an optional column, its default where the cell is empty; refuse one out of range."""
-    text = row.get(column) or ""
-    if not text:
+    if not (text := row.get(column)):
         return 1.0 if column == "share" else 0
     try:
         value = kind(text)
@@ -167,7 +167,7 @@ def _cues(row: dict, where: str) -> str:
 
 
 def refuse_cues(scheme: Scheme, where: str) -> None:
-    """Raise InputError naming `where` and the scheme for a scheme with cues, where images are all there is."""
+    """Raise InputError naming `where` and the scheme for one with cues."""
     if scheme.cues:
         raise InputError(f"{where}: scheme {scheme.name!r} has the cue {scheme.cues!r}, expected one without cues")
 
@@ -204,7 +204,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
         fusion=row["fusion"],
         backbone=row["backbone"],
         protocols=protocols,
-        size=int(_number(row, "size", int, 8, 4096, where)),
+        size=int(_number(row, "size", int, 8, 4096 if method else 1024, where)),
         steps=int(_number(row, "steps", int, 1, 1e9, where)),
         share=float(_number(row, "share", float, 1e-6, 1.0, where)),
         method=method,

@@ -5,7 +5,6 @@ networks has, or has in another shape, stay fresh. The start may have seen no sa
 not train on, and may have been chosen by none that does not validate it; both are checked on the samples themselves.
 """
 
-import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,13 +50,11 @@ def opened(path: str | Path) -> Start:
 
     Raises: InputError where the file is missing, damaged, or no network.
     """
-    text, state = checkpoint.load(path)
-    if not {"scheme", "protocol", "network", "weights"} <= set(state):
-        raise InputError(f"--start: {path} is not a trained model, expected a model.pt")
+    identity, state = checkpoint.model(path)
     scheme = of_record(state["scheme"])
     if scheme.sees == "features":
         raise InputError(f"--start: {path} is of the method {scheme.method!r}, expected a network")
-    return Start(scheme, json.loads(text), state, sha256(path))
+    return Start(scheme, identity, state, sha256(path))
 
 
 def check_settings(start: Start, scheme: Scheme, settings: dict) -> None:

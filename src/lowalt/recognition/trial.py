@@ -55,7 +55,8 @@ def trial(
     runs.train(given, scheme, f"without fold {fold}", block, out)
     asked = joined_sources(parts["held"], parts["validation"])
     about = {"candidate": name, "fold": fold, "held": held}
-    runs.evaluate(runs.load(out / "model.pt"), asked, evaluation, out / "predictions.csv", more=about)
+    trained = runs.load(out / "model.pt", scheme.backbone_of(block["network"]))
+    runs.evaluate(trained, asked, evaluation, out / "predictions.csv", more=about)
 
 
 def main(arguments: list[str]) -> None:

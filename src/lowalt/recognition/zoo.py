@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from lowalt.common.command import run
+from lowalt.common.command import name_backbone, run
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.recognition import model_card, model_file
@@ -37,10 +37,11 @@ def names(zoo: Path = ZOO) -> list[str]:
     return sorted(path.stem for path in zoo.glob("*.safetensors"))
 
 
-def opened(given: str | Path, zoo: Path = ZOO) -> tuple[Trained, dict]:
+def opened(given: str | Path, zoo: Path = ZOO, own: str = "") -> tuple[Trained, dict]:
     """Return a trained model and how its images are made of signals ({network, spectra, images}; {} where unknown).
 
-    given: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo.
+    given: model.pt of a training, a model file (.safetensors), or the name of an entry of the zoo; own: the user's
+    FILE.py:FUNCTION for a model whose backbone is such code.
     Raises: InputError naming the entries there are, or the fault of the file.
     """
     path = Path(given)
@@ -49,17 +50,17 @@ def opened(given: str | Path, zoo: Path = ZOO) -> tuple[Trained, dict]:
         if str(given) not in names(zoo):
             raise InputError(f"model {str(given)!r}: not a file, and {zoo} has {names(zoo)}")
     if path.suffix != ".safetensors":
-        return load(path), {}
+        return load(path, own), {}
     content = model_file.read(path)
-    return model_file.trained(content, path), content.input
+    return model_file.trained(content, path, own), content.input
 
 
-def small(content: ModelFile) -> ModelFile:
-    """Return a model with its trained matrices in 8 bits.
+def small(content: ModelFile, own: str = "") -> ModelFile:
+    """Return a model with its trained matrices in 8 bits; own: as in `opened`.
 
     Raises: InputError for a model that is no network: its numbers are no rows of weights.
     """
-    found = model_file.trained(content, "model")
+    found = model_file.trained(content, "model", own)
     if found.scheme.sees == "features":
         raise InputError(f"--model: method {found.scheme.method!r}, expected a network; `export` writes it as it is")
     matrices = {name for name, value in found.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
@@ -84,10 +85,10 @@ def held_against(exact: Trained, entry: Trained, samples: Samples, batch: int = 
     }
 
 
-def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO) -> dict:
+def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO, own: str = "") -> dict:
     """Write NAME.safetensors and NAME.md into the zoo and return the measurements.
 
-    model: model.pt of a training; samples: its validation fold.
+    model: model.pt of a training; samples: its validation fold; own: as in `opened`.
     Raises: InputError for a name that is no plain file name, samples that are not the validation fold of the training,
     an entry of 1 MB or more, or one that loses accuracy.
     """
@@ -96,11 +97,11 @@ def entry(model: str | Path, samples: Samples, name: str, zoo: Path = ZOO) -> di
     content = model_file.of_run(model)
     if content.identity.get("samples", {}).get("validation") != samples.sha256():
         raise InputError(f"{model}: was validated on other samples, expected the validation fold of its own run")
-    reduced = small(content)
+    reduced = small(content, own)
     size = len(model_file.packed(reduced))
     if size >= LARGEST_BYTES:
         raise InputError(f"--model: {size} bytes in 8 bits, expected less than {LARGEST_BYTES}")
-    exact, answering = (model_file.trained(each, model) for each in (content, reduced))
+    exact, answering = (model_file.trained(each, model, own) for each in (content, reduced))
     measured = held_against(exact, answering, samples)
     if measured["percent"] < measured["exact_percent"] - FEWER_POINTS:
         raise InputError(
@@ -122,8 +123,9 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--signals", nargs="+", help="for models on signals: their caches (.npz)")
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
+    name_backbone(line)
     given = line.parse_args(arguments)
-    found = load(given.model)
+    found = load(given.model, given.backbone)
     refuse_cues(found.scheme, "--model")
     wanted = "views" if found.scheme.sees == "images" else "signals"
     paths, pairs = getattr(given, wanted), folds(found.protocol, "validation")
@@ -135,7 +137,7 @@ def main(arguments: list[str]) -> None:
         samples = SlowTimeSamples(paths, found.scheme.sees, found.scheme.columns, pairs)
     if samples.size != found.size:
         raise InputError(f"--{wanted}: size {samples.size}, the model sees {found.size}")
-    measured = entry(given.model, samples, given.name, given.out)
+    measured = entry(given.model, samples, given.name, given.out, given.backbone)
     print(
         f"{given.name}: {(given.out / given.name).with_suffix('.safetensors').stat().st_size} bytes, validation "
         f"{measured['exact_percent']:.3f} % as trained, {measured['percent']:.3f} % in 8 bits, "

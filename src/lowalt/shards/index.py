@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256, text_of
+from lowalt.common.schema import check_brought
 from lowalt.shards.table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
@@ -80,35 +81,21 @@ def _relative(shard: Path, index: Path) -> str:
 def load(path: str | Path) -> dict:
     """Return an index.
 
-    Raises: InputError naming the file where it is missing or no index.
+    Raises: InputError naming the file where it is missing or no index, or the setting in it that is wrong.
     """
     existing(path, "index")
     try:
         index = json.loads(text_of(path, "index"))
-        found, checksum = index["format"], index["sha256"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        found, checksum, own = index["format"], index["sha256"], _checksum(index)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: not an index of shards ({error})") from error
     if found not in READABLE:
         raise InputError(f"{path}: format {found!r}, expected one of {READABLE}")
-    if checksum != _checksum(index):
+    if checksum != own:
         raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
-    _check_entries(index, path)
-    return index
-
-
-NEEDED = {"name": str, "path": str, "group": str, "fold": str, "samples": int, "bytes": int, "table_sha256": str}
-
-
-def _check_entries(index: dict, path: str | Path) -> None:
-    """Refuse an index whose entries are no shards or name files outside its folder, even if its checksum is right."""
-    entries = index.get("shards")
-    if not isinstance(entries, list) or not isinstance(index.get("kind"), str):
-        raise InputError(f"{path}: lacks its kind or its list of shards")
-    for entry in entries:
-        known = entry if isinstance(entry, dict) else {}
-        wrong = [key for key, kind in NEEDED.items() if not isinstance(known.get(key), kind)]
-        if wrong:
-            raise InputError(f"{path}: a shard lacks {wrong}, or they are of another type")
+    check_brought("index", index, path)
+    for entry in index["shards"]:
         place = PurePosixPath(entry["path"])
         if place.is_absolute() or ".." in place.parts:
             raise InputError(f"{path}: shard {entry['path']!r} lies outside the index's folder")
+    return index

@@ -9,6 +9,7 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, slug
 from lowalt.common.network import Network
+from lowalt.common.schema import check_brought
 from lowalt.common.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
@@ -71,6 +72,7 @@ class Remaker:
         Raises: InputError as `made`.
         """
         row, snr_db = row_of(entry)
+        check_brought("record", entry, self.shards.index_path)
         return self._maker(entry["seed"]).signal(row, snr_db)
 
     def made(self, entry: dict) -> tuple[bytes, bytes]:

@@ -64,6 +64,10 @@ def zero_index(name: str) -> int:
     return 128 if spectrum(name).SIGNED else 0
 
 
+MOST_VALUES = 2**26
+"""Values of one spectrum of a signal and of its tables for all stations, each of some 16 bytes at work."""
+
+
 class Spectra(Mapping[str, Any]):
     """The settings of a data set's spectra by name, in the order of the columns of its tiles."""
 
@@ -109,10 +113,13 @@ class Spectra(Mapping[str, Any]):
         """Number of spectra."""
         return len(self._settings)
 
-    def check(self, symbols: int) -> None:
-        """Refuse signals too short for a window.
+    def check(self, symbols: int, stations: int = 1) -> None:
+        """Refuse signals too short for a window, and spectra that take gigabytes.
 
-        Raises: InputError naming the spectrum whose window is no shorter than the signal.
+        Raises: InputError naming the spectrum whose window is no shorter than the signal, or that is too large.
         """
         for name, settings in self.items():
             windows(symbols, settings.window, settings.hop, name)
+            values = spectrum(name).rows(settings) * (symbols + stations * settings.window)
+            if values > MOST_VALUES:
+                raise InputError(f"spectrum {name}: {values} values with its tables, expected at most {MOST_VALUES}")

@@ -59,9 +59,9 @@ class Transfer:
                 raise InputError(f"{name} is {value!r}, expected a finite speed in m/s")
         if self.speed_step_mps <= 0 or self.speed_max_mps <= self.speed_min_mps:
             raise InputError(f"speeds {values}, expected min < max and a positive step")
-        if len(self.speeds_mps) > MOST_SPEEDS:
+        if (self.speed_max_mps - self.speed_min_mps) / self.speed_step_mps >= MOST_SPEEDS:
             raise InputError(
-                f"speeds {values}, min, max and step: {len(self.speeds_mps)} in all, expected at most {MOST_SPEEDS}"
+                f"speeds {values}, min, max and step, expected a step that makes at most {MOST_SPEEDS} of them"
             )
 
     @property

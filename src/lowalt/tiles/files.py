@@ -85,6 +85,8 @@ def map_array(path: Path, name: str) -> np.ndarray:
     Raises: InputError naming the file where it has no such array or is cut off.
     """
     dtype, count, start = stored_array(path, name)
+    if dtype.hasobject:
+        raise InputError(f"{path}: {name} holds objects, expected plain values")
     return np.memmap(path, dtype, "r", start, (count,)) if count else np.zeros(0, dtype)
 
 
@@ -98,7 +100,9 @@ class Tiles:
         """
         self.path = existing(path, "tiles")
         self.offsets = ends = np.array(map_array(self.path, "offsets.npy"))
-        _, size, self._start = stored_array(self.path, "data.npy")
+        kind, size, self._start = stored_array(self.path, "data.npy")
+        if ends.dtype.kind not in "iu" or kind != np.uint8:
+            raise InputError(f"{self.path}: data of {kind} parted by {ends.dtype}, expected bytes and whole numbers")
         if not len(ends) or ends[0] < 0 or (np.diff(ends) < 0).any() or ends[-1] != size:
             raise InputError(f"{self.path}: offsets.npy does not part data.npy's {size} bytes, the file is damaged")
         # Plain reads, not a map: mapped pages of gigabytes would count as this process's memory.

@@ -21,6 +21,9 @@ from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
 
+MOST_PIXELS = 2**29
+"""Pixels of a tile."""
+
 
 class Renderer:
     """Everything that is the same for all samples: twiddles, weights, tables. Reusable, holds its work arrays."""
@@ -28,10 +31,13 @@ class Renderer:
     def __init__(self, network: Network, spectra: Spectra, images: Images) -> None:
         """Prepare for the stations and the number of symbols of `network`.
 
-        Raises: InputError naming the spectrum whose window is no shorter than the signal.
+        Raises: InputError naming the spectrum whose window is no shorter than the signal, or what is too large.
         """
         self.network, self.spectra, self.images = network, spectra, images
-        spectra.check(network.symbols)
+        spectra.check(network.symbols, len(network.stations))
+        pixels = len(network.stations) * len(spectra) * images.size**2
+        if pixels > MOST_PIXELS:
+            raise InputError(f"images.size is {images.size}: a tile of {pixels} pixels, expected at most {MOST_PIXELS}")
         self._of_profiles = {name for name in spectra if isinstance(spectrum(name), OfProfiles)}
         self._plans = {name: self._plan(name) for name in spectra}
         self._tables = {

@@ -69,9 +69,8 @@ class Products(DataProducts):
 
     def _own_backbone(self, wildcards: Any) -> dict[str, str]:
         """The user's file that a scheme's backbone is made in, none for a library's backbone."""
-        scheme = self._run.schemes_by_slug[wildcards.scheme]
-        name = scheme.backbone or self._config["recognition"]["network"]["backbone"]
-        return {"backbone": name.rpartition(":")[0]} if ".py:" in name else {}
+        name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
+        return {"backbone": name.rpartition(":")[0]} if name else {}
 
     def data(self, wildcards: Any) -> list[str]:
         """Files of the run's data set: shards, their tables, index and data card."""

@@ -68,7 +68,7 @@ class Run:
         refuse_heights(config["motion"]["height_m"], published, classes)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
         network, spectra = Network.from_settings(config["network"]), Spectra.from_settings(config["spectra"])
-        spectra.check(network.symbols)
+        spectra.check(network.symbols, len(network.stations))
         refuse_profiles(config)
         profile_cells(spectra, network)
         Images.from_settings(config["images"])
@@ -148,6 +148,11 @@ class Run:
     def schemes_by_slug(self) -> dict[str, Scheme]:
         """Schemes trained or timed by the name of their folders."""
         return {scheme.slug: scheme for scheme in self.schemes.values()}
+
+    def own_backbone(self, scheme: Scheme) -> str:
+        """FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
+        name = "" if scheme.method else scheme.backbone_of(self.config["recognition"]["network"])
+        return name if ".py:" in name else ""
 
     @cached_property
     def trained(self) -> list[Scheme]:

@@ -171,6 +171,12 @@ class Settings:
         """Settings with which a network predicts."""
         return self._text("evaluation", **self._config["recognition"]["evaluation"])
 
+    def backbone(self, wildcards: Any) -> list[str]:
+        """The words that name the code of the asked network's backbone, none where a library has it."""
+        scheme = self._run.schemes_by_slug[wildcards.scheme] if wildcards.get("scheme") else self._run.asked
+        name = self._run.own_backbone(scheme)
+        return ["--backbone", name] if name else []
+
     def seed(self, wildcards: Any) -> str:
         """The run's seed alone, for tables with intervals."""
         return self._text("seed", **self._blocks("seed"))
