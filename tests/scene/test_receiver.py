@@ -169,6 +169,22 @@ def test_phase_from_symbol_to_symbol_wanders_as_its_spectrum_says():
         assert np.mean((phases[:, lag:] - phases[:, :-lag]) ** 2) == pytest.approx(truth, rel=0.05)
 
 
+def test_the_slowest_lines_of_a_free_oscillator_wander_over_a_look_as_they_stand():
+    """Each line k of amplitude a turns by exp(2 pi j f_k t): D(t) = sum of a^2 (2 - 2 cos 2 pi f_k t)."""
+    settings, radio = phase_noise.DEFAULTS | {"shared": False, "loop_hz": 0.0}, network(symbols=400)
+    looks = [phase_noise.phase(settings, look_of(radio), stream(4, "s", k))[:, 0] for k in range(80)]
+    line_hz = np.arange(1, 400) * 0.5
+    power = 2 * phase_noise.density(settings, line_hz) * 0.5
+    truth = np.sum(power * (2 - 2 * np.cos(2 * np.pi * line_hz * 40 * 2.5e-3)))
+    assert np.mean([(look[40:] - look[:-40]) ** 2 for look in looks]) == pytest.approx(truth, rel=0.2)
+
+
+def test_a_loop_gives_slow_noise_to_the_reference_and_fast_noise_to_the_oscillator():
+    found = 10 * np.log10(phase_noise.density(phase_noise.DEFAULTS, np.array([1.0, 1e6])))
+    free = 10 * np.log10(phase_noise.density(phase_noise.DEFAULTS | {"loop_hz": 0.0}, np.array([1e6])))
+    np.testing.assert_allclose(found, [-46.0, free[0]], atol=0.1)
+
+
 def test_a_link_has_the_noise_of_two_oscillators():
     settings, looks = phase_noise.DEFAULTS | {"shared": False}, [look_of(linked(), at) for at in (A, link())]
     own, both = (np.var(np.diff(phase_noise.phase(settings, look, stream(4, "l")))) for look in looks)

@@ -3,14 +3,7 @@
 The workflow asks this module before any effect is imported, so nothing is imported here at the top.
 """
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from lowalt.common.network import Network
 
 
 def white(rng: np.random.Generator, variance: float, shape: tuple[int, ...]) -> np.ndarray:
@@ -23,7 +16,7 @@ def in_all_cells(effects: dict) -> bool:
     return "cell_noise" in effects and (effects["cell_noise"] or {}).get("snr_db") is None
 
 
-def behind_canceller(noise: np.ndarray, canceller: dict, network: Network) -> np.ndarray:
+def behind_canceller(noise: np.ndarray, canceller: dict) -> np.ndarray:
     """Return noise (N,) of one range cell as a canceller (its parameters) leaves it: its spectrum is not flat.
 
     Cancellers are linear and act on each range cell by itself, so this is the noise that the cell would hold if it had
@@ -33,5 +26,5 @@ def behind_canceller(noise: np.ndarray, canceller: dict, network: Network) -> np
     from lowalt.scene.catalogue import called
 
     for effect in called({"canceller": canceller}):
-        noise = effect.module.filtered(effect.settings, noise[:, None], network)[:, 0]
+        noise = effect.module.filtered(effect.settings, noise[:, None])[:, 0]
     return noise

@@ -26,7 +26,10 @@ SOURCE = (
     "Bar-Ness, An eigenanalysis interference canceler, IEEE Trans. Signal Process. 39(1), 1991 (clutter); its "
     "covariance: Billingsley, Low-Angle Radar Land Clutter, 2002, chapter 6; depth: estimate"
 )
-DEFAULTS = {"kind": "mean", "order": 1, "memory": 0.95, "wind_mps": 4.5, "depth_db": 50.0}
+DEFAULTS = {
+    "kind": "mean", "order": 1, "memory": 0.95,
+    "wind_mps": 4.5, "depth_db": 50.0, "carrier_hz": 4.9e9, "symbol_interval_s": 2.5e-3,
+}  # fmt: skip
 
 
 def idle(settings: dict) -> bool:
@@ -35,21 +38,29 @@ def idle(settings: dict) -> bool:
 
 
 def check(settings: dict, scene: CheckedScene) -> None:
-    """Raise InputError for a filter of evenly spaced symbols where some are not received."""
+    """Raise InputError for a filter of evenly spaced symbols where some are not received, or of another radar."""
+    if settings["kind"] != "clutter":
+        return
     timing = scene.effects.get("slow_time", {"downlink": 1, "missing": 0})
-    if settings["kind"] == "clutter" and (timing["downlink"] < 1 or timing["missing"] > 0):
+    if timing["downlink"] < 1 or timing["missing"] > 0:
         raise InputError(
             "effects.canceller.kind: 'clutter' needs all symbols, and effects.slow_time leaves gaps, expected mean, "
             "pulse or exponential"
         )
+    for key in ("carrier_hz", "symbol_interval_s"):
+        if settings[key] != getattr(scene.network, key):
+            raise InputError(
+                f"effects.canceller.{key}: {settings[key]:g}, expected the network's {getattr(scene.network, key):g}, "
+                "for which kind 'clutter' is made"
+            )
 
 
 def process(settings: dict, cells: np.ndarray, look: Look, rng: np.random.Generator) -> np.ndarray:
     """Return the range cells (N, M) behind the filter; nothing is drawn."""
-    return filtered(settings, cells, look.network)
+    return filtered(settings, cells)
 
 
-def filtered(settings: dict, cells: np.ndarray, network: Network) -> np.ndarray:
+def filtered(settings: dict, cells: np.ndarray) -> np.ndarray:
     """Return range cells (N, M) without the echoes of land.
 
     mean: subtracts the look's mean. pulse: `order` first differences over symbols. exponential: subtracts a running
@@ -67,7 +78,8 @@ def filtered(settings: dict, cells: np.ndarray, network: Network) -> np.ndarray:
         # The noise gain of k differences is the sum of squared binomials, C(2k, k).
         return cells / math.sqrt(math.comb(2 * settings["order"], settings["order"]))
     if settings["kind"] == "clutter":
-        basis = land(len(cells), network, settings["wind_mps"], settings["depth_db"])
+        radar = settings["carrier_hz"], settings["symbol_interval_s"]
+        basis = land(len(cells), *radar, settings["wind_mps"], settings["depth_db"])
         parts = np.ascontiguousarray(cells, np.complex128).view(np.float64)
         left = (parts - basis @ (basis.T @ parts)).view(np.complex128)
         return left * math.sqrt(len(cells) / max(len(cells) - basis.shape[1], 1))
@@ -85,7 +97,7 @@ def _step(cells: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=8)
-def land(symbols: int, network: Network, wind_mps: float, depth_db: float) -> np.ndarray:
+def land(symbols: int, carrier_hz: float, interval_s: float, wind_mps: float, depth_db: float) -> np.ndarray:
     """Return the components (N, K) of windblown land's echoes over N symbols that lie above its power less `depth_db`.
 
     They are orthonormal: the constant, in which all that stands still lies however loud it is, and the eigenvectors of
@@ -93,11 +105,11 @@ def land(symbols: int, network: Network, wind_mps: float, depth_db: float) -> np
     1 / (1 + (4 pi t / (beta lambda))^2) at a lag t.
     """
     constant = np.full((symbols, 1), symbols**-0.5)
-    still, beta = windblown(wind_mps, network.carrier_hz)
+    still, beta = windblown(wind_mps, carrier_hz)
     if not np.isfinite(still):
         return constant
-    decay_s = beta * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi)
-    lag_s = network.symbol_interval_s * np.arange(symbols)
+    decay_s = beta * SPEED_OF_LIGHT / carrier_hz / (4 * np.pi)
+    lag_s = interval_s * np.arange(symbols)
     moving = toeplitz(1 / (1 + (lag_s / decay_s) ** 2)) / (1 + still)
     beside = moving - moving.mean(axis=0)
     power, basis = eigh(beside - beside.mean(axis=1, keepdims=True))
@@ -112,5 +124,5 @@ def loss_db(settings: dict, network: Network, speed_mps: float) -> float:
     """
     turns = 2 * speed_mps * network.carrier_hz / SPEED_OF_LIGHT * network.symbol_interval_s
     echo = np.exp(2j * np.pi * turns * np.arange(network.symbols))[:, None]
-    left = np.median(abs(filtered(settings, echo, network)) ** 2)
+    left = np.median(abs(filtered(settings, echo)) ** 2)
     return float(-10 * np.log10(left)) if left > 0 else math.inf
