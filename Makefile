@@ -20,7 +20,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit mutants docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -54,7 +54,7 @@ $(SETUP): $(BASE)
 	touch $@
 
 $(TESTING): $(SETUP)
-	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,mutants) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
+	$(call install,$(call of_extra,test) $(call of_extra,tensorboard) $(call of_extra,export) $(call of_extra,slurm) $(call of_extra,notebooks) $(call of_extra,methods) $(call of_extra,tools) $(call of_extra,docs) $(call of_extra,lint))
 	touch $@
 
 # Machine code of the data stages: compiled once, while packages come, and not by many tests at the same time.
@@ -113,13 +113,6 @@ test-slow: $(TESTING)  ## the slow checks
 # One process a reader; some ten minutes.
 fuzz: $(TESTING)  ## 2000 damaged files for every reader of files, 200 for one that starts a process each: results/benchmarks/fuzz.csv
 	PYTHONPATH=tests/support $(BIN)/python -m fuzzing --count 2000 --out results/benchmarks/fuzz.csv
-
-# At the lowest priority; the same command goes on where the last one stopped: make mutants MINUTES=45
-MUTANTS ?= 25
-MINUTES ?= inf
-mutants: $(TESTING)  ## set small faults into every room of the package, one at a time, and count those that the tests notice: results/benchmarks/mutants.csv
-	$(BIN)/python benchmarks/mutants.py --count $(MUTANTS) --minutes $(MINUTES) $(if $(ROOMS),--rooms $(ROOMS) $(if $(NEAR),--near)) \
-		--out results/benchmarks/mutants.csv --survivors results/benchmarks/mutants_survivors.csv
 
 lint:  ## ruff, snakefmt, mypy, snakemake --lint
 	@$(MAKE) --no-print-directory -j 2 ready

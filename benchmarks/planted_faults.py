@@ -10,12 +10,11 @@ tree. Tests that pin bytes are left out, since they notice every change and say 
 import argparse
 import csv
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
-
-from mutation.trials import copy_of_tree
 
 from lowalt.common.csv_tables import write_csv
 
@@ -24,6 +23,23 @@ FAULTS = Path(__file__).with_suffix(".csv")
 COLUMNS = ("stage", "fault", "caught", "by")
 NO_PINS = "not bytes and not byte and not fixed and not kept and not slow"
 COMPILED = "njit", "jit import"
+
+
+def copy_of_tree(root: Path, folder: Path) -> Path:
+    """Return `folder` with a copy of the checkout's files, and its environment linked, in which faults can be set."""
+    files = subprocess.run(["git", "ls-files", "-z"], cwd=root, check=True, capture_output=True, text=True).stdout
+    for name in filter(None, files.split("\0")):
+        if (root / name).is_file():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, folder / name)
+    (folder / ".venv").symlink_to((root / ".venv").resolve())
+    return folder
+
+
+def test_file(name: str) -> Path:
+    """Return the test file of a name in the table, such as echo or scene/receiver."""
+    room, _, last = name.rpartition("/")
+    return Path("tests", room, f"test_{last}.py")
 
 
 def planted(tree: Path, fault: dict[str, str]) -> str:
@@ -38,7 +54,7 @@ def planted(tree: Path, fault: dict[str, str]) -> str:
     with tempfile.TemporaryDirectory() as compiled:
         # Numba's kept machine code does not notice a change of a function that was compiled into another file's.
         own = {"NUMBA_CACHE_DIR": compiled} if any(word in good for word in COMPILED) else {}
-        tests = [f"tests/test_{name}.py" for name in fault["tests"].split()]
+        tests = [str(test_file(name)) for name in fault["tests"].split()]
         command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", "--tb=no", "-k", NO_PINS]
         try:
             path.write_text(good.replace(fault["old"], fault["new"]))

@@ -23,10 +23,11 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.streams import stream
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.scene.catalogue import called
-from lowalt.scene.chain import Scene, observe, received_signal, with_cross_sections
+from lowalt.scene.chain import received_signal
 from lowalt.scene.effects.channel import mean_cross_section
 from lowalt.scene.explain import samples
 from lowalt.scene.levels import Level, levels
+from lowalt.scene.observe import Scene, observe, with_cross_sections
 from lowalt.scene.protocols import PointsBeams, SamplesTime, SetsCrossSections, ShapesElements, WeighsPoints
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

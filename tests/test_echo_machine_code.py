@@ -11,7 +11,7 @@ import lowalt
 from forks import printed
 from lowalt.common.jit import INNER, LEAN, _DigestCache, digest
 from lowalt.echo.fast.driver import run
-from lowalt.scene.response_loops import one_way
+from lowalt.echo.pointwise.sums import matrix
 
 PROGRAM = """
 import sys
@@ -27,20 +27,20 @@ sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(package).parent))
 from lowalt.common.jit import digest
 from lowalt.echo.fast.driver import run
-from lowalt.scene.response_loops import one_way
+from lowalt.echo.pointwise.sums import matrix
 path.write_text(kept)
-print(digest(run.py_func), digest(one_way.py_func))
+print(digest(run.py_func), digest(matrix.py_func))
 """
-"""Edits a source file of a copy of the package and prints the digests of the echo's main kernel and of an effect's."""
+"""Edits a source file of a copy of the package and prints the digests of two of the echo's kernels."""
 
-# file, text, its replacement, and whether the keys of the echo's and of the effects' kernel change by it
+# file, text, its replacement, and whether the keys of both kernels change by it
 EDITS = {
     "nothing": ("echo/api.py", "import numpy as np", "import numpy as np", [0, 0]),
     "a module without kernels": ("echo/api.py", "import numpy as np", "import numpy as np\nUNUSED = 1", [0, 0]),
     "a function that is not compiled": ("echo/fast/polynomials.py", "nodes = min(count, 32)", "nodes = 31", [0, 0]),
     "a comment in a kernel": ("echo/fast/vector_loops.py", "    k = degree", "    # Why.\n    k = degree",
                               [0, 0]),
-    "a called kernel": ("echo/fast/vector_loops.py", "k = degree - first", "k = degree - first + 0", [1, 1]),
+    "a called kernel": ("echo/fast/vector_loops.py", "k = degree - first", "k = degree - first + 0", [1, 0]),
     "a kernel called by a called one": ("echo/fast/polynomials.py", "half = 0.5 * band", "half = band * 0.5", [1, 0]),
     "a constant": ("echo/fast/cell_kernel.py", "SIDE = 4", "SIDE = 3", [1, 0]),
     "the settings of a called kernel": ("echo/pointwise/terms.py", "@PLAIN\ndef dirichlet", "@LEAN\ndef dirichlet",
@@ -63,13 +63,13 @@ def test_the_key_changes_with_what_is_compiled_alone(case, digests):
     assert [int(new != old) for new, old in zip(digests[case], before, strict=True)] == EDITS[case][-1]
 
 
-def test_kernels_of_the_echo_and_of_the_effects_are_kept_by_that_key():
+def test_kernels_of_the_echo_are_kept_by_that_key():
     class Codegen:
         def magic_tuple(self):
             return ("processor",)
 
     # numba offers no public name for the key of a cache entry; only the key shows that this cache is asked.
-    for compiled in (run, one_way):
+    for compiled in (run, matrix):
         key = compiled._cache._index_key(("signature",), Codegen())
         assert isinstance(compiled._cache, _DigestCache) and digest(compiled.py_func, compiled._cache.options) in key
 

@@ -126,8 +126,8 @@ def test_tiles_with_range_profiles_follow_the_seed_and_the_snrs():
 def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
     run, products, settings = parts()
     calls = EffectCalls(run)
-    assert list(calls.all) == ["none", *PLACES, "urban", "worst"]
-    assert products.call_samples(CHUNK)[0] == "results/default/effects/seen-worst.npz"
+    assert list(calls.all) == ["none", *PLACES, "urban", "streets"]
+    assert products.call_samples(CHUNK)[0] == "results/default/effects/seen-streets.npz"
     occluded = SimpleNamespace(run="default", group="seen", call="occlusion")
     assert len(products.call_occluders(occluded)) == 20
     assert json.loads(settings.effect_samples(occluded))["effects"] == {"occlusion": {}}

@@ -1,7 +1,5 @@
 """A small network, a target of a body and a rotor, and scenes of effects: inputs of the tests of `lowalt.scene`."""
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from lowalt.common.network import Network, Station
@@ -61,7 +59,13 @@ def scene(effects: dict, radio: Network | None = None) -> Scene:
 def view_of(radio: Network, places: np.ndarray, rcs_m2: np.ndarray, aim_m, station: Station | None = None) -> View:
     """A view of points at places (N, L, 3) m, under beams at aim_m (3,), or (K, 3) from symbol 0, 1, ... on."""
     times_s, aims = radio.symbol_interval_s * np.arange(len(places)), np.atleast_2d(np.asarray(aim_m, float))
-    cloud = SimpleNamespace(rcs_m2=rcs_m2, kinds=("body",), part=np.zeros(len(rcs_m2), int))
+    count, nothing = len(rcs_m2), np.full((1, 3), np.nan)
+    cloud = Cloud(
+        points=np.zeros((count, 3)), part=np.zeros(count, int), kinds=("body",), names=("body",),
+        parents=np.array([-1]), hinges=nothing, axes=nothing, normals=np.full((count, 3), np.nan),
+        rcs_m2=np.asarray(rcs_m2, float),
+        record={"subtype": "Thing", "category": "UAV", "source": "test", "checksum": ""},
+    )  # fmt: skip
     beams = Beams(radio.symbol_interval_s * np.arange(len(aims)), aims)
     names = {end.name for end in radio.stations} | {"A", "B"}
     view = View(radio, station or radio.stations[0], cloud, {}, times_s, times_s, beams=dict.fromkeys(names, beams))
