@@ -15,7 +15,7 @@ from needed_options import assert_needed_options_are_named
 NEEDED = """
 common.config: --settings, --out
 echo.__main__: --settings, --motion, --clouds, --station, --out
-effects.__main__: --settings, --motion, --clouds, --station, --out, --power
+scene.__main__: --settings, --motion, --clouds, --station, --out, --power
 measure.accuracy_cost: --settings, --predictions, --speeds, --index, --out
 measure.echo_cost: --settings, --clouds, --out
 measure.echo_pixels: --settings, --table, --clouds, --out

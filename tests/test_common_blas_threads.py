@@ -55,7 +55,7 @@ PROBE = """
 import hashlib, sys
 sys.path.insert(0, "tests/support")
 import numpy as np
-from every_effect import targets
+from scenes import target
 from lowalt.common.network import Network, Station
 from lowalt.scene.catalogue import called
 from lowalt.scene.chain import received_signal
@@ -63,7 +63,7 @@ from lowalt.scene.observe import Scene
 from lowalt.motion.table import NUMBERS
 station = Station("A", (0.0, 0.0, 25.0), 0.3, 4.9e9)
 network = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (16, 4), (16, 4), 1.0, (station,))
-cloud, _ = targets(np.random.default_rng(1), 0.3, False)
+cloud, _ = target(np.random.default_rng(1), 60, 0.3)
 row = dict.fromkeys(NUMBERS, 0.0) | {"subtype": "Thing", "category": "UAV", "group": "seen", "model": 3}
 row |= {"x_m": 90.0, "y_m": 40.0, "z_m": 60.0, "vx_mps": 3.0, "rate_hz": 50.0}
 for name in ("phase_noise", "clutter", "adc"):

@@ -44,7 +44,7 @@ PROGRAMS = {
         "    os.wait()\n"
         "else:\n"
         "    sys.exit()\n"
-        "names = [n for n in sys.modules if n.startswith('lowalt.scene.') and n.count('.') == 3]\n"
+        "names = [n for n in sys.modules if n.startswith('lowalt.scene.effects.') and n.count('.') == 4]\n"
         "print(*(n.rpartition('.')[2] for n in names), flush=True)\n"
         "os._exit(0)"
     ),
@@ -124,20 +124,13 @@ def test_every_function_says_what_it_does():
     assert not bare
 
 
-LONG = {
-    "one_way": "a compiled loop over points and frequencies; functions for its parts would take ten numbers a point",
-    "triangles": "a compiled loop over points and triangles; functions for its parts would take ten numbers a pair",
-}
-"""Functions that may have more than 60 lines, with the reason."""
-
-
-def test_functions_have_at_most_60_lines_and_files_250():
+def test_functions_have_at_most_60_lines_and_files_400():
     files = python_files("src", "benchmarks", "tests", "docs", "examples")
     lines = {path.relative_to(ROOT): len(path.read_text().splitlines()) for path in files}
     long = [f"{path.name}: {name}" for path in files for name, more_lines, _ in file(path).functions
-            if more_lines >= 60 and name not in LONG]  # fmt: skip
+            if more_lines >= 60]  # fmt: skip
     assert not long
-    assert not {str(path): count for path, count in lines.items() if count > 250}
+    assert not {str(path): count for path, count in lines.items() if count > 400}
 
 
 def test_no_name_of_a_class_stands_for_two_things():

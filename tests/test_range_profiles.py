@@ -156,7 +156,7 @@ def test_a_signal_alone_gives_no_profile(dataset):
 
 @pytest.mark.parametrize("cells", [4, 1, 2.5, True])
 def test_cells_have_a_middle_and_neighbours(cells):
-    with pytest.raises(InputError, match=r"spectra.hrrp.cells is"):
+    with pytest.raises(InputError, match=r"cells is"):
         hrrp.Settings(1, 1, cells)
 
 

@@ -13,7 +13,7 @@ from lowalt.common.streams import stream
 from lowalt.echo import echo_signal
 from lowalt.scene import waveform
 from lowalt.scene.catalogue import ORDER, PLACES, called, dotted
-from lowalt.scene.chain import Sample, received_signal
+from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.observe import observe
 from lowalt.scene.response import response
 from scenes import A, network, scene, target, view_of
@@ -87,7 +87,7 @@ def test_effects_without_strength_change_no_bit():
 def test_adding_an_effect_moves_no_other_draw():
     cloud, row = target(np.random.default_rng(4))
     noise, land = {"receiver_noise": {"noise_figure_db": 60.0}}, {"clutter": {}}
-    noisy, cluttered, both = (Sample(scene(effects), A, cloud, row) for effects in (noise, land, noise | land))
+    noisy, cluttered, both = (SceneSample(scene(effects), A, cloud, row) for effects in (noise, land, noise | land))
     echo = np.fft.ifft(noisy.direct, axis=1)
     assert abs((both.cells - cluttered.cells) - (noisy.cells - echo)).max() < 1e-9 * abs(noisy.cells).max()
     assert abs(noisy.cells - echo).max() > 0.1 * abs(echo).max()
@@ -116,8 +116,8 @@ def test_unknown_effects_and_parameters_are_named():
 
 def test_a_sample_without_its_target_keeps_its_noise_and_land():
     cloud, row = target(np.random.default_rng(6))
-    whole = Sample(scene({"receiver_noise": {}, "clutter": {}}), A, cloud, row)
-    echo = Sample(scene({"squint": {}}), A, cloud, row)
+    whole = SceneSample(scene({"receiver_noise": {}, "clutter": {}}), A, cloud, row)
+    echo = SceneSample(scene({"squint": {}}), A, cloud, row)
     empty = whole.without_target()
     difference = whole.cells - empty.cells
     alone = np.fft.ifft(echo.direct, axis=1)

@@ -26,7 +26,7 @@ from lowalt.scene.effects.channel import (
     reflected_aspect,
     walls,
 )
-from lowalt.scene.response import Path
+from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 from scenes import A, B, link, linked, target
 
@@ -254,7 +254,10 @@ def test_dark_facades_carry_nothing_and_lit_ones_the_walls_coefficient():
 def test_routes_show_the_sides_that_their_images_see(station):
     view = seen(station)
     images = [np.array([1.0, 2.0, -10.0]), np.array([5.0, -2.0, 9.0])]
-    paths = [Path(view.places, 1.0, images[0], Path(view.places, 1.0, images[1])), Path(view.places, 0.5)]
+    paths = [
+        ImagePath(view.places, 1.0, images[0], ImagePath(view.places, 1.0, images[1])),
+        ImagePath(view.places, 0.5),
+    ]
 
     def weight(view: View, names) -> np.ndarray:
         """A follower's factor that tells a place from another, and one of all others that does not."""

@@ -9,7 +9,7 @@ import reference_effects
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_matrix
-from lowalt.scene.response import Path, response
+from lowalt.scene.response import ImagePath, response
 from scenes import A, B, drifting, link, linked, network, view_of
 
 PHYSICS = pytest.mark.parametrize("squint, wavefront", [(False, False), (True, False), (False, True), (True, True)])
@@ -33,7 +33,7 @@ def test_it_is_the_sum_over_every_element_path_and_subcarrier(squint, wavefront,
         radio, A, places, rcs, aim, [(images, coefficient)], factor, squint, wavefront
     )
     found = response(
-        view_of(radio, places, rcs, aim), [Path(images, coefficient)], factor, squint=squint, wavefront=wavefront
+        view_of(radio, places, rcs, aim), [ImagePath(images, coefficient)], factor, squint=squint, wavefront=wavefront
     )
     assert relative(found, truth) < 5e-11
 
@@ -62,18 +62,20 @@ def test_routes_have_factors_of_their_own():
     images, mirrored = places * [1, 1, -1], -0.4 + 0.1j
     strong = rng.uniform(0, 1, (2, 2, 3, 4))
     strong[1, 0] = strong[0, 1]
-    found = response(view_of(radio, places, rcs, aim), [Path(images, mirrored)], strong)
+    found = response(view_of(radio, places, rcs, aim), [ImagePath(images, mirrored)], strong)
     # Of factors that are products of both ways', each way's is the path's coefficient.
     truth = sum(
-        response(view_of(radio, places, rcs, aim), [Path(images, mirrored)], strong * np.reshape(only, (2, 2, 1, 1)))
+        response(
+            view_of(radio, places, rcs, aim), [ImagePath(images, mirrored)], strong * np.reshape(only, (2, 2, 1, 1))
+        )
         for only in ([1, 0, 0, 0], [0, 1, 1, 0], [0, 0, 0, 1])
     )
     assert relative(found, truth) < 1e-12
     direct = strong * np.reshape([1, 0, 0, 0], (2, 2, 1, 1))
-    alone = response(view_of(radio, places, rcs, aim), [Path(images, mirrored)], direct)
+    alone = response(view_of(radio, places, rcs, aim), [ImagePath(images, mirrored)], direct)
     assert relative(alone, response(view_of(radio, places, rcs, aim), [], strong[0, 0])) < 1e-10
     both = strong * np.reshape([0, 0, 0, 1], (2, 2, 1, 1))
-    alone = response(view_of(radio, places, rcs, aim), [Path(images, mirrored)], both)
+    alone = response(view_of(radio, places, rcs, aim), [ImagePath(images, mirrored)], both)
     seen = response(view_of(radio, images, rcs, aim), [], strong[1, 1]) * mirrored**2
     assert relative(alone, seen) < 1e-10
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.scene.catalogue import NamedEffect
-from lowalt.scene.response import Path, response
+from lowalt.scene.response import ImagePath, response
 from lowalt.scene.view import View
 from lowalt.scene.waveform import transmit
 
@@ -24,13 +24,13 @@ class Physics(NamedTuple):
         """Whether an echo is more than a response: its subcarriers leak into each other."""
         return self.symbol_motion is not None or self.cyclic_prefix is not None
 
-    def response(self, view: View, paths: list[Path], factor: np.ndarray | float) -> np.ndarray:
+    def response(self, view: View, paths: list[ImagePath], factor: np.ndarray | float) -> np.ndarray:
         """Return the subcarriers (N, M) of `response.response` with the physics that the scene names."""
         return response(view, paths, factor, squint=self.squint, wavefront=self.wavefront)
 
 
 def arriving(
-    physics: Physics, view: View, factor: np.ndarray | float, paths_of: Callable[[View], list[Path]],
+    physics: Physics, view: View, factor: np.ndarray | float, paths_of: Callable[[View], list[ImagePath]],
     symbols: tuple[np.ndarray, np.ndarray],
 ) -> np.ndarray:  # fmt: skip
     """Return the time samples (N, M) of a view's target.
@@ -65,7 +65,7 @@ def arriving(
     return samples
 
 
-def _at_rows(path: Path, rows: np.ndarray) -> Path:
+def _at_rows(path: ImagePath, rows: np.ndarray) -> ImagePath:
     """A path at some symbols alone."""
     coefficient = path.coefficient[rows] if np.ndim(path.coefficient) > 1 else path.coefficient
     sender = None if path.sender is None else _at_rows(path.sender, rows)

@@ -23,7 +23,7 @@ from lowalt.scene.arrivals import Physics, arriving
 from lowalt.scene.catalogue import BY_END, NamedEffect, placed, providing
 from lowalt.scene.listening import Listening
 from lowalt.scene.observe import Scene, ends_of, observe, with_cross_sections
-from lowalt.scene.response import Path, response
+from lowalt.scene.response import ImagePath, response
 from lowalt.scene.view import View
 from lowalt.scene.waveform import Look
 from lowalt.targets.cloud import Cloud
@@ -42,7 +42,7 @@ class Received(NamedTuple):
     power: float
 
 
-class Sample:
+class SceneSample:
     """One motion model seen at one station of a scene, and what each step of the chain makes of it.
 
     row: of the motion table; occluders: the target's surfaces, for self-occlusion; clouds: those of other subtypes, for
@@ -111,7 +111,7 @@ class Sample:
             self._factors[view, effect.name] = factor
         return self._factors[view, effect.name]
 
-    def every_path(self, view: View) -> list[Path]:
+    def every_path(self, view: View) -> list[ImagePath]:
         """Return all paths but the direct one; on a link those of its receiver, each with its sender's."""
         adding = providing(self.channel, protocols.AddsPaths)
         ends = [
@@ -121,11 +121,11 @@ class Sample:
             ends[0] = [there._replace(sender=here) for here, there in zip(*ends, strict=True)]
         return ends[0]
 
-    def paths(self, view: View) -> list[Path]:
+    def paths(self, view: View) -> list[ImagePath]:
         """Return those paths that carry anything in the look: most facades reflect nothing of it."""
         return [path for path in self.every_path(view) if _carries(path)]
 
-    def routes(self, view: View, paths: list[Path]) -> np.ndarray:
+    def routes(self, view: View, paths: list[ImagePath]) -> np.ndarray:
         """Return the factor on the points' amplitudes, (N, L), or (R, R, N, L) where the scene tells routes apart."""
         telling = providing(self.channel, protocols.WeighsRoutes)
         if not telling or not paths:
@@ -192,7 +192,7 @@ class Sample:
         """Time samples (N, M) of a view's target with what reaches into symbols."""
         kept = [number for number, path in enumerate(self.every_path(view)) if _carries(path)]
 
-        def paths_of(moved: View) -> list[Path]:
+        def paths_of(moved: View) -> list[ImagePath]:
             """The same paths at other instants."""
             every = self.every_path(moved)
             return [every[number] for number in kept]
@@ -281,7 +281,7 @@ class Sample:
             chosen = every
         return Received(signal, chosen, self.power)
 
-    def without_target(self) -> "Sample":
+    def without_target(self) -> "SceneSample":
         """Return the same sample, with the same draws and noise level, whose target reflects nothing."""
         result, power = copy(self), self.power
         result.__dict__ = {name: value for name, value in self.__dict__.items() if name not in ("cells", "direct")}
@@ -327,10 +327,10 @@ def received_signal(
     Raises: InputError naming the sample that cannot be computed.
     """
     keep_freed_arrays()
-    return Sample(scene, station, cloud, row, occluders, clouds).received()
+    return SceneSample(scene, station, cloud, row, occluders, clouds).received()
 
 
-def _carries(path: Path) -> bool:
+def _carries(path: ImagePath) -> bool:
     """Whether a path carries anything in the look, both ways of a link."""
     return bool(np.any(path.coefficient) and np.any((path.sender or path).coefficient))
 

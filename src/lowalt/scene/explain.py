@@ -17,7 +17,7 @@ from lowalt.common.network import Network, Station, masts_m
 from lowalt.common.streams import stream
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.scene.catalogue import PLACES, NamedEffect, called
-from lowalt.scene.chain import Sample
+from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check
 from lowalt.scene.levels import Level, levels
 from lowalt.scene.observe import Scene
@@ -130,7 +130,7 @@ def scene_of(config: dict) -> Scene:
 
 def finding(scene: Scene, station: Station, explained: ExplainedSample, clouds: dict[str, Cloud]) -> Finding:
     """Return whether a sample's target is found at a station, and how loud it is against all else."""
-    sample = Sample(scene, station, *explained, clouds)
+    sample = SceneSample(scene, station, *explained, clouds)
     own, empty = sample.own_cell(), sample.without_target()
     behind, rest = sample.filtered(sample.detection), empty.filtered(sample.detection)
     at_target = (behind - rest)[np.arange(len(own)), own]
@@ -158,7 +158,7 @@ def _with(effect: NamedEffect, changed: dict) -> NamedEffect:
     return effect._replace(settings=effect.settings | changed) if effect.name == "canceller" else effect
 
 
-def _right(sample: Sample, detection: Sequence[NamedEffect], own: np.ndarray) -> float:
+def _right(sample: SceneSample, detection: Sequence[NamedEffect], own: np.ndarray) -> float:
     """Share of symbols whose chosen cell is within WORD of the target's, cells wrapping around as ranges do."""
     kept = [effect for effect in detection if not effect.module.idle(effect.settings)]
     cells = sample.filtered(kept)
@@ -203,9 +203,9 @@ def _timed(
 ) -> tuple[tuple[np.ndarray, np.ndarray], float]:
     """Signals and cells (K, stations, N) of the chosen samples, and one's mean processor time (ms)."""
     # The first call compiles and fills tables.
-    Sample(scene, stations[0], *chosen[0], clouds).received()
+    SceneSample(scene, stations[0], *chosen[0], clouds).received()
     start = time.process_time()
-    received = [[Sample(scene, end, *explained, clouds).received() for end in stations] for explained in chosen]
+    received = [[SceneSample(scene, end, *explained, clouds).received() for end in stations] for explained in chosen]
     ms = 1e3 * (time.process_time() - start) / (len(chosen) * len(stations))
     signals, cells = (
         np.array([[getattr(one, name) for one in row] for row in received]) for name in ("signal", "cell")

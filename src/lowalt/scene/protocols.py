@@ -18,7 +18,7 @@ from lowalt.common.network import Network
 from lowalt.motion.poses import Perturbation
 from lowalt.scene.antenna import Element
 from lowalt.scene.listening import Listening
-from lowalt.scene.response import Path
+from lowalt.scene.response import ImagePath
 from lowalt.scene.sampling import Sampling
 from lowalt.scene.view import Beams, View
 from lowalt.scene.waveform import Look
@@ -104,7 +104,7 @@ class WeighsPoints(Protocol):
 class AddsPaths(Protocol):
     """Channel: opens further one-way paths between the station and the points."""
 
-    def paths(self, settings: dict, view: View) -> list[Path]:
+    def paths(self, settings: dict, view: View) -> list[ImagePath]:
         """Return the further paths; waves go out by any path and come back by any."""
 
 
@@ -112,7 +112,7 @@ class AddsPaths(Protocol):
 class WeighsRoutes(Protocol):
     """Channel: tells the points' amplitudes on further paths from those on the direct one."""
 
-    def routes(self, settings: dict, view: View, paths: list[Path], weight: Callable[[View, Iterable[str] | None], np.ndarray]) -> np.ndarray:  # fmt: skip  # noqa: E501
+    def routes(self, settings: dict, view: View, paths: list[ImagePath], weight: Callable[[View, Iterable[str] | None], np.ndarray]) -> np.ndarray:  # fmt: skip  # noqa: E501
         """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b; direct first.
 
         weight(view, names): product (N, L) of the factors of the named effects (None: all) as `view` sees them.

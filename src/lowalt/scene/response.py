@@ -23,7 +23,7 @@ ERROR = 1e-11
 """Largest error of the expansions in frequency, relative to the sum of the points' amplitudes."""
 
 
-class Path(NamedTuple):
+class ImagePath(NamedTuple):
     """A one-way propagation path between a station and every point, given by the points' images.
 
     places: (N, L, 3) m, where the station sees the points (their images); coefficient: the path's complex factor in
@@ -34,11 +34,11 @@ class Path(NamedTuple):
     places: np.ndarray
     coefficient: np.ndarray | complex = 1.0
     station_m: np.ndarray | None = None
-    sender: "Path | None" = None
+    sender: "ImagePath | None" = None
 
 
 def response(
-    view: View, paths: Sequence[Path] = (), factor: np.ndarray | float = 1.0, *, squint: bool = False,
+    view: View, paths: Sequence[ImagePath] = (), factor: np.ndarray | float = 1.0, *, squint: bool = False,
     wavefront: bool = False,
 ) -> np.ndarray:  # fmt: skip
     """Return the subcarriers Y (N, M) complex128 of a view's target, the known symbol removed.
@@ -51,7 +51,7 @@ def response(
     Bistatic Radar, 2nd ed. 1995, ch. 3, for links.
     """
     network, station = view.network, view.station
-    seen, strength = [Path(view.places), *paths], _amplitudes(view, factor)
+    seen, strength = [ImagePath(view.places), *paths], _amplitudes(view, factor)
     ends = [(station, network.receive, seen)]
     same = station.transmitter is None and network.transmit == network.receive
     if not same:
@@ -116,7 +116,7 @@ def cosines(station: Station, places: np.ndarray) -> np.ndarray:
 
 
 def _end(
-    view: View, station: Station, counts: tuple[int, int], paths: Sequence[Path],
+    view: View, station: Station, counts: tuple[int, int], paths: Sequence[ImagePath],
     physics: tuple[bool, bool],
 ) -> response_loops.End:  # fmt: skip
     """One end's array and paths as the loops take them; physics: squint and wavefront."""

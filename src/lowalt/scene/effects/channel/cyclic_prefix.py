@@ -10,6 +10,8 @@ import numpy as np
 from scipy import fft
 
 from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.scene.prefix import length_s as length_s
+from lowalt.scene.prefix import turn as turn
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -18,30 +20,15 @@ SOURCE = (
 )
 DEFAULTS = {"prefix_s": None}
 
-NORMAL = 144 / 2048
-"""Length of the normal cyclic prefix, in useful symbol lengths."""
-
 
 def idle(settings: dict) -> bool:
     """Return False: a scene that names this effect gets it wherever an echo is later than the prefix."""
     return False
 
 
-def length_s(settings: dict, network: Network) -> float:
-    """Return the prefix's length (s): the given one, or NR's normal prefix."""
-    return NORMAL / network.subcarrier_spacing_hz if settings["prefix_s"] is None else settings["prefix_s"]
-
-
 def lost(delay_s: np.ndarray | float, prefix_s: float, network: Network) -> np.ndarray | float:
     """Return the share of the receive window that an echo of this delay loses, 0 to 1; any shape."""
     return np.clip((delay_s - prefix_s) * network.subcarrier_spacing_hz, 0.0, 1.0)
-
-
-def turn(settings: dict, network: Network) -> np.ndarray:
-    """Return the factor (M,) exp(j 2 pi f T_cp) of the previous symbol, which ends a prefix before the window."""
-    count = network.subcarriers
-    baseband_hz = (np.arange(count) - count // 2) * network.subcarrier_spacing_hz
-    return np.exp(2j * np.pi * baseband_hz * length_s(settings, network))
 
 
 def late_samples(settings: dict, view: View) -> np.ndarray:

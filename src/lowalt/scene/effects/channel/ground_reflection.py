@@ -13,7 +13,7 @@ from lowalt.echo.radar import radar
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel
-from lowalt.scene.response import Path
+from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -82,7 +82,7 @@ def roughness(sine: np.ndarray, height_m: float, frequency_hz: float) -> np.ndar
     return i0e(2.0 * (2 * np.pi * frequency_hz / SPEED_OF_LIGHT * height_m * sine) ** 2)
 
 
-def paths(settings: dict, view: View) -> list[Path]:
+def paths(settings: dict, view: View) -> list[ImagePath]:
     """Return the one further path: images (N, L, 3) m below the ground and coefficients (N, L).
 
     The coefficient at the middle of the station's band is used for the whole band.
@@ -99,4 +99,4 @@ def paths(settings: dict, view: View) -> list[Path]:
         return smooth * roughness(sine, settings["roughness_m"], frequency)
 
     coefficient = series.at(reflected, sine) * view.relative_gain(images)
-    return [Path(images, coefficient, station_m * mirror)]
+    return [ImagePath(images, coefficient, station_m * mirror)]

@@ -18,8 +18,8 @@ from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.scene import clocks, waveform
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
-from lowalt.scene.effects.channel.cyclic_prefix import length_s, turn
 from lowalt.scene.listening import Listening
+from lowalt.scene.prefix import length_s, turn
 
 SOURCE = (
     "3GPP TS 38.104, 6.6.3 (adjacent channel leakage ratio of base stations, 45 dB below 7 GHz; here the same at any "

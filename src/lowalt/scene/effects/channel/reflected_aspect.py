@@ -12,7 +12,7 @@ import numpy as np
 from lowalt.common.errors import InputError
 from lowalt.scene.catalogue import PLACES
 from lowalt.scene.checks import CheckedScene
-from lowalt.scene.response import Path
+from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -46,7 +46,7 @@ def check(settings: dict, scene: CheckedScene) -> None:
 
 
 def routes(
-    settings: dict, view: View, paths: list[Path], weight: Callable[[View, Iterable[str] | None], np.ndarray]
+    settings: dict, view: View, paths: list[ImagePath], weight: Callable[[View, Iterable[str] | None], np.ndarray]
 ) -> np.ndarray:
     """Return the factors (R, R, N, L) on two-way amplitudes, out by path a and back by path b, the direct one first.
 

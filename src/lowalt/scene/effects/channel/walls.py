@@ -16,7 +16,7 @@ from lowalt.echo.radar import radar
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel
-from lowalt.scene.response import Path
+from lowalt.scene.response import ImagePath
 from lowalt.scene.view import View
 
 SOURCE = (
@@ -84,7 +84,7 @@ def _mirror(places, station, axes, size, images, grazing, reflected):
             reflected[n, l] = inside & (before * off > 0.0)
 
 
-def paths(settings: dict, view: View) -> list[Path]:
+def paths(settings: dict, view: View) -> list[ImagePath]:
     """Return one path a facade: images (N, L, 3) m and coefficients (N, L), zero where no ray is reflected.
 
     A facade that reflects nothing in the whole look has the coefficient 0.0, and the points themselves as images.
@@ -98,7 +98,7 @@ def paths(settings: dict, view: View) -> list[Path]:
         behind = mirrored(facade, station_m[None, None], station_m)[0][0, 0]
         if reflected.any():
             mirror = series.at(lambda sine: fresnel(sine, *material), sine) * view.relative_gain(images)
-            result.append(Path(images, np.where(reflected, mirror, 0.0), behind))
+            result.append(ImagePath(images, np.where(reflected, mirror, 0.0), behind))
         else:
-            result.append(Path(view.places, 0.0, behind))
+            result.append(ImagePath(view.places, 0.0, behind))
     return result
