@@ -4,7 +4,7 @@
     python benchmarks/scene_levels.py --targets results/benchmarks/target_levels.csv
 
 The sample is the first motion model of the DJI Mavic 3 Pro at the first station, or on the first link; the same lines
-as `lowalt explain SCENE --sample "DJI Mavic 3 Pro:0" --no-cost` prints.
+as `lowalt explain SCENE --sample "DJI Mavic 3 Pro:0" --no-table` prints.
 A target's level is the mean over looks, drawn as the default scene draws them, of the echo over the radar equation's
 for 1 m2 at the target's place at each symbol. Columns in dBsm: what is stated; points whose cross sections add to that;
 points as `mean_cross_section` gives them, by one frequency and one element, with its standard error. Columns in dB:

@@ -126,8 +126,8 @@ def parsed_only(monkeypatch, words):
 
 ODD = (
     "run none.yaml", "run config", "run README.md", "explain none.yaml", "explain config",
-    "explain README.md --no-cost", "explain config/scenes/urban.yaml --station Z --no-cost",
-    "explain config/tiny.yaml --sample Nobody:1 --no-cost", "sample Nobody 3", "sample Crow -1",
+    "explain README.md --no-table", "explain config/scenes/urban.yaml --station Z --no-table",
+    "explain config/tiny.yaml --sample Nobody:1 --no-table", "sample Nobody 3", "sample Crow -1",
     "sample Crow 3 --snr nan", "sample Crow 3 --overlay none.yaml", "predict none.pt a.png",
     "predict README.md README.md", "predict README.md none.npy", "verify none.json", "verify README.md",
     "verify config", "verify config/targets.csv --remake 2", "remake none.json KEY", "remake README.md KEY",

@@ -1,7 +1,6 @@
 """Answers of `lowalt --json`: valid JSON with the keys that the reference names, and the plain command's status."""
 
 import json
-import math
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,7 +15,7 @@ from lowalt.commands.for_programs import as_json
 from lowalt.common.config import load, plain
 from lowalt.common.files import replacing
 from lowalt.report.figures import inspection, target
-from lowalt.shards.dataset import Dataset, Place
+from lowalt.scene.catalogue import PLACES
 from lowalt.tiles.render import Renderer
 from lowalt.workflow.board import Board, Job
 from lowalt.workflow.status import FOLDER, PLANNED_JOBS
@@ -26,8 +25,8 @@ ROOT = Path(__file__).parents[1]
 CONFIG, SCHEMA = ROOT / "config/default.yaml", ROOT / "workflow/schemas/config.schema.yaml"
 PAGE = (ROOT / "docs/reference/json.md").read_text()
 STATION = {"method", "decisions", "rms_change", "other_cells"}
-STATIC = ("settings", "stages", "method")
-"""Keys whose own keys are names of settings, stages or fields that the reference does not list."""
+STATIC = ("settings", "stages", "method", "otherwise")
+"""Keys whose own keys are names of settings, stages, fields or filters that the reference does not list."""
 
 
 def refused(text):
@@ -60,54 +59,34 @@ def keys(value):
     return set(value).union(*(keys(item) for name, item in value.items() if name not in STATIC))
 
 
-def test_explain_answers_with_the_facts_of_its_text(answer, capsys, tmp_path):
-    overlay = tmp_path / "scene.yaml"
-    effects = "effects: {squint: {}, iq_imbalance: {}}"
-    overlay.write_text(f"{{network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
+def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
+    overlay, mine = tmp_path / "scene.yaml", tmp_path / "mine.yaml"
+    effects = "effects: {iq_imbalance: {}, adc: {bits: 24}}"
+    overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
     scene = ["explain", str(overlay), "--sample", "Crow:3"]
-    found, status = answer(*scene)
-    assert status == 0 and found["snr_db"][-1] == "inf"
-    assert found["time"]["base_ms"] > 0 and found["time"]["hardware"]
-    (sample,) = found["samples"]
-    assert set(sample) >= STATION and (sample["subtype"], sample["model"]) == ("Crow", 3)
-    assert main([*scene, "--no-cost"]) == 0
+    found, status = answer(*scene, "--suggest", "1e-3", "--out", str(mine))
+    assert status == 0 and [one["station"] for one in found["findings"]] == ["A", "B", "C"]
+    assert all(one["right"] > 0.99 and one["subtype"] == "Crow" for one in found["findings"])
+    changes = {one["effect"]: one for one in found["changes"]}
+    assert set(changes) == set(PLACES) and [one["effect"] for one in found["changes"]][:2] == ["iq_imbalance", "adc"]
+    assert changes["iq_imbalance"]["signal"] > 1e-3 > changes["adc"]["signal"]
+    assert "there is no clutter to cancel" in changes["canceller"]["refused"]
+    # The suggested scene has the effects that matter, and is a scene.
+    assert load([CONFIG, mine], SCHEMA)["effects"] == {"iq_imbalance": {}}
+    assert main([*scene, "--no-table", "--levels"]) == 0
     text = capsys.readouterr().out
-    assert f"range {sample['range_m']:.0f} m" in text and f"rms change {sample['rms_change']:.2g}" in text
-    decided = re.findall(r"^  (\w+): (?:computed|left out)", text, re.MULTILINE)
-    assert decided == [decision["name"] for decision in sample["decisions"]] == ["squint"]
-    named = re.findall(r"^(\w+) \([\w ]+\): ", text, re.MULTILINE)
-    assert named == [effect["name"] for effect in found["effects"]] == ["squint", "iq_imbalance"]
+    assert "is chosen in 100% of the symbols: Bird 100%" in text and "expected echo" in text
 
 
-def test_explain_answers_for_a_link_with_its_geometry(answer):
-    scene = ("explain", "config/scenes/links.yaml", "--sample", "Crow:3", "--no-cost", "--station")
-    found, _ = answer(*scene, "A-B")
-    (sample,) = found["samples"]
-    assert found["time"] is None and not set(sample) & STATION
-    out, back, angle = (sample["link"][name] for name in ("out_m", "back_m", "bistatic_rad"))
-    assert set(sample["link"]) == {"out_m", "back_m", "bistatic_rad"}
-    assert sample["range_m"] == pytest.approx((out + back) / 2)
-    assert [answer(*scene, name)[0]["samples"][0]["range_m"] for name in "AB"] == pytest.approx([out, back])
-    masts = load([CONFIG, ROOT / "config/scenes/links.yaml"], SCHEMA)["network"]["stations"]
-    apart = math.dist(masts["A"]["position_m"], masts["B"]["position_m"])
-    assert out**2 + back**2 - 2 * out * back * math.cos(angle) == pytest.approx(apart**2)
-
-
-def test_explain_says_how_far_effects_change_the_signals_of_the_data_set(answer, tmp_path):
-    """A wrong cell holds another value, so the symbols that change are those with another cell."""
-    plain_scene, overlay = tmp_path / "plain.yaml", tmp_path / "scene.yaml"
-    plain_scene.write_text("targets: {select: [Crow]}\nnetwork: {symbols: 32}\nspectra: {vrp: {window: 16}}\n")
-    overlay.write_text(plain_scene.read_text() + "effects: {cell_error: {probability: 0.4}}\n")
-    found, _ = answer("explain", str(overlay), "--sample", "Crow:3", "--no-cost")
-    (sample,) = found["samples"]
-    without, signal = (
-        Dataset(load([CONFIG, path], SCHEMA)).made_signal(Place("seen", "Crow", 3, math.inf))[0].astype(complex)
-        for path in (plain_scene, overlay)
+def test_a_wrong_cell_changes_the_symbols_that_hold_another_cell(answer, tmp_path):
+    overlay = tmp_path / "scene.yaml"
+    overlay.write_text(
+        "network: {symbols: 32}\nspectra: {vrp: {window: 16}}\n"
+        "effects: {cell_error: {probability: 0.4, spread_cells: 9, mode: fixed}}\n"
     )
-    assert 0.1 < sample["other_cells"] == (signal != without).mean() < 0.9
-    change = np.sqrt((abs(signal - without) ** 2).mean() / (abs(without) ** 2).mean())
-    # Signals of the data set are complex64.
-    assert sample["rms_change"] == pytest.approx(change, rel=1e-6)
+    found, _ = answer("explain", str(overlay), "--sample", "Crow:3", "--station", "A")
+    right = found["findings"][0]["right"]
+    assert 0.3 < right < 0.9 and found["changes"][0]["cells"] == pytest.approx(1 - right)
 
 
 def test_spectra_answers_with_the_size_of_each(answer):

@@ -143,7 +143,8 @@ def finding(scene: Scene, station: Station, explained: ExplainedSample, clouds: 
         detection = [_with(effect, changed) for effect in sample.detection]
         for more in ("",) if "detector" in names else ("", "detector"):
             added = detection + (called({more: {}}) if more else [])
-            otherwise[" and ".join(filter(None, (name and f"canceller {name}", more)))] = _right(sample, added, own)
+            said = " and ".join(filter(None, (name and f"canceller {name}", more))) or "the same"
+            otherwise[said] = _right(sample, added, own)
     named = {effect.name: effect for effect in scene.effects}
     range_m = float(np.linalg.norm(sample.view.aim_m - np.asarray(station.position_m)))
     row = explained.row
