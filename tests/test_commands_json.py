@@ -61,7 +61,7 @@ def keys(value):
 
 def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
     overlay, mine = tmp_path / "scene.yaml", tmp_path / "mine.yaml"
-    effects = "effects: {iq_imbalance: {}, adc: {bits: 24}}"
+    effects = "effects: {iq_imbalance: {}, adc: {bits: 24, clip: false}}"
     overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
     scene = ["explain", str(overlay), "--sample", "Crow:3"]
     found, status = answer(*scene, "--suggest", "1e-3", "--out", str(mine))
