@@ -96,7 +96,7 @@ def test_a_cache_holds_the_heights_of_a_shard_s_samples_by_key(data, tmp_path):
     quiet = np.array([not shards.record(number)["noise"] for number in range(len(shards))])
     assert abs(wanted[quiet] - exact[quiet, None]).max() < CELL_M / 2
     changed, shard = data / "changed.json", data / "seen-train-00000.tar"
-    scene = json.dumps({**RENDER, "echo": {"tolerance": None, "effects": {"clutter": None}}})
+    scene = json.dumps({**RENDER, "echo": {"tolerance": None, "effects": {"clutter": {}}}})
     write_index(["index", "--settings", scene, "--shards", str(shard), "--out", str(changed)])
     with pytest.raises(InputError, match="scene with the effects \\['clutter'\\]"):
         track.cache_shard(changed, "seen-train-00000.tar", tmp_path / "none.npz")

@@ -54,6 +54,15 @@ def save(path: str | Path, name: str, state: dict) -> None:
         torch.save({"identity": name, "digest": _digest(state), "state": state}, file)
 
 
+def _facts(identity: str) -> dict:
+    """The facts that an identity states in JSON, none where it is another text."""
+    try:
+        facts = json.loads(identity)
+    except ValueError:
+        return {}
+    return facts if isinstance(facts, dict) else {}
+
+
 def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
     """Return the identity and the state of a checkpoint.
 
@@ -65,14 +74,16 @@ def load(path: str | Path, name: str | None = None) -> tuple[str, dict]:
         # Load tensors and plain values only, so that a checkpoint from elsewhere cannot run code.
         content = torch.load(path, map_location="cpu", weights_only=True)
         found, digest, state = content["identity"], content["digest"], content["state"]
-        theirs, own = json.loads(found), _digest(state)
+        own, named = _digest(state), isinstance(found, str)
     except Exception as error:
         # torch's reader meets damaged bytes with nearly any exception.
         raise InputError(f"{path}: not a checkpoint ({in_one_line(error)})") from error
+    if not named:
+        raise InputError(f"{path}: not a checkpoint (its identity is {type(found).__name__}, expected text)")
     if own != digest:
         raise InputError(f"{path}: checkpoint is damaged, its values do not match their SHA-256")
     if name is not None and found != name:
-        ours = json.loads(name)
+        theirs, ours = _facts(found), _facts(name)
         differs = sorted(key for key in theirs.keys() | ours.keys() if theirs.get(key) != ours.get(key))
         raise InputError(f"{path}: checkpoint of another run, its {', '.join(differs)} differ")
     return found, state
