@@ -85,16 +85,13 @@ def faults(config: dict, schema: dict) -> list[str]:
 
 
 def check(config: dict, schema_path: str | Path) -> dict:
-    """Return the configuration if it fits the schema, without the stations, spectra and starts that are null.
+    """Return the configuration if it fits the schema, without the stations and spectra that are null.
 
     A layer of configuration can only add keys to a mapping, so a null removes one of a lower layer.
     The configuration is changed in place. Raises: InputError with one line a fault.
     """
-    network, recognition = config.get("network"), config.get("recognition")
-    inner = [
-        block.get(key) for block, key in ((network, "stations"), (recognition, "start")) if isinstance(block, dict)
-    ]
-    for block in (*inner, config.get("spectra")):
+    network = config.get("network")
+    for block in (network.get("stations") if isinstance(network, dict) else None, config.get("spectra")):
         if isinstance(block, dict):
             for name in [name for name, value in block.items() if value is None]:
                 del block[name]

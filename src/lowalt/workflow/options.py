@@ -59,43 +59,13 @@ def reduced_chunk(wildcards: Any, input: Any) -> str:
     return f"--reduced {input.reduced} --motion {input.motion}" if input.get("reduced") else ""
 
 
-def extra(wildcards: Any, input: Any) -> str:
-    """The shrunk images or the signals of other runs that are trained on too, and their measured heights."""
-    tracks = f" --extra-tracks {input.extra_tracks}" if input.get("extra_tracks") else ""
-    return f"--extra {input.extra}{tracks}" if input.get("extra") else ""
-
-
-def noisy_chunk(wildcards: Any, input: Any) -> str:
-    """The noisy signals of a chunk and its motion table, where shards hold images alone."""
-    return f"--noisy {input.noisy} --motion {input.motion}" if input.get("noisy") else ""
-
-
-def timed_model(wildcards: Any, input: Any) -> str:
-    """The trained model to time, where its time depends on its training."""
-    return f"--model {input.model}" if input.model else ""
-
-
 def fidelity(wildcards: Any, input: Any) -> str:
     """The table of models trained on echoes at a tolerance, where there is one."""
     return f"--fidelity {input.fidelity}" if input.fidelity else ""
 
 
-def stream(wildcards: Any, input: Any) -> str:
-    """The configuration whose fresh motion models are trained on."""
-    return f"--stream {input.stream}" if input.get("stream") else ""
-
-
-def start(wildcards: Any, input: Any) -> str:
-    """The trained model whose weights a training starts from."""
-    return f"--start {input.start}" if input.get("start") else ""
-
-
 def samples(wildcards: Any, input: Any) -> str:
-    """Options that name the signals, the shrunk images, the index of the shards, or the configuration to make samples
-    from; and the measured heights, for a scheme with the cue."""
-    tracks = f" --tracks {input.tracks}" if input.get("tracks") else ""
+    """Options that name the shrunk images, the index of the shards, or the configuration to make samples from."""
     if input.get("dataset"):
         return f"--dataset {input.dataset}"
-    if input.get("signals"):
-        return f"--signals {input.signals}"
-    return (f"--views {input.views}" if input.get("views") else f"--index {input.index}") + tracks
+    return f"--views {input.views}" if input.get("views") else f"--index {input.index}"
