@@ -75,7 +75,7 @@ def _texts() -> list[Reader]:
     from lowalt.common.csv_tables import read_csv
     from lowalt.common.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
-    from lowalt.recognition import choose, freeze, orderings, schemes
+    from lowalt.recognition import freeze, orderings, schemes
     from lowalt.recordings.record import read_record
     from lowalt.shards import manifest
     from lowalt.targets.records import load_records, load_table
@@ -102,10 +102,9 @@ def _texts() -> list[Reader]:
                lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p])),
         Reader("table of targets", "a.csv", table, load_table),
         Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
-        Reader("candidates", "a.yaml", Path("config/choices/default.yaml").read_bytes(), choose.read),
         Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
                orderings.read_published),
-        Reader("table", "a.csv", Path("config/accuracy.csv").read_bytes(), read_csv),
+        Reader("table", "a.csv", Path("config/cost/accuracy.csv").read_bytes(), read_csv),
         Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
                read_table),
         Reader("manifest", "a.sha256", Path("results/reference/tiny.sha256").read_bytes(), manifest.read),
@@ -136,7 +135,6 @@ def _captures() -> list[Reader]:
 def _arrays() -> list[Reader]:
     """Readers of arrays, shards and models, each with a good file."""
     import torch
-    from lowalt.recognition.tracked import Tracked
 
     from lowalt.common.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
@@ -174,7 +172,6 @@ def _arrays() -> list[Reader]:
     return [
         Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud),
         Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")})),
-        Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1))),
         Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p))),
         Reader("index", "index.json", json.dumps(index).encode(), load_index),
         Reader("tiles", "a.npz", _bytes(lambda p: write_tiles(p, [png, png]), "a.npz"), lambda p: [*_all(Tiles(p))]),
