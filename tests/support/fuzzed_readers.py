@@ -6,7 +6,6 @@ import json
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import yaml
@@ -161,8 +160,6 @@ def _arrays() -> list[Reader]:
         np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
     )  # fmt: skip
     cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
-    ones, measured = np.ones((count, 3)), SimpleNamespace(facts=facts, size=16)
-    heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
     index = {"format": "lowalt-shards-2", "shards": [], "kind": "image"}
