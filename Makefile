@@ -20,7 +20,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods rotors confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods study confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -208,6 +208,9 @@ track-invented: $(SETUP)  ## networks with measured heights, trained also on inv
 	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples tracks
 	$(SNAKEMAKE) --configfile config/track-invented.yaml $(OVERLAY)
 
+study:  ## a study of studies/: make study NAME=rotors
+	$(MAKE) --no-print-directory -C studies/$(NAME)
+
 # The classical methods' packages, which nothing else needs.
 METHODS := .venv/set-up-methods
 $(METHODS): $(SETUP)
@@ -271,13 +274,6 @@ reference-choices:  ## keep the tables of a finished `make choices`
 
 reference-confirm:  ## keep the tables of a finished `make confirm`
 	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
-
-rotors: $(BASE)  ## rates, lengths and numbers of blades read from signals, against the truth: results/reference/*-rotors.csv
-	$(SNAKEMAKE) -- data
-	$(BIN)/python -m lowalt.measure.rotor_estimates --run results/default --out results/reference/default-rotors.csv
-	$(SNAKEMAKE) --configfile config/rotors.yaml -- $(foreach file,config.yaml noisy/seen-00000.npy noisy/unseen-00000.npy,results/rotors/$(file))
-	$(BIN)/python -m lowalt.measure.rotor_estimates --run results/rotors --out results/reference/short-rotors.csv
-	$(BIN)/python -m lowalt.measure.rotor_made --out results/reference/made-rotors.csv
 
 reference-methods: $(SETUP)  ## keep the tables of a finished `make methods`
 	for table in $(REFERENCE) alarms.csv accuracy_cost.csv; do cp results/methods/$$table results/reference/methods-$$table; done

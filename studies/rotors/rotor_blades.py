@@ -13,8 +13,7 @@ Source: Chen, The Micro-Doppler Effect in Radar, 2nd ed. 2019, ch. 3 (lines, fla
 from typing import NamedTuple
 
 import numpy as np
-
-from lowalt.recognition.rotor import Passing
+from rotor import Passing
 
 MOST_LINES = 80
 """Lines on either side of the body that are looked at."""

@@ -1,6 +1,6 @@
 """Rotors read from the signals of a finished run, held against the truth of its motion tables and records.
 
-    python -m lowalt.measure.rotor_estimates --run results/default --out rotors.csv
+    python studies/rotors/study.py estimates --run results/default --out rotors.csv
 
 rotors.csv, one row a craft with rotors and SNR:
     subtype, group, snr_db, blades, models    blades of a rotor (its record); motion models tried
@@ -23,16 +23,15 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from rotor import LEAST_CYCLES, folded, passing, passing_of_rests, without_body, without_pursued_body
+from rotor_blades import Blades, blades
 
-from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.errors import InputError
 from lowalt.common.network import SPEED_OF_LIGHT, Network
 from lowalt.common.shipped import located
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion import read_table
-from lowalt.recognition.rotor import LEAST_CYCLES, folded, passing, passing_of_rests, without_body, without_pursued_body
-from lowalt.recognition.rotor_blades import Blades, blades
 from lowalt.targets.records import records_of
 from lowalt.tiles.signals import load_signals
 
@@ -125,7 +124,7 @@ def summary(reads: list[Read], count: int, near_hz: float) -> list[str]:
 
 def main(arguments: list[str]) -> None:
     """Write the table."""
-    options = argparse.ArgumentParser("lowalt.measure.rotor_estimates", description=__doc__.splitlines()[0])
+    options = argparse.ArgumentParser("study.py estimates", description=__doc__.splitlines()[0])
     options.add_argument("--run", required=True, type=Path, help="folder of a finished run")
     options.add_argument("--models", type=int, default=20, help="motion models of each subtype (default: 20)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
@@ -140,7 +139,3 @@ def main(arguments: list[str]) -> None:
         rows.append([subtype, group, snr, blade_count, len(reads), right, f"{chance:.1f}", *rest])
     write_csv(given.out, COLUMNS, rows)
     print(f"{given.out}: {len(rows)} rows", file=sys.stderr)
-
-
-if __name__ == "__main__":
-    run(main)

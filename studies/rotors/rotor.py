@@ -16,10 +16,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from null_space_pursuit import pursue, second_difference_bands
 from scipy.linalg import solveh_banded
-
-from lowalt.recognition.features import body_line_hz
-from lowalt.recognition.null_space_pursuit import pursue, second_difference_bands
 
 POINTS_A_SYMBOL = 20
 """Points of the zero-padded transform of the rest for each symbol, raised to a power of two."""
@@ -29,6 +27,21 @@ WEIGHTS = np.arange(1.0, 6.0) ** -0.5 / (np.arange(1.0, 6.0) ** -0.5).sum()
 """Weights of the comb's first lines; chosen on the first 14 motion models of the seen subtypes."""
 LEAST_CYCLES, STEP_CYCLES = 8.0, 0.05
 """Smallest passing frequency that is looked for, in cycles a look, and the steps of the search; below lies the body."""
+
+
+def body_line_hz(signal: np.ndarray, interval_s: float) -> float:
+    """Return the Doppler frequency (Hz) of the strongest line of a signal (N,), folded, by a parabola through its peak.
+
+    The window is Hann's, so a strong body line does not cover weak lines of moving parts by its side lobes.
+    """
+    points = 1024
+    power = np.abs(np.fft.fft(signal * np.hanning(len(signal) + 2)[1:-1], points)) ** 2
+    place = int(power.argmax())
+    left, middle, right = np.log(power[[place - 1, place, (place + 1) % points]] / (power.sum() or 1) + 1e-300)
+    bend = left - 2 * middle + right
+    shift = np.clip(0.5 * (left - right) / bend, -0.5, 0.5) if bend < 0 else 0.0
+    found = (place + shift) / (points * interval_s)
+    return (found + 0.5 / interval_s) % (1 / interval_s) - 0.5 / interval_s
 
 
 class Passing(NamedTuple):
@@ -54,7 +67,7 @@ def without_body(signal: np.ndarray, interval_s: float, rounds: int = 3) -> np.n
     """
     bands = _smoother(len(signal), (len(signal) / SMOOTH_SYMBOLS) ** 4)
     times = np.arange(len(signal)) * interval_s
-    phase = 2 * np.pi * body_line_hz(signal[None], interval_s)[0] * times
+    phase = 2 * np.pi * body_line_hz(signal, interval_s) * times
 
     def body_of(turned: np.ndarray) -> np.ndarray:
         """Return the smooth part of a demodulated signal."""
@@ -72,7 +85,7 @@ def without_body(signal: np.ndarray, interval_s: float, rounds: int = 3) -> np.n
 
 def without_pursued_body(signal: np.ndarray, interval_s: float) -> np.ndarray:
     """Return the rest as `without_body` does, the body found by null space pursuit; shapes as there."""
-    start_hz = float(body_line_hz(signal[None], interval_s)[0])
+    start_hz = float(body_line_hz(signal, interval_s))
     found = pursue(signal, start_hz, interval_s)
     phase = np.concatenate([[0.0], np.cumsum(np.angle(found.course))])
     return found.rest * np.exp(-1j * phase)

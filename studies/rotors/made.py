@@ -1,6 +1,6 @@
 """Blade length and number read from made signals of rotors in closed form, whose truth is exact.
 
-    python -m lowalt.measure.rotor_made --out made-rotors.csv
+    python studies/rotors/study.py made --out made-rotors.csv
 
 made-rotors.csv, one row a kind of rotor, at 20 dB and the default's symbols and stations:
     rotors, blades, lines      equal rotors of one rate; blades of each; lines on either side, on average
@@ -15,13 +15,12 @@ import argparse
 import sys
 
 import numpy as np
+from estimates import NEAR_CYCLES, Read, summary
+from rotor import folded, passing_of_rests, without_body
+from rotor_blades import blades
 
-from lowalt.common.command import run
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.streams import stream
-from lowalt.measure.rotor_estimates import NEAR_CYCLES, Read, summary
-from lowalt.recognition.rotor import folded, passing_of_rests, without_body
-from lowalt.recognition.rotor_blades import blades
 
 COLUMNS = (
     "rotors", "blades", "lines", "draws", "right_percent", "length_told_percent", "length_error_percent",
@@ -72,7 +71,7 @@ def read_made(rng: np.random.Generator, count: int, lines: float, rotors: int) -
 
 def main(arguments: list[str]) -> None:
     """Write the table."""
-    options = argparse.ArgumentParser("lowalt.measure.rotor_made", description=__doc__.splitlines()[0])
+    options = argparse.ArgumentParser("study.py made", description=__doc__.splitlines()[0])
     options.add_argument("--draws", type=int, default=30, help="signals of each kind (default: 30)")
     options.add_argument("--out", required=True, help="table to write (.csv)")
     given = options.parse_args(arguments)
@@ -84,7 +83,3 @@ def main(arguments: list[str]) -> None:
         rows.append([rotors, count, lines, given.draws, right, *lengths])
     write_csv(given.out, COLUMNS, rows)
     print(f"{given.out}: {len(rows)} rows", file=sys.stderr)
-
-
-if __name__ == "__main__":
-    run(main)
