@@ -12,7 +12,6 @@ KERNELS := .venv/set-up-kernels
 BYTECODE := .venv/set-up-bytecode
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-TABLES := accuracy comparisons confusion subtypes stages alarms calibration reliability orderings seeds ranges aspects
 # The oldest and the newest NumPy that pyproject.toml allows.
 NUMPYS := 2.0.0 2.4.6
 OLDEST_SNAKEMAKE := 9.23.0
@@ -20,7 +19,7 @@ REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv 
 
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost choices invented track-invented methods study confirm effects-cost scenes tables estimate space campaign reference reference-choices reference-confirm reference-methods reference-tables reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost study effects-cost estimate space campaign reference reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
 
 all: default
 
@@ -166,7 +165,7 @@ status: $(SETUP)  ## the state of a run in another terminal
 	@$(BIN)/python -m lowalt.workflow.status
 
 cost: $(SETUP)  ## time of the echo over its accuracy, up to 1600 points: results/cost/cost.csv and cost.png
-	$(SNAKEMAKE) --configfile config/cost.yaml -- cost
+	$(SNAKEMAKE) --configfile config/cost/echo.yaml -- cost
 
 gallery: $(BASE)  ## a page that links all runs and compares any two: results/index.html
 	$(BIN)/lowalt report --gallery
@@ -175,38 +174,12 @@ hard-cases: $(BASE)  ## inputs on which a naive formula fails, its error, ours a
 	$(BIN)/python -m lowalt.measure.hard_cases --out results/default/hard_cases.csv
 
 accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .png
-	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/fidelity.yaml config/fidelity/1e-$$order.yaml -- models || exit 1; done
-	$(SNAKEMAKE) --configfile config/fidelity.yaml -- results/fidelity-exact/transfer.csv
-	$(SNAKEMAKE) --configfile config/accuracy.yaml -- accuracy_cost
-
-# The paper's scene first: its model is what the other scenes' samples are tried on, in addition to a model of their own.
-scenes: $(SETUP)  ## small trials of the paper's scene and three others: accuracy of a model trained without effects, and of their own
-	$(SNAKEMAKE) --configfile config/trial.yaml config/scenes/paper.yaml -- models results/scene-paper/accuracy.csv
-	for scene in urban rural worst; do $(SNAKEMAKE) --configfile config/trial.yaml config/scenes/$$scene.yaml \
-		--config 'recognition={transfer: [scene-paper]}' -- results/$$scene/transfer.csv || exit 1; done
+	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/cost/fidelity.yaml config/cost/fidelity-1e-$$order.yaml -- models || exit 1; done
+	$(SNAKEMAKE) --configfile config/cost/fidelity.yaml -- results/fidelity-exact/transfer.csv
+	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 
 effects-cost: $(SETUP)  ## time and influence of each effect, alone and together: results/default/effects.csv and .png
 	$(SNAKEMAKE) -- effects_cost
-
-tables: $(SETUP)  ## every scheme of the paper that two cores can train, on the default's data, into results/tables; three times: make tables OVERLAY=config/seeds.yaml
-	$(SNAKEMAKE)
-	$(SNAKEMAKE) --configfile config/tables.yaml $(OVERLAY)
-
-choices: $(SETUP)  ## recipes of training compared on validation alone: results/default/choices.csv and choices_subtypes.csv
-	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
-	$(SNAKEMAKE) -- choices
-
-invented: $(SETUP)  ## the default's schemes trained also on craft and birds of sizes that no maker has built: results/with-invented
-	$(SNAKEMAKE) -- prepared training_samples
-	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples
-	$(SNAKEMAKE) --configfile config/with-invented.yaml $(OVERLAY)
-
-# On the data of `make confirm` instead: make track-invented OVERLAY=config/track-invented-confirm.yaml; of a second fresh
-# root seed: track-invented-confirm-again.yaml.
-track-invented: $(SETUP)  ## networks with measured heights, trained also on invented sizes and their heights: results/track-invented
-	$(SNAKEMAKE) $(if $(OVERLAY),--configfile $(subst track-invented-,,$(OVERLAY))) -- prepared training_samples tracks
-	$(SNAKEMAKE) --configfile config/invented.yaml -- training_samples tracks
-	$(SNAKEMAKE) --configfile config/track-invented.yaml $(OVERLAY)
 
 study:  ## a study of studies/: make study NAME=rotors
 	$(MAKE) --no-print-directory -C studies/$(NAME)
@@ -216,14 +189,6 @@ METHODS := .venv/set-up-methods
 $(METHODS): $(SETUP)
 	$(call install,$(call of_extra,methods))
 	touch $@
-
-methods: $(METHODS)  ## methods that people ask about, on the default's data: fusions, networks on signals, classical ones on features: results/methods
-	$(SNAKEMAKE) -- prepared slow_times training_samples
-	$(SNAKEMAKE) --configfile config/methods.yaml
-	$(SNAKEMAKE) --configfile config/methods.yaml -- accuracy_cost
-
-confirm: $(SETUP)  ## the default's recipe once more from a root seed that no choice has seen, three training seeds: results/confirm
-	$(SNAKEMAKE) --configfile config/confirm.yaml
 
 # Its own stamp: nothing else needs pip-audit. Without the internet the table is all there is, and the status says so.
 .venv/set-up-audit: $(BASE)
@@ -268,19 +233,6 @@ campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes
 space: $(SETUP)  ## disk and memory of jobs, measured: make space RUNS='results/tiny results/default' (finished, small to large)
 	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
 		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
-
-reference-choices:  ## keep the tables of a finished `make choices`
-	cp results/default/choices.csv results/default/choices_subtypes.csv results/reference/
-
-reference-confirm:  ## keep the tables of a finished `make confirm`
-	for table in $(REFERENCE); do cp results/confirm/$$table results/reference/confirm-$$table; done
-
-reference-methods: $(SETUP)  ## keep the tables of a finished `make methods`
-	for table in $(REFERENCE) alarms.csv accuracy_cost.csv; do cp results/methods/$$table results/reference/methods-$$table; done
-
-reference-tables: $(SETUP)  ## keep the tables of a finished `make tables` and write them into the documents
-	for table in $(TABLES); do cp results/tables/$$table.csv results/reference/tables-$$table.csv; done
-	$(BIN)/python -m lowalt.report.documents design/recognition.md schemes=results/reference/tables-
 
 reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy-cost` and write it into the documents
 	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end; done

@@ -18,7 +18,6 @@ include: "workflow/rules/noise.smk"
 include: "workflow/rules/tiles.smk"
 include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
-include: "workflow/rules/choices.smk"
 include: "workflow/rules/cost.smk"
 include: "workflow/rules/accuracy_cost.smk"
 include: "workflow/rules/effects_table.smk"
@@ -73,28 +72,10 @@ rule training_samples:
     localrule: True
 
 
-rule slow_times:
-    input:
-        products.slow_times,
-    localrule: True
-
-
-rule tracks:
-    input:
-        products.tracks,
-    localrule: True
-
-
 # What needs no torch before the first training: `make` has it made while torch is still on its way.
 rule prepared:
     input:
         products.prepared,
-    localrule: True
-
-
-rule choices:
-    input:
-        f"results/{RUN.name}/choices.csv",
     localrule: True
 
 

@@ -2,7 +2,7 @@
 
     python benchmarks/long_run.py --out results/benchmarks/long_run.csv [--models N] [--short N] [--cores N]
 
-Makes config/long.yaml twice through the workflow, with few motion models and with many, checks every byte of each data
+Makes OVERLAY twice through the workflow, with few motion models and with many, checks every byte of each data
 set (`lowalt verify`), and lets every Python process note its own peak memory and times when it ends. No network is
 trained. Ends with status 1 where a stage needs more memory for many samples than for few. Linux. Columns:
 
@@ -35,7 +35,7 @@ from lowalt.common.hardware import describe
 from lowalt.common.yaml_files import load_yaml
 
 ROOT = Path(__file__).parents[1]
-OVERLAY = "config/long.yaml"
+OVERLAY = "config/checks/long.yaml"
 COLUMNS = ("run", "models", "samples", "stage", "processes", "wall_s", "cpu_s", "peak_mib", "growth", "hardware")
 NOTES = """
 import atexit, json, os, sys, time
@@ -68,7 +68,7 @@ def stage(words: list[str]) -> str | None:
 def commands(run: str, cores: int, overlays: list[str]) -> list[list[str]]:
     """Return the command lines that make a run and verify it.
 
-    overlays: on top of config/long.yaml; they name the run.
+    overlays: on top of config/checks/long.yaml; they name the run.
     """
     python = sys.executable
     make = [python, "-m", "snakemake", "--cores", str(cores), "--forceall", "--configfile", OVERLAY, *overlays]
@@ -138,7 +138,7 @@ def compared(few: list[dict], many: list[dict]) -> tuple[list[dict], list[str]]:
 def measured(run: str, models: int, cores: int, more: list[str]) -> list[dict]:
     """Make and verify one run; return its rows with run, models and samples.
 
-    more: overlays on top of config/long.yaml. Raises: CalledProcessError where the run fails or a byte of it is wrong.
+    more: overlays on top of OVERLAY. Raises: CalledProcessError where the run fails or a byte of it is wrong.
     """
     with tempfile.TemporaryDirectory() as name:
         overlays = [*more, size_overlay(run, models, Path(name))]

@@ -3,7 +3,7 @@ ROOT := $(abspath $(dir $(lastword $(MAKEFILE_LIST)))..)
 HERE := studies/$(notdir $(CURDIR))
 CORES ?= all
 SNAKEMAKE := cd $(ROOT) && .venv/bin/snakemake --cores $(CORES)
-PYTHON := cd $(ROOT) && .venv/bin/python
+PYTHON := cd $(ROOT) && PYTHONPATH=studies .venv/bin/python
 # The first target of a study; `make setup` brings what the root's `make` needs.
 .PHONY: all setup
 all:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import yaml
+from lowalt.recognition.extra import with_extra
 
 from lowalt.common.config import merge, plain
 from lowalt.common.errors import InputError
@@ -18,7 +19,6 @@ from lowalt.motion import poses, read_table, write_table
 from lowalt.motion.poses import positions
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.recognition.__main__ import main
-from lowalt.recognition.extra import with_extra
 from lowalt.recognition.freeze import freeze
 from lowalt.recognition.samples import Facts, ViewSamples, write
 from lowalt.shards.record import record, row_of

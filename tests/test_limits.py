@@ -6,6 +6,7 @@ import zipfile
 
 import numpy as np
 import pytest
+from lowalt.recognition.stream import STRIDE, Stream
 
 from configured import ROOT, SCHEMA
 from dataset import build
@@ -13,7 +14,6 @@ from lowalt.common.config import load, merge
 from lowalt.common.plan import Plan
 from lowalt.common.streams import digest
 from lowalt.common.yaml_files import load_yaml
-from lowalt.recognition.stream import STRIDE, Stream
 from lowalt.shards import ShardSet, index
 from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset

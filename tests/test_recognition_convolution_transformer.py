@@ -2,10 +2,10 @@
 
 import pytest
 import torch
+from test_recognition_fusion import images, recogniser
 
 from lowalt.common.errors import InputError
 from lowalt.recognition import convolution_transformer
-from test_recognition_fusion import images, recogniser
 
 
 @torch.inference_mode()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 import yaml
+from lowalt.recognition.stream import Stream
 
 from configured import Inputs, parts
 from lowalt.common.classes import CATEGORIES
@@ -17,7 +18,6 @@ from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.made import DatasetSamples, opened, stations_of
 from lowalt.recognition.reader import Reader
-from lowalt.recognition.stream import Stream
 from lowalt.recognition.views import ShardSamples
 from lowalt.scene import chunk
 from lowalt.shards import maker

@@ -37,7 +37,6 @@ def test_views_are_numbered_over_all_spectra_and_found_among_those_a_data_set_ha
         schemes.columns_in(scheme.columns, ["vt", "vrp"], 2, "here")
     with pytest.raises(InputError, match=r"here: spectra \['vt'\], the scheme also needs \['vrp'\]"):
         schemes.columns_in(scheme.columns, ["vt"], 3, "here")
-    assert schemes.Scheme("x", (1, 2), (), method="cnn").columns == [1, 2]
 
 
 def test_stations_of_one_letter_stand_together_and_others_are_joined():
@@ -48,21 +47,8 @@ def test_stations_of_one_letter_stand_together_and_others_are_joined():
     assert schemes.joined(["A", "B"]) == "AB" and schemes.joined(["A", "west"]) == "A+west"
 
 
-def test_a_record_is_the_scheme_and_names_a_cue_only_where_there_is_one():
+def test_a_record_is_the_scheme_and_one_of_another_version_counts_only_where_it_says_nothing_more():
     plain = schemes.Scheme("x", (0,), (1, 2), size=24)
-    assert "cues" not in plain.record and schemes.of_record(plain.record) == plain
-    cued = schemes.Scheme("x height", (0,), (1,), cues="height")
-    assert schemes.of_record({key: list(value) if isinstance(value, tuple) else value
-                              for key, value in cued.record.items()}) == cued  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [({"cues": "speed"}, "cues 'speed', expected nothing or one of"),
-     ({"cues": "height", "scheme": "A height", "fusion": "mean"}, "with fusion 'mean', expected 'attention'"),
-     ({"cues": "height"}, "expected the word in the scheme's name 'x'")],
-)  # fmt: skip
-def test_cues_that_do_not_fit_their_row_are_refused(changes, words):
-    with pytest.raises(InputError, match=words):
-        made(**changes)
-    assert made(cues="height", scheme="A height").cues == "height"
+    assert schemes.of_record(plain.record) == schemes.of_record({**plain.record, "method": ""}) == plain
+    with pytest.raises(TypeError):
+        schemes.of_record({**plain.record, "cues": "height"})

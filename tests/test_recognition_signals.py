@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from lowalt.recognition.augment_signals import augment_signals
 
 from dataset import SNRS, build
 from lowalt.common.errors import InputError
 from lowalt.common.streams import stream
 from lowalt.recognition import methods, one_sample, runs, schemes, signal_networks, slow_time
-from lowalt.recognition.augment_signals import augment_signals
 from lowalt.shards import ShardSet
 from pictures import IMAGES, NETWORK, SPECTRA
 from signal_trainings import share_right, sources, write_signals

@@ -33,12 +33,7 @@ GIVEN = {
     "clouds": ({"clouds": ["a"]}, ["--clouds", "a"]),
     "content": ({"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
     "reduced_chunk": ({"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
-    "extra": ({"extra": ["a", "b"]}, ["--extra", "a", "b"]),
-    "noisy_chunk": ({"noisy": "a", "motion": "b"}, ["--noisy", "a", "--motion", "b"]),
-    "timed_model": ({"model": "a"}, ["--model", "a"]),
     "fidelity": ({"fidelity": "a"}, ["--fidelity", "a"]),
-    "stream": ({"stream": "a"}, ["--stream", "a"]),
-    "start": ({"start": "a"}, ["--start", "a"]),
 }
 
 
@@ -57,13 +52,11 @@ def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_
     assert not re.findall(r"^    (?:script|run|notebook|wrapper|cwl):", text, re.MULTILINE)
 
 
-def test_samples_are_named_by_their_kind_with_the_heights_that_images_come_with():
-    every = {"dataset": "d", "signals": "s", "views": "v", "index": "i", "tracks": "t"}
-    for kind, more in (("dataset", []), ("signals", []), ("views", ["--tracks", "t"]), ("index", ["--tracks", "t"])):
-        assert options.samples(None, Inputs(every)) == [f"--{kind}", every[kind], *more]
+def test_samples_are_named_by_their_kind():
+    every = {"dataset": "d", "views": "v", "index": "i"}
+    for kind in ("dataset", "views", "index"):
+        assert options.samples(None, Inputs(every)) == [f"--{kind}", every[kind]]
         del every[kind]
-    assert options.samples(None, Inputs(index="i")) == ["--index", "i"]
-    assert options.extra(None, Inputs(extra_tracks="t")) == []
 
 
 def test_a_stage_loads_an_effect_s_module_only_in_its_scene():
@@ -133,8 +126,6 @@ def test_added_levels_are_the_settings_of_their_own_chunks():
     levels = {tuple(json.loads(settings.noise(SimpleNamespace(group=group, part=part)))["snr_db"])
               for group, part in (name.split("-", 1) for name in run.plan.chunks)}  # fmt: skip
     assert levels == {(3, 8), (1.5,)}
-    assert {tuple(json.loads(settings.slow_time(SimpleNamespace(group=group, part=part)))["snr_db"])
-            for group, part in (name.split("-", 1) for name in run.plan.chunks)} == levels  # fmt: skip
 
 
 def test_companions_bring_their_clouds_once_and_strangers_are_refused():
@@ -157,26 +148,16 @@ def test_effects_that_do_not_fit_together_are_refused_and_so_are_links_without_a
         run_of({"network": {"stations": links}})
 
 
-def test_the_network_asked_about_effects_sees_images_without_heights_and_knows_the_seen_protocol(tmp_path):
+def test_the_network_asked_about_effects_has_most_images_and_knows_the_seen_protocol(tmp_path):
     table = tmp_path / "table.csv"
-    table.write_text("scheme,stations,spectra,fusion,backbone,protocols,cues\n"
-                     "few,A,VRP,attention,,seen+unseen,\nmore,AB,VRP,attention,,seen,\n"
-                     "height,ABC,VRP,attention,,seen+unseen,height\nother,ABC,VRP,attention,,unseen,\n")  # fmt: skip
-    block = {"table": str(table), "schemes": ["few", "height", "more", "other"], "timed": []}
-    run = run_of({"recognition": block})
+    table.write_text("scheme,stations,spectra,fusion,backbone,protocols\nfew,A,VRP,attention,,seen+unseen\n"
+                     "more,AB,VRP,attention,,seen\nother,ABC,VRP,attention,,unseen\n")  # fmt: skip
+    block = {"table": str(table), "schemes": ["few", "more", "other"], "timed": [], "seeds": [4, 5]}
+    run, products, _ = parts({"recognition": block})
     assert run.asked.name == "more"
-    assert run.trainings == ["seen/few/0", "unseen/few/0", "seen/height/0", "unseen/height/0", "seen/more/0",
-                             "unseen/other/0"]  # fmt: skip
-    assert run.pairs == {"seen/few", "unseen/few", "seen/height", "unseen/height", "seen/more", "unseen/other"}
+    assert run.trainings == [f"{name}/{seed}" for name in ("seen/few", "unseen/few", "seen/more", "unseen/other")
+                             for seed in (4, 5)]  # fmt: skip
+    job = SimpleNamespace(run="default", scheme="few")
+    assert isinstance(products, Products) and products.asked_model(job) == "results/default/models/seen/more/4/model.pt"
     with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
         _ = run_of({"recognition": block | {"protocols": ["unseen"]}}).asked
-
-
-def test_the_first_of_several_training_seeds_is_timed_and_asked():
-    run, products, _ = parts({"recognition": {
-        "table": "config/methods.csv", "schemes": ["images mean", "RBF-SVM on features"], "timed": [],
-        "seeds": [4, 5, 6]}})  # fmt: skip
-    assert isinstance(products, Products) and len(run.trainings) == 2 * 2 * 3
-    job = SimpleNamespace(run="default", scheme="rbf-svm-on-features")
-    assert products.timed_model(job) == ["results/default/models/unseen/rbf-svm-on-features/4/model.pt"]
-    assert products.asked_model(job) == "results/default/models/seen/images-mean/4/model.pt"

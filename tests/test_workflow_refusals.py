@@ -8,17 +8,12 @@ import yaml
 from configured import run_of
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
-from lowalt.recognition.schemes import Scheme
-from lowalt.workflow import extra_runs, refusals
-
-IMAGES = Scheme("x", (0,), (0,))
-SIGNALS = Scheme("x", (0,), (), method="cnn", size=400)
-HEIGHT = Scheme("x height", (0,), (0,), cues="height")
+from lowalt.workflow import refusals
 
 
 def config(**recognition):
     """What the refusals read of a configuration."""
-    block = {"cache": True, "training": {"stream": 0}, "timed": [], **recognition}
+    block = {"cache": True, **recognition}
     return {"motion": {}, "effects": {}, "shards": {"kind": "image"}, "recognition": block,
             "network": {"symbols": 400, "stations": {"A": {}, "B": {}}}}  # fmt: skip
 
@@ -44,46 +39,6 @@ def test_samples_made_on_the_spot_have_no_cache():
     refusals.refuse_input(config(input="dataset", cache=False))
     refusals.refuse_input(config(input="shards"))
     assert_refused("'dataset' together with recognition.cache true", refusals.refuse_input, config(input="dataset"))
-
-
-def test_schemes_on_signals_ask_for_a_cache_and_the_symbols_of_a_signal():
-    refusals.refuse_signals(config(), SIGNALS)
-    refusals.refuse_signals(config(), Scheme("x", (0,), (), method="svm"))
-    assert_refused("sees signals, expected cache: true", refusals.refuse_signals, config(cache=False), SIGNALS)
-    short = config()
-    short["network"]["symbols"] = 399
-    assert_refused("size 400, expected the 399 symbols", refusals.refuse_signals, short, SIGNALS)
-
-
-def test_a_measured_height_stands_in_its_way_with_nothing_else():
-    refusals.refuse_height(config(), HEIGHT)
-    faults = {"input": config(input="dataset"), "timed": config(timed=["x height"]),
-              "training.stream": config(training={"stream": 0.5}), "effects": config() | {"effects": {"adc": {}}},
-              "links": config() | {"network": {"stations": {"A": {}, "B": {"transmit": "A"}}}}}  # fmt: skip
-    for key, wrong in faults.items():
-        refusals.refuse_height(wrong, IMAGES)
-        assert_refused(f"cue 'height' and {key} is .*, expected no {key}", refusals.refuse_height, wrong, HEIGHT)
-
-
-def test_starts_come_from_trainings_of_this_run_that_met_no_test_sample_and_go_in_no_circle():
-    trained = {"seen/a", "seen/b", "unseen/a", "unseen/b"}
-    refusals.refuse_starts({"seen/a": {"from": "unseen/a"}, "seen/b": {"from": "seen/a"}}, trained)
-    assert_refused(
-        "seen/a from 'seen/c', expected one of", refusals.refuse_starts, {"seen/a": {"from": "seen/c"}}, trained
-    )
-    assert_refused(
-        "which trains on samples that 'unseen' tests", refusals.refuse_starts, {"unseen/a": {"from": "seen/a"}}, trained
-    )
-    circle = {"seen/a": {"from": "seen/b"}, "seen/b": {"from": "seen/a"}}
-    assert_refused("seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained)
-    # From outside of the circle, and round a circle of one.
-    circle = {"seen/c": {"from": "seen/a"}} | circle
-    assert_refused(
-        "seen/c from seen/a from seen/b from seen/a is a circle", refusals.refuse_starts, circle, trained | {"seen/c"}
-    )
-    assert_refused(
-        "start: seen/a from seen/a is a circle", refusals.refuse_starts, {"seen/a": {"from": "seen/a"}}, trained
-    )
 
 
 def test_a_folder_without_any_named_file_is_refused_where_built_in_models_would_replace_them(monkeypatch):
@@ -126,13 +81,6 @@ def test_another_run_s_data_are_there_and_made_with_the_same_settings(tmp_path, 
     refusals.refuse_data(own | {"data": "made"})
     kept.write_text(yaml.safe_dump(own | {"run": "made", "seed": own["seed"] + 1, "more": 1}))
     assert_refused(r"other settings of \['more', 'seed'\]", refusals.refuse_data, own | {"data": "made"})
-
-
-def test_a_run_to_train_on_too_that_has_no_shards_is_named_with_what_makes_its_files(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for folder, target in (("views/24", "training_samples"), ("slow_time", "slow_times"), ("tracks", "tracks")):
-        words = f"no results/other/shards; expected what the target `{target}` makes in the run 'other'"
-        assert_refused(words, extra_runs.files, "other", folder)
 
 
 def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not():

@@ -138,11 +138,11 @@ def _captures() -> list[Reader]:
 def _arrays() -> list[Reader]:
     """Readers of arrays, shards and models, each with a good file."""
     import torch
+    from lowalt.recognition.tracked import Tracked
 
     from lowalt.common.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
     from lowalt.recognition.one_sample import images_of
-    from lowalt.recognition.tracked import Tracked
     from lowalt.shards import recipe, table
     from lowalt.shards.index import load as load_index
     from lowalt.shards.table import map_samples, read_header

@@ -7,7 +7,6 @@
 rule speed:
     input:
         code=code("lowalt.measure.network_speed"),
-        model=products.timed_model,
         schemes=config["recognition"]["table"],
     output:
         "results/{run}/speed/{scheme}.json",
@@ -22,10 +21,9 @@ rule speed:
     params:
         settings=settings.training,
         stations=RUN.stations,
-        model=options.timed_model,
     shell:
         "python -m lowalt.measure.network_speed --settings {params.settings:q} --scheme {wildcards.scheme:q}"
-        " --schemes {input.schemes:q} --stations {params.stations:q} {params.model:q} --out {output:q} 2> {log:q}"
+        " --schemes {input.schemes:q} --stations {params.stations:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_table:

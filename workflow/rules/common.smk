@@ -52,5 +52,3 @@ wildcard_constraints:
     size=r"\d+",
     call=r"[a-z0-9_-]+",
     train_seed=r"\d+",
-    candidate=r"[a-z0-9-]+",
-    held=r"\d+",

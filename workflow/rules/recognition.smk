@@ -28,49 +28,6 @@ rule views:
         " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
 
 
-rule slow_time:
-    input:
-        unpack(products.noisy_chunk),
-        code=code("lowalt.recognition.slow_time"),
-        index=ancient("results/{run}/shards/index.json"),
-        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
-    output:
-        "results/{run}/slow_time/{group}-{fold}-{part}.npz",
-    log:
-        "results/{run}/logs/slow_time/{group}-{fold}-{part}.log",
-    benchmark:
-        "results/{run}/benchmarks/slow_time/{group}-{fold}-{part}.jsonl"
-    conda:
-        "../../envs/environment.yaml"
-    params:
-        settings=settings.slow_time,
-        render=settings.index,
-        noisy=options.noisy_chunk,
-    shell:
-        "python -m lowalt.recognition.slow_time --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar {params.noisy:q} --out {output:q} 2> {log:q}"
-
-
-rule track:
-    input:
-        code=code("lowalt.recognition.track"),
-        index=ancient("results/{run}/shards/index.json"),
-        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
-    output:
-        "results/{run}/tracks/{group}-{fold}-{part}.npz",
-    log:
-        "results/{run}/logs/tracks/{group}-{fold}-{part}.log",
-    benchmark:
-        "results/{run}/benchmarks/tracks/{group}-{fold}-{part}.jsonl"
-    conda:
-        "../../envs/environment.yaml"
-    params:
-        render=settings.index,
-    shell:
-        "python -m lowalt.recognition.track --settings '{{}}' --index {input.index:q}"
-        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar --out {output:q} 2> {log:q}"
-
-
 rule freeze:
     input:
         code=code("lowalt.recognition", "lowalt.recognition.freeze"),
@@ -111,12 +68,10 @@ rule train:
         code=code(
             "lowalt.recognition",
             "lowalt.recognition.runs",
-            "lowalt.recognition.extra",
             "lowalt.recognition.views",
-            "lowalt.recognition.tracked",
             "lowalt.recognition.freeze",
         ),
-        frozen=products.frozen,
+        frozen=f"{DATA}/SHA256SUMS",
         schemes=config["recognition"]["table"],
     output:
         model="results/{run}/models/{protocol}/{scheme}/{train_seed}/model.pt",
@@ -136,14 +91,11 @@ rule train:
         settings=settings.training,
         launcher=RUN.launch.words,
         source=options.samples,
-        extra=options.extra,
-        stream=options.stream,
-        start=options.start,
         events=["--tensorboard"] if config["recognition"]["tensorboard"] else [],
         stations=RUN.stations,
     shell:
-        "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q} {params.extra:q}"
-        " {params.stream:q} {params.start:q} --frozen {input.frozen:q}"
+        "python -m {params.launcher:q} lowalt.recognition train --settings {params.settings:q} {params.source:q}"
+        " --frozen {input.frozen:q}"
         " --schemes {input.schemes:q} --stations {params.stations:q} --protocol {wildcards.protocol:q} --scheme {wildcards.scheme:q}"
         ' {params.events:q} --out "$(dirname {output.model:q})" 2> {log:q}'
 
@@ -155,7 +107,6 @@ rule evaluate:
             "lowalt.recognition",
             "lowalt.recognition.runs",
             "lowalt.recognition.views",
-            "lowalt.recognition.tracked",
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",
@@ -214,7 +165,6 @@ rule transfer_evaluate:
             "lowalt.recognition",
             "lowalt.recognition.runs",
             "lowalt.recognition.views",
-            "lowalt.recognition.tracked",
             "lowalt.recognition.freeze",
         ),
         frozen=f"{DATA}/SHA256SUMS",

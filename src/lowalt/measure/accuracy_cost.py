@@ -97,8 +97,8 @@ def entries(
 
 
 def _input_bytes(scheme: Scheme, size: int) -> int:
-    """Bytes a sample that a scheme takes in: index images of `size` pixels, complex64 signals or float32 features."""
-    return len(scheme.columns) * {"images": size * size, "signals": 8 * size, "features": 4 * size}[scheme.sees]
+    """Bytes a sample that a scheme takes in: index images of `size` pixels."""
+    return len(scheme.columns) * size * size
 
 
 def _what(entry: Entry) -> dict:

@@ -17,17 +17,14 @@ import numpy as np
 import torch
 
 from lowalt.common.command import parser, pick, run
-from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.hardware import describe
 from lowalt.common.timing import least_s
 from lowalt.recognition import network, recipe
-from lowalt.recognition.features import NAMES
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.methods import built
 from lowalt.recognition.objective import objective
-from lowalt.recognition.runs import load
-from lowalt.recognition.schemes import TABLE, Scheme, named, refuse_cues
+from lowalt.recognition.schemes import TABLE, Scheme, named
 
 BATCHES = (1, 64)
 
@@ -46,53 +43,26 @@ def _clock(machine: Machine, threads: int) -> Callable[[], float]:
 
 
 def _inputs(samples: int, scheme: Scheme, size: int) -> torch.Tensor:
-    """Random images or signals of a scheme's views; size: pixels a side, or symbols."""
+    """Random images of a scheme's views; size: pixels a side."""
     generator = torch.Generator().manual_seed(0)
-    if scheme.sees == "signals":
-        return torch.randn((samples, len(scheme.columns), size), dtype=torch.complex64, generator=generator)
     shape = (samples, len(scheme.columns), size, size)
     return torch.randint(0, 256, shape, dtype=torch.uint8, generator=generator)
 
 
-def _classical(scheme: Scheme, settings: dict, path: str | None, limit_s: float) -> dict:
-    """Return the entries of `measure` for a trained classical method, which has no training step to time.
-
-    Raises: InputError where no model is given.
-    """
-    if path is None:
-        raise InputError(f"scheme {scheme.name!r}: no --model, expected a trained one, whose time depends on its size")
-    model, block = load(path).model, settings["training"]
-    clock = _clock(Machine.here("fp32"), block["threads"])
-    times = {}
-    with torch.inference_mode():
-        for batch in BATCHES:
-            values = torch.randn(batch, len(scheme.columns), len(NAMES))
-            times[f"inference_ms_{batch}"] = 1e3 * least_s(lambda x=values: model(x), limit_s, clock) / batch
-    return {
-        "scheme": scheme.name, "size": len(NAMES), "parameters": sum(x.numel() for x in model.state_dict().values()),
-        **times, "train_ms": None, "train_batch": 0, "precision": "fp64", "threads": block["threads"],
-        "batch": block["batch"], "steps": block["steps"], "backbone": scheme.method, "hardware": describe(),
-    }  # fmt: skip
-
-
-def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0, model_path: str | None = None) -> dict:
+def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0) -> dict:
     """Return the times of a scheme's network on one machine, in ms a sample, and its size.
 
     settings: {seed, size, colour_map, network, training, augmentation, classes}, as for a training; limit_s: seconds
     spent on one figure. A batch that one call cannot do within the limit is left out (None); the training step takes
     the largest power of two of samples, up to the setting's batch, that it can do in a quarter of the limit, and one at
     least.
-    model_path: the trained model of a classical method, which alone is timed as it is; its features are in memory.
     Where the settings compile, the training step is that of the compiled network, as in a training.
     Raises: InputError for a wrong setting.
     """
-    refuse_cues(scheme, "network_speed")
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block = recipe.check(settings["training"])
     recipe.seeded(settings["seed"], ("speed",), block["threads"])
     machine = Machine.here(block["precision"])
-    if scheme.sees == "features":
-        return _classical(scheme, settings, model_path, limit_s)
     model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(settings["classes"]))
     layout = torch.channels_last if block["channels_last"] else torch.contiguous_format
     model, clock = model.to(machine.device, memory_format=layout), _clock(machine, block["threads"])
@@ -130,7 +100,7 @@ def measure(scheme: Scheme, settings: dict, limit_s: float = 5.0, model_path: st
         "scheme": scheme.name, "size": settings["size"], "parameters": network.parameters(model), **times,
         "train_ms": 1e3 * least_s(step, limit_s, clock) / batch, "train_batch": batch, "precision": machine.precision,
         "threads": block["threads"], "batch": block["batch"], "steps": block["steps"],
-        "backbone": scheme.method or scheme.backbone or settings["network"]["backbone"], "hardware": describe(),
+        "backbone": scheme.backbone or settings["network"]["backbone"], "hardware": describe(),
     }  # fmt: skip
 
 
@@ -142,10 +112,9 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--stations", nargs="+", required=True, help="names of the network's stations, in its order")
     options.add_argument("--limit-s", type=float, default=5.0, help="seconds spent on one figure (default: 5)")
     options.add_argument("--out", required=True, help="record to write (.json)")
-    options.add_argument("--model", help="model.pt to time, for a classical method")
     given = options.parse_args(arguments)
     scheme = named(given.schemes, given.scheme, given.stations)
-    found = measure(scheme, scheme.settled(given.settings), given.limit_s, given.model)
+    found = measure(scheme, scheme.settled(given.settings), given.limit_s)
     with replacing(given.out) as temporary:
         temporary.write_text(json.dumps(found, indent=1, sort_keys=True) + "\n")
 

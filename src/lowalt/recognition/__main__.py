@@ -9,7 +9,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names, refuse_cues
+from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
 from lowalt.recognition.sources import name_sources, of_size
 
 
@@ -40,70 +40,30 @@ def _freeze(arguments: list[str]) -> None:
 
 
 def _open(given, pairs: set, scheme: Scheme, size: int, placed: bool):
-    """Return the samples of some (group, fold) pairs from the source the command line names, heights included."""
+    """Return the samples of some (group, fold) pairs from the source that the command line names."""
     from lowalt.recognition.samples import ViewSamples
     from lowalt.recognition.views import ShardSamples
 
-    if sum(source is not None for source in (given.views, given.signals, given.index, given.dataset)) != 1:
-        raise InputError("expected one of --views, --signals, --index and --dataset")
-    if (given.signals is None) != (scheme.sees == "images"):
-        raise InputError(f"--signals: scheme {scheme.name!r} sees {scheme.sees}")
-    if given.signals is not None:
-        from lowalt.recognition.slow_time import SlowTimeSamples
-
-        found = of_size(SlowTimeSamples(given.signals, scheme.sees, scheme.columns, pairs), scheme, size)
-    elif given.dataset is not None:
+    if sum(source is not None for source in (given.views, given.index, given.dataset)) != 1:
+        raise InputError("expected one of --views, --index and --dataset")
+    if given.dataset is not None:
         from lowalt.recognition.made import DatasetSamples, opened
 
-        found = DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
-    elif given.views is None:
-        found = ShardSamples(given.index, scheme.columns, pairs, size, placed)
-    else:
-        found = of_size(ViewSamples(given.views, scheme.columns, pairs), scheme, size)
-    if given.tracks is None and not scheme.cues:
-        return found
-    from lowalt.recognition.tracked import with_heights
-
-    return with_heights(found, given.tracks, scheme)
-
-
-def _parts(given, protocol: str, scheme: Scheme, settings: dict) -> dict:
-    """Return the sources "train" and "validation" of a scheme in a protocol that the command line of `train` names."""
-    from lowalt.recognition.samples import first_models
-
-    samples = {
-        part: _open(given, folds(protocol, part), scheme, settings["size"], placed=False)
-        for part in ("train", "validation")
-    }
-    if scheme.share < 1:
-        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
-    if given.extra or given.extra_tracks:
-        from lowalt.recognition.extra import joined
-
-        more, heights = given.extra or [], given.extra_tracks
-        samples["train"] = joined(samples["train"], more, heights, scheme, folds(protocol, "train"))
-    if given.stream:
-        from lowalt.recognition.stream import streamed
-
-        refuse_cues(scheme, "--stream")
-        models = settings["training"].get("stream_models", 0)
-        samples["train"] = streamed(samples["train"], given.stream, scheme.columns, protocol, models)
-    return samples
+        return DatasetSamples(opened(given.dataset), scheme.columns, pairs, size, placed)
+    if given.views is None:
+        return ShardSamples(given.index, scheme.columns, pairs, size, placed)
+    return of_size(ViewSamples(given.views, scheme.columns, pairs), size)
 
 
 def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
     classes."""
-    from lowalt.recognition import start
     from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
+    from lowalt.recognition.samples import first_models
 
     line = parser("lowalt.recognition train", _train.__doc__)
     name_sources(line)
-    line.add_argument("--extra", nargs="+", help="caches of views or signals of other runs that are trained on too")
-    line.add_argument("--extra-tracks", nargs="+", help="for schemes with the cue height: heights of --extra (.npz)")
-    line.add_argument("--stream", help="config.yaml of a run with clouds, of which fresh motion models are trained on")
-    line.add_argument("--start", help="model.pt of a finished training on these samples, whose weights it starts from")
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
@@ -116,14 +76,13 @@ def _train(arguments: list[str]) -> None:
     scheme = named(given.schemes, given.scheme, given.stations)
     pick(given.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     settings = scheme.settled(given.settings)
-    samples, begun = _parts(given, given.protocol, scheme, settings), None
-    if given.start:
-        # A started training has steps of its own; those of the scheme's row are of a training from fresh weights.
-        settings["training"]["steps"] = given.settings["training"]["steps"]
-        begun = start.opened(given.start)
-        start.check_settings(begun, scheme, settings)
-        start.check_samples(begun, _parts(given, begun.state["protocol"], begun.scheme, settings), samples)
-    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard, begun)
+    samples = {
+        part: _open(given, folds(given.protocol, part), scheme, settings["size"], placed=False)
+        for part in ("train", "validation")
+    }
+    if scheme.share < 1:
+        samples["train"].keep(first_models(samples["train"].facts, scheme.share))
+    train(samples, scheme, given.protocol, settings, Path(given.out), given.tensorboard)
 
 
 def _evaluate(arguments: list[str]) -> None:

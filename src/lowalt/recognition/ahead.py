@@ -7,7 +7,10 @@ import numpy as np
 import torch
 from torch.utils.data import DataLoader, Dataset
 
-from lowalt.recognition.height_cue import WithHeight, measured
+
+def tensors(arrays: Any) -> Any:
+    """Return an array, or every array of a named tuple, as a tensor."""
+    return type(arrays)(*map(torch.from_numpy, arrays)) if isinstance(arrays, tuple) else torch.from_numpy(arrays)
 
 
 class Unchanged(Dataset):
@@ -17,9 +20,9 @@ class Unchanged(Dataset):
         """source: samples, with a method `views`."""
         self.source = source
 
-    def __getitem__(self, numbers: np.ndarray) -> torch.Tensor | WithHeight:
-        """Return the index images (len(numbers), views, S, S) uint8 of the samples `numbers`, perhaps with heights."""
-        return measured(self.source, numbers, torch.from_numpy(self.source.views(numbers)))
+    def __getitem__(self, numbers: np.ndarray) -> Any:
+        """Return the inputs of the network for the samples `numbers` as tensors."""
+        return tensors(self.source.inputs(numbers))
 
 
 class ReadAhead:

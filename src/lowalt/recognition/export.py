@@ -11,7 +11,6 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
-from lowalt.recognition.schemes import refuse_cues
 
 
 class Probabilities(nn.Module):
@@ -31,10 +30,8 @@ def export(trained: Trained, out: str | Path) -> None:
     """Write the model as a torch.export program (.pt2) or ONNX (.onnx), for any batch size; or its weights and records
     (.safetensors) with a card (.md) next to them.
 
-    Raises: InputError for another suffix, a model with cues, a program of a model that sees no images, or where ONNX is
-    asked for and its packages are not installed.
+    Raises: InputError for another suffix, or where ONNX is asked for and its packages are not installed.
     """
-    refuse_cues(trained.scheme, "--model")
     suffix = Path(out).suffix
     if suffix not in (".pt2", ".onnx", ".safetensors"):
         raise InputError(f"--out {out}: expected a name ending in .safetensors, .pt2 or .onnx")
@@ -43,8 +40,6 @@ def export(trained: Trained, out: str | Path) -> None:
         model_file.write(out, content)
         model_card.write(out, content, model_card.accuracy_rows(trained.path, trained.protocol, trained.scheme.name))
         return
-    if trained.scheme.sees != "images":
-        raise InputError(f"--model: scheme {trained.scheme.name!r} sees {trained.scheme.sees}, expected one on images")
     model = Probabilities(trained.model).eval()
     # Two samples, since a batch of one would be taken for a constant.
     example = torch.zeros(2, len(trained.scheme.columns), trained.size, trained.size, dtype=torch.uint8)

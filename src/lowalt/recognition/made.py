@@ -73,7 +73,7 @@ def views_of(
     return images if images.shape[-1] == size else resize(images, size)
 
 
-class DatasetSamples:
+class DatasetSamples(samples.Samples):
     """Samples made as they are asked for; the same calls, order and pixels as `ShardSamples`."""
 
     def __init__(self, dataset: Dataset, columns: list[int], folds: set, size: int, placed: bool) -> None:

@@ -25,32 +25,24 @@ from torch import nn
 
 from lowalt.common.command import pick
 from lowalt.common.errors import InputError
-from lowalt.recognition import convolution_transformer, own_backbone, spectrogram_transformer
+from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
-from lowalt.recognition.height_cue import HeightCue, WithHeight, images_of
 from lowalt.recognition.schemes import SPECTRA, Scheme
 
 KEYS = ("backbone", "weights", "intra_depth", "inter_depth", "heads", "feed_forward", "dropout", "hidden")
 
 
 def backbone(name: str, weights: str, size: int) -> nn.Module:
-    """Return the timm model `name`, one of `spectrogram_transformer` or `convolution_transformer`, or the user's own
-    FILE.py:FUNCTION, as a feature extractor for size x size RGB images.
+    """Return the timm model `name`, or the user's own FILE.py:FUNCTION, as a feature extractor for size x size RGB
+    images.
 
     weights: "none", "hub" or a local file. Models with a fixed input size are built for `size` where timm can.
     Raises: InputError for an unknown name, a missing file, or weights that do not fit.
     """
-    ours = None
     if own_backbone.file_of(name) is not None:
-        ours = own_backbone.backbone
-    elif name in spectrogram_transformer.SHAPES:
-        ours = spectrogram_transformer.backbone
-    elif name in convolution_transformer.NAMES:
-        ours = convolution_transformer.backbone
-    if ours is not None:
         if weights != "none":
             raise InputError(f"network: backbone {name!r} has no weights {weights!r}, expected 'none'")
-        return ours(name, size)
+        return own_backbone.backbone(name, size)
     if not timm.is_model(name):
         raise InputError(f"network: backbone {name!r} is not a timm model (timm {timm.__version__})")
     options: dict = {"num_classes": 0}
@@ -111,15 +103,9 @@ class Recogniser(Fused):
         pre = self.backbone.pretrained_cfg
         self.palettes = Palettes(palettes, scheme.spectra, pre["mean"], pre["std"])
         self.add_head(scheme.fusion, width, (len(scheme.stations), len(scheme.spectra)), block, classes)
-        # Last, so that all other weights begin as in the network without it.
-        self.height = HeightCue(width) if scheme.cues else None
 
-    def tokens(self, inputs: torch.Tensor | WithHeight) -> torch.Tensor:
-        """Index images (B, K * V, rows, columns) uint8, perhaps with heights -> tokens (B, K, V, features).
-
-        Raises: InputError where heights are missing, or are given to a network without the cue.
-        """
-        index = images_of(inputs, self.height is not None)
+    def tokens(self, index: torch.Tensor) -> torch.Tensor:
+        """Index images (B, K * V, rows, columns) uint8 -> tokens (B, K, V, features)."""
         samples, views = index.shape[:2]
         stations, spectra = views // self.shape[1], self.shape[1]
         images = self.palettes(index.unflatten(1, (stations, spectra)))
@@ -127,17 +113,10 @@ class Recogniser(Fused):
         features = self.backbone(images.flatten(0, 2))
         return features.view(samples, stations, spectra, -1)
 
-    def cue(self, inputs: torch.Tensor | WithHeight) -> torch.Tensor | None:
-        """Heights (B, K) of the inputs -> cues (B, K, features); None for a network without the cue."""
-        return self.height(inputs.height_m) if self.height is not None else None
-
     @staticmethod
-    def mirrored(index: torch.Tensor | WithHeight) -> torch.Tensor | WithHeight:
-        """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees.
-
-        A measured height stays as it is.
-        """
-        return index._replace(images=index.images.flip(-2)) if isinstance(index, WithHeight) else index.flip(-2)
+    def mirrored(index: torch.Tensor) -> torch.Tensor:
+        """Return index images (..., rows, columns) turned around along Doppler: the target turned by 180 degrees."""
+        return index.flip(-2)
 
 
 def checkpoint_activations(model: Recogniser) -> None:

@@ -10,10 +10,8 @@ import torch
 from lowalt.common.array_files import array_of
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
-from lowalt.common.network import Network
 from lowalt.recognition.runs import Trained
-from lowalt.recognition.schemes import columns_in, refuse_cues
-from lowalt.recognition.slow_time import of_stations
+from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import named
 from lowalt.tiles import Renderer, decode, resize, split
 
@@ -50,29 +48,15 @@ def _signals(path: Path) -> np.ndarray:
 
 
 def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:
-    """Return the input of a model, one sample (1, ...), from a signal file or, for models on images, a tile.
-
-    Raises: InputError where a model on signals is given something else than the signals of its network.
-    """
-    if trained.scheme.sees == "images":
-        images = images_of(path, settings)
-        names = named(settings["spectra"])
-        places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
-        return resize(images, trained.size)[places][None]
-    network_of, signals = Network.from_settings(settings["network"]), _signals(path)
-    if signals.shape != (len(network_of.stations), network_of.symbols):
-        raise InputError(f"{path}: shape {signals.shape}, expected {len(network_of.stations), network_of.symbols}")
-    signals = signals.astype(np.complex64)[None]
-    values = signals if trained.scheme.sees == "signals" else of_stations(signals, network_of)
-    return values[:, trained.scheme.columns]
+    """Return the images that a model sees, (1, views, S, S), from a signal file or a tile."""
+    images = images_of(path, settings)
+    names = named(settings["spectra"])
+    places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
+    return resize(images, trained.size)[places][None]
 
 
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
-    """Return the probability of each category for one signal file or tile, in full precision.
-
-    Raises: InputError for a model that also asks for a measured height, which no such file has.
-    """
-    refuse_cues(trained.scheme, "predict")
+    """Return the probability of each category for one signal file or tile, in full precision."""
     with torch.inference_mode():
         found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
     if not torch.isfinite(found).all():

@@ -26,17 +26,6 @@ def epoch_order(facts: Facts, seed: int, keys: tuple, epoch: int, snrs_per_model
     return order[rank[order] < snrs_per_model]
 
 
-def with_fresh(part: np.ndarray, step: int, share: float, known: int) -> np.ndarray:
-    """Return a batch whose last samples, a share 0..1 of it, are the fresh ones of this step.
-
-    part: sample numbers; step: how many steps came before; known: number of fixed samples, after which the fresh ones
-    are numbered. Batches of one size never share a fresh sample.
-    """
-    count = round(share * len(part))
-    fresh = known + step * count + np.arange(count)
-    return np.concatenate([part[: len(part) - count], fresh])
-
-
 def batches(order: np.ndarray, size: int) -> list[np.ndarray]:
     """Cut an epoch's order into full batches; a shorter last one is left out unless it is the only one."""
     full = len(order) // size

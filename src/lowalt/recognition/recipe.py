@@ -26,8 +26,6 @@ and, where they are given:
     accumulate       parts a batch is cut into, one after the other through the network; their gradients are added up.
                      Only one part's activations are in memory. A batch norm sees one part at a time
     activation_checkpointing  keep few activations of the backbone and compute the others again for the gradient
-    stream           share of every batch that is fresh motion models, 0..1, which come once and never again
-    stream_models    fresh motion models after which they repeat; 0 never repeats
 """
 
 import math
@@ -47,18 +45,18 @@ KEYS = (
     "label_smoothing", "alone", "ema", "precision", "channels_last", "compile", "validate_every", "patience",
     "checkpoint_s", "threads", "workers",
 )  # fmt: skip
-OPTIONAL = {"accumulate": 1, "activation_checkpointing": False, "stream": 0.0, "stream_models": 0}
+OPTIONAL = {"accumulate": 1, "activation_checkpointing": False}
 """Keys that a block may leave out, with the values that they have then."""
 
 
 WHOLE = {
     "steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "patience": 0, "threads": 1, "workers": 0,
-    "accumulate": 1, "stream_models": 0,
+    "accumulate": 1,
 }  # fmt: skip
 """Smallest value of every whole number."""
 REAL = {
     "rate": math.inf, "backbone_rate": math.inf, "weight_decay": math.inf, "warmup": 1, "clip": math.inf,
-    "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf, "stream": 1,
+    "label_smoothing": 1, "alone": math.inf, "ema": 1, "checkpoint_s": math.inf,
 }  # fmt: skip
 """Largest value of every real number; the smallest is 0."""
 PRECISIONS = ("auto", "bf16", "fp32")

@@ -7,6 +7,7 @@ palettes and the weights.
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,7 +24,6 @@ from lowalt.common.hardware import describe
 from lowalt.recognition import (
     augment,
     checkpoint,
-    classical_runs,
     inference,
     metrics,
     network,
@@ -32,56 +32,39 @@ from lowalt.recognition import (
     recipe,
 )  # fmt: skip
 from lowalt.recognition.ahead import ReadAhead, Unchanged
-from lowalt.recognition.classical_models import of_arrays
-from lowalt.recognition.features import NAMES
-from lowalt.recognition.height_cue import WithHeight
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.methods import built
-from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.samples import Samples
 from lowalt.recognition.schemes import Scheme, of_record
-from lowalt.recognition.slow_time import SlowTimeSamples
-from lowalt.recognition.start import Start, carry
 from lowalt.recognition.training import Trainer
-from lowalt.recognition.views import ShardSamples
 from lowalt.recognition.weights import filled, refuse_unfinite, refuse_unfit
 
-Samples = ViewSamples | ShardSamples | SlowTimeSamples
+Build = Callable[[Scheme, dict, int, str, int], nn.Module]
+"""Makes a network of a scheme, the settings of networks, a size, a colour map and a number of classes."""
 
 
 def train(
     samples: dict[str, Samples], scheme: Scheme, protocol: str, settings: dict, folder: Path, events: bool = False,
-    start: Start | None = None,
+    build: Build = built,
 ) -> None:  # fmt: skip
     """Train a scheme and write `model.pt`, `history.csv` and `run.json` into `folder`; resumes its own checkpoint.
 
     samples: the sources "train" and "validation"; settings: {seed, size, colour_map, network, training,
     augmentation, classes}, the classes by label; events: whether to write the metrics for TensorBoard too,
-    into `events/` of the folder; start: the finished training whose weights it starts from, checked by `start`.
+    into `events/` of the folder; build: makes the network.
     Raises: InputError for a wrong setting, a foreign checkpoint, or a training that ends in NaN.
     """
     pick(settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     block, classes = recipe.check(settings["training"]), settings["classes"]
     if len(classes) < 2:
         raise InputError(f"training: classes {classes}, expected two or more to tell apart")
-    if scheme.sees == "features":
-        _record(folder / "run.json", classical_runs.train(samples, scheme, protocol, settings, folder))
-        return
     augment.check(settings["augmentation"])
-    if bool(block["stream"]) != hasattr(samples["train"], "fresh"):
-        raise InputError(
-            f"training: stream is {block['stream']}, expected a share above 0 together with --stream, or neither"
-        )
     machine = Machine.here(block["precision"])
-    begun = {"start": start.about} if start else {}
-    name = _identity(samples, scheme, protocol, settings, machine, begun)
+    name = _identity(samples, scheme, protocol, settings, machine)
     keys = (protocol, scheme.name)
     recipe.seeded(settings["seed"], keys, block["threads"])
-    model = built(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
-    if start:
-        carry(start, scheme, model)
+    model = build(scheme, settings["network"], settings["size"], settings["colour_map"], len(classes))
     trainer = Trainer(model, samples, scheme.columns, settings, keys, name, folder, machine)
-    # Weights that come from another training are a candidate as they are.
-    trainer.validates_first = start is not None
     resumed = trainer.resume()
     machine.agree(name, trainer.at.steps)
     if resumed and machine.rank == 0:
@@ -93,12 +76,12 @@ def train(
     seconds, busy = time.monotonic() - began, time.process_time() - busy
     trainer.finish({
         "scheme": scheme.record, "protocol": protocol, "network": settings["network"], "size": settings["size"],
-        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes), **begun,
+        "seed": settings["seed"], "colour_map": settings["colour_map"], "classes": list(classes),
     })  # fmt: skip
     if machine.rank == 0:
         _record(folder / "run.json", {
             "protocol": protocol, "scheme": scheme.name, "seed": settings["seed"], "hardware": describe(),
-            "backbone": scheme.method or scheme.backbone_of(settings["network"]),
+            "backbone": scheme.backbone_of(settings["network"]),
             "weights": settings["network"]["weights"],
             "parameters": network.parameters(model), "train_samples": len(samples["train"].facts),
             "samples_seen": at.steps * block["batch"], "validation_accuracy": at.best, "train_s": seconds,
@@ -106,11 +89,11 @@ def train(
             "samples_per_s": (at.steps - steps) * block["batch"] / max(seconds, 1e-9), "resumed": resumed,
             "precision": machine.precision,
             "waiting_share": trainer.waited_s / max(seconds, 1e-9), "ranks": machine.ranks,
-            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes), **begun,
+            "torch": torch.__version__, "timm": timm.__version__, "classes": list(classes),
         })  # fmt: skip
 
 
-def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine, begun: dict) -> str:
+def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, machine: Machine) -> str:
     """Return the JSON text of all that determines a training's weights."""
     own = own_backbone.file_of(scheme.backbone_of(settings["network"]))
     # Leave out settings that change no weight, and name the precision that this machine computes with.
@@ -118,7 +101,7 @@ def _identity(samples: dict, scheme: Scheme, protocol: str, settings: dict, mach
     return checkpoint.identity(
         scheme=scheme.record, protocol=protocol, settings={**settings, "training": {**settings["training"], **kept}},
         samples={part: source.sha256() for part, source in samples.items()}, torch=torch.__version__,
-        **({"own": sha256(own)} if own and own.is_file() else {}), **begun,
+        **({"own": sha256(own)} if own and own.is_file() else {}),
     )  # fmt: skip
 
 
@@ -141,28 +124,24 @@ class Trained:
     classes: tuple[str, ...]
 
 
-def load(path: str | Path, own: str = "") -> Trained:
-    """Return the trained model of a `model.pt`; own: as in `of_state`.
+def load(path: str | Path, own: str = "", build: Build = built) -> Trained:
+    """Return the trained model of a `model.pt`; own, build: as in `of_state`.
 
     Raises: InputError where the file is missing, damaged or not a model of this project.
     """
-    return of_state(checkpoint.model(path)[1], path, own)
+    return of_state(checkpoint.model(path)[1], path, own, build)
 
 
-def of_state(state: dict, path: str | Path, own: str = "") -> Trained:
+def of_state(state: dict, path: str | Path, own: str = "", build: Build = built) -> Trained:
     """Return the trained model of what a model file keeps: `weights` and the checked settings of its network.
 
-    path: its file; own: the user's FILE.py:FUNCTION for a model whose backbone is such code.
+    path: its file; own: the user's FILE.py:FUNCTION for a model whose backbone is such code; build: makes its network.
     Raises: InputError where weights and settings do not fit together, or the backbone is code that nobody named.
     """
     scheme, classes, weights = of_record(state["scheme"]), stated(state), state["weights"]
     try:
         refuse_unfinite(weights, path)
-        if scheme.sees == "features":
-            model = of_arrays(weights)
-            model.check(len(NAMES) * len(scheme.stations), len(classes))
-        else:
-            model = _network(scheme, state, len(classes), path, own)
+        model = _network(scheme, state, len(classes), path, own, build)
     except InputError as error:
         raise InputError(str(error) if str(path) in str(error) else f"{path}: {error}") from error
     except Exception as error:
@@ -171,8 +150,8 @@ def of_state(state: dict, path: str | Path, own: str = "") -> Trained:
     return Trained(model.eval(), scheme, state["protocol"], state["size"], state["seed"], Path(path), classes)
 
 
-def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: str) -> nn.Module:
-    """The network of a file with its weights; own: as in `of_state`."""
+def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: str, build: Build) -> nn.Module:
+    """The network of a file with its weights; own, build: as in `of_state`."""
     named = scheme.backbone_of(state["network"])
     name = own_backbone.allowed(named, own)
     block, told = {**state["network"], "backbone": name, "weights": "none"}, replace(scheme, backbone="")
@@ -180,17 +159,10 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: s
 
     def made() -> nn.Module:
         """The network with fresh weights."""
-        return built(told, block, size, state["colour_map"], classes)
+        return build(told, block, size, state["colour_map"], classes)
 
-    def example() -> torch.Tensor | WithHeight:
-        """Two samples of zeros."""
-        if scheme.sees == "signals":
-            return torch.zeros(2, views, size, dtype=torch.complex64)
-        images = torch.zeros(2, views, size, size, dtype=torch.uint8)
-        return WithHeight(images, torch.zeros(2, len(scheme.stations))) if scheme.cues else images
-
-    if name == named:
-        return filled(made, example, state["weights"], path)
+    if name == named and build is built:
+        return filled(made, lambda: torch.zeros(2, views, size, size, dtype=torch.uint8), state["weights"], path)
     # The user's own code may not know of the device without memory.
     model = made()
     refuse_unfit(state["weights"], model, path)

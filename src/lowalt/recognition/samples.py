@@ -21,6 +21,7 @@ import numpy as np
 from lowalt.common.array_files import UNREADABLE, checked_archive
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
+from lowalt.recognition.augment import augment
 from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import LISTED
 
@@ -116,10 +117,35 @@ def cached(path: Path, what: str, folds: set[tuple[str, str]], *names: str) -> C
         raise InputError(f"{path}: not a {what} file ({error})") from error
 
 
-class ViewSamples:
-    """Samples held in memory, read from cache files; the scheme's columns only."""
+class Samples:
+    """A source of samples: `facts` of each, `size` of its images, `views` of some, and `sha256` of all.
 
-    HELD = "images"
+    A training and an evaluation ask `changed` and `inputs`; a source whose network takes more than images, or something
+    else, has its own.
+    """
+
+    facts: Facts
+    size: int
+
+    def views(self, numbers: np.ndarray) -> np.ndarray:
+        """Index images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
+        raise NotImplementedError
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of all that a training sees of these samples."""
+        raise NotImplementedError
+
+    def inputs(self, numbers: np.ndarray) -> Any:
+        """Return what the network takes of the samples `numbers`: an array, or several in a named tuple."""
+        return self.views(numbers)
+
+    def changed(self, numbers: np.ndarray, columns: list[int], block: dict, generator: np.random.Generator) -> Any:
+        """Return `inputs` augmented; columns: numbers of the views; block: `recognition.augmentation`."""
+        return augment(self.views(numbers), columns, block, generator)
+
+
+class ViewSamples(Samples):
+    """Samples held in memory, read from cache files; the scheme's columns only."""
 
     def __init__(self, paths: list[str | Path], columns: list[int], folds: set[tuple[str, str]]) -> None:
         """paths: cache files; columns: views to keep; folds: the (group, fold) pairs to keep.
@@ -160,15 +186,15 @@ class ViewSamples:
         return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
 
 
-def joined_sources(first: Any, second: Any) -> Any:
-    """Return the samples of two sources of one kind, images, signals or features, as one source.
+def joined_sources(first: ViewSamples, second: ViewSamples) -> ViewSamples:
+    """Return the samples of two sources as one source.
 
-    Raises: InputError where their samples differ in size.
+    Raises: InputError where their images differ in size.
     """
     if first.size != second.size:
         raise InputError(f"samples: sizes {first.size} and {second.size}, expected one size")
     found = copy.copy(first)
-    setattr(found, first.HELD, np.concatenate([getattr(first, first.HELD), getattr(second, first.HELD)]))
+    found.images = np.concatenate([first.images, second.images])
     found.facts = joined([first.facts, second.facts])
     return found
 

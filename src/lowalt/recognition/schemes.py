@@ -5,7 +5,7 @@ The paper's rows stand in `config/schemes.csv`, one line a scheme:
     scheme      published name, "ABC:VRP+TRP+VT"; also the key of accuracy.csv
     stations    names of stations of the run's network, joined by "+"; names of one letter may stand together, "ABC"
     spectra     spectra joined by "+"
-    fusion      attention (the paper's proposal) | mean (its baseline) | voting | concatenation
+    fusion      attention (the paper's proposal) | mean (its baseline)
     backbone    timm name, or empty for the configuration's own backbone
     protocols   protocols of the paper's tables that hold this row, joined by "+"
 
@@ -13,15 +13,10 @@ A table may have more columns, which a row leaves empty to take the configuratio
 
     size, steps pixels a side the network sees; optimiser steps
     share       share of the motion models of each subtype that train, 0..1 (empty: all)
-    method      empty: the network on images. Otherwise the scheme sees signals or features and names no spectra:
-                cnn | complex | transformer on the stations' signals (fusion and stations as for images; size: symbols
-                of a signal); svm | boosting | xgboost on physical features of all its stations (fusion: concatenation)
-    cues        empty, or height: each station gives the network the height that it measures (`track.py`), next to its
-                images; fusion attention, no method, and the word in the scheme's name
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv
@@ -33,14 +28,10 @@ TABLE = "config/schemes.csv"
 """Where the table of schemes stands if a command names no other."""
 SPECTRA = tuple(name.upper() for name in NAMES)
 """Spectra as the table of schemes writes them, in the catalogue's order."""
-FUSIONS, PROTOCOLS = ("attention", "mean", "voting", "concatenation"), ("seen", "unseen")
+FUSIONS = ("attention", "mean")
+PROTOCOLS = ("seen", "unseen")
 COLUMNS = ("scheme", "stations", "spectra", "fusion", "backbone", "protocols")
-OPTIONAL, CUES = ("size", "steps", "share", "method", "cues"), ("height",)
-SEES = {
-    "": "images", "cnn": "signals", "complex": "signals", "transformer": "signals",
-    "svm": "features", "boosting": "features", "xgboost": "features",
-}  # fmt: skip
-"""The input of each method: images of spectra, slow-time signals, or physical features of these."""
+OPTIONAL = ("size", "steps", "share")
 
 
 @dataclass(frozen=True)
@@ -57,18 +48,11 @@ class Scheme:
     size: int = 0
     steps: int = 0
     share: float = 1.0
-    method: str = ""
-    cues: str = ""
 
     @property
     def record(self) -> dict:
-        """The scheme as models and checkpoints keep it; one without cues as before there were any."""
-        return {key: value for key, value in asdict(self).items() if value or key != "cues"}
-
-    @property
-    def sees(self) -> str:
-        """Input of the scheme: "images", "signals" or "features"."""
-        return SEES[self.method]
+        """The scheme as models and checkpoints keep it."""
+        return asdict(self)
 
     def backbone_of(self, network: dict) -> str:
         """Return the scheme's own backbone, or that of the block `recognition.network`."""
@@ -86,13 +70,10 @@ class Scheme:
 
     @property
     def columns(self) -> list[int]:
-        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number; of a scheme
-        that sees no images, the numbers of its stations.
+        """Numbers of the scheme's views, station-major, where every spectrum of the catalogue has a number.
 
         `columns_in` gives their places in a data set, which may have fewer spectra.
         """
-        if self.sees != "images":
-            return list(self.stations)
         return [len(SPECTRA) * station + spectrum for station in self.stations for spectrum in self.spectra]
 
 
@@ -137,41 +118,6 @@ def _number(row: dict, column: str, kind: type, low: float, high: float, where: 
     return value
 
 
-def _method(row: dict, where: str) -> str:
-    """Return the method of a row; refuse an unknown one, and columns that say nothing about it."""
-    method = row.get("method") or ""
-    if method not in SEES:
-        raise InputError(f"{where}: method {method!r}, expected nothing or one of {list(SEES)[1:]}")
-    for column in ("spectra", "backbone") if method else ():
-        if row[column]:
-            raise InputError(f"{where}: {column} {row[column]!r} with method {method!r}, expected an empty cell")
-    if SEES[method] == "features" and row["fusion"] != "concatenation":
-        raise InputError(f"{where}: fusion {row['fusion']!r} with method {method!r}, expected concatenation")
-    return method
-
-
-def _cues(row: dict, where: str) -> str:
-    """Return the cues of a row; refuse an unknown one, and a row that cannot take it or does not say it by name."""
-    cues = row.get("cues") or ""
-    if not cues:
-        return ""
-    if cues not in CUES:
-        raise InputError(f"{where}: cues {cues!r}, expected nothing or one of {CUES}")
-    for column, wanted in (("fusion", "attention"), ("method", "")):
-        if (row.get(column) or "") != wanted:
-            raise InputError(f"{where}: cues {cues!r} with {column} {row[column]!r}, expected {wanted or 'none'!r}")
-    # By its name no table takes the row for one that sees images alone.
-    if cues not in row["scheme"]:
-        raise InputError(f"{where}: cues {cues!r}, expected the word in the scheme's name {row['scheme']!r}")
-    return cues
-
-
-def refuse_cues(scheme: Scheme, where: str) -> None:
-    """Raise InputError naming `where` and the scheme for one with cues."""
-    if scheme.cues:
-        raise InputError(f"{where}: scheme {scheme.name!r} has the cue {scheme.cues!r}, expected one without cues")
-
-
 def _station_names(text: str, known: Sequence[str]) -> list[str]:
     """Split names of stations, "north+south" or "ABC"."""
     names = text.split("+")
@@ -196,19 +142,16 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
     protocols = tuple(row["protocols"].split("+"))
     _indices(row["protocols"], list(protocols), PROTOCOLS, "protocols", where)
     listed = _station_names(row["stations"], stations)
-    method = _method(row, where)
     return Scheme(
         name=row["scheme"],
         stations=_indices(row["stations"], listed, tuple(stations), "stations", where),
-        spectra=() if method else _indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
+        spectra=_indices(row["spectra"], row["spectra"].split("+"), SPECTRA, "spectra", where),
         fusion=row["fusion"],
         backbone=row["backbone"],
         protocols=protocols,
         size=int(_number(row, "size", int, 8, 4096 if method else 1024, where)),
         steps=int(_number(row, "steps", int, 1, 1e9, where)),
         share=float(_number(row, "share", float, 1e-6, 1.0, where)),
-        method=method,
-        cues=_cues(row, where),
     )
 
 

@@ -25,7 +25,7 @@ from lowalt.recognition.matrix_products import as_products
 from lowalt.recognition.metrics import Metrics
 from lowalt.recognition.moving_average import MovingAverage
 from lowalt.recognition.objective import descent
-from lowalt.recognition.order import batches, epoch_order, with_fresh
+from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.reader import Reader
 from lowalt.recognition.recipe import averaging, check, optimiser, random_state, schedule, set_random_state
 from lowalt.recognition.statistics import cross_entropy
@@ -84,7 +84,7 @@ class Trainer:
         readers = (reader, Unchanged(self.validation))
         self.read, self.read_validation = (ReadAhead(read, self.block["workers"], pin=machine.gpu) for read in readers)
         self.best_weights: dict = {}
-        self.waited_s, self.validates_first = 0.0, False
+        self.waited_s = 0.0
         self.metrics: Metrics | None = None
         self.at = TrainingState()
 
@@ -94,9 +94,7 @@ class Trainer:
 
     def _numbered(self, parts: list[np.ndarray]) -> list[tuple[int, np.ndarray]]:
         """Return the sample numbers of the next batches, each with its step, which alone decides what a batch holds."""
-        share, known = self.block["stream"], len(self.train.facts)
-        numbered = enumerate(parts, start=self.at.steps)
-        return [(step, with_fresh(part, step, share, known) if share else part) for step, part in numbered]
+        return list(enumerate(parts, start=self.at.steps))
 
     def save(self) -> None:
         """Write the checkpoint; refuses to write weights that are not finite."""
@@ -177,7 +175,7 @@ class Trainer:
         """Validate the averaged weights, keep the best, and decide whether to stop early."""
         self._finite_weights()
         facts, batch, ahead = self.validation.facts, self.block["batch"], self.read_validation
-        numbers, loss = np.arange(len(facts)), self.at.loss_sum / (self.at.loss_steps or math.nan)
+        numbers, loss = np.arange(len(facts)), self.at.loss_sum / self.at.loss_steps
         found = probabilities(self.ema.module, self.validation, numbers, self.machine, batch, False, ahead)
         accuracy = float(np.mean(found.argmax(1) == facts.label))
         rate = self.block["rate"] * schedule(self.at.steps / self.block["steps"], self.block["warmup"])
@@ -198,8 +196,6 @@ class Trainer:
         """Train to the last step or until validation stops improving; goes on from where the run stands."""
         start, last, first = time.monotonic(), time.monotonic(), self.at.steps
         report = Reporter(steps := self.block["steps"], "steps")
-        if self.validates_first and not self.at.history:
-            self._validate()
         while self.at.steps < steps and not self.at.done:
             parts = batches(self._order(self.at.epoch), self.block["batch"])
             rest = parts[self.at.batch : self.at.batch + steps - self.at.steps]

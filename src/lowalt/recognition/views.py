@@ -161,7 +161,7 @@ def cache_shard(index: str | Path, name: str, size: int, out: str | Path, source
     return len(numbers)
 
 
-class ShardSamples:
+class ShardSamples(samples.Samples):
     """Samples read from shards as they are asked for; the same calls and pixels as `ViewSamples`."""
 
     def __init__(self, index: str | Path, columns: list[int], folds: set, size: int, placed: bool) -> None:

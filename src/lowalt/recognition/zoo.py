@@ -20,16 +20,13 @@ from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.model_file import EIGHT, ModelFile
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
-from lowalt.recognition.samples import ViewSamples
-from lowalt.recognition.schemes import refuse_cues
-from lowalt.recognition.slow_time import SlowTimeSamples
+from lowalt.recognition.samples import Samples, ViewSamples
 
 ZOO = Path("results/zoo")
 """Where entries lie, from the folder of the checkout."""
 LARGEST_BYTES = 1_000_000
 FEWER_POINTS = 0.5
 """An entry that loses more of the validation accuracy, in percentage points, is not written."""
-Samples = ViewSamples | SlowTimeSamples
 
 
 def names(zoo: Path = ZOO) -> list[str]:
@@ -56,13 +53,8 @@ def opened(given: str | Path, zoo: Path = ZOO, own: str = "") -> tuple[Trained, 
 
 
 def small(content: ModelFile, own: str = "") -> ModelFile:
-    """Return a model with its trained matrices in 8 bits; own: as in `opened`.
-
-    Raises: InputError for a model that is no network: its numbers are no rows of weights.
-    """
+    """Return a model with its trained matrices in 8 bits; own: as in `opened`."""
     found = model_file.trained(content, "model", own)
-    if found.scheme.sees == "features":
-        raise InputError(f"--model: method {found.scheme.method!r}, expected a network; `export` writes it as it is")
     matrices = {name for name, value in found.model.named_parameters() if value.ndim > 1 and not value.is_complex()}
     return replace(content, tensors=rounded(content.tensors, matrices), weights=EIGHT)
 
@@ -119,24 +111,15 @@ def main(arguments: list[str]) -> None:
     """Make an entry of the zoo of a finished training: 8-bit weights, measured on the validation fold, and a card."""
     line = argparse.ArgumentParser(prog="python -m lowalt.recognition.zoo", description=main.__doc__)
     line.add_argument("--model", required=True, help="model.pt of a training run")
-    line.add_argument("--views", nargs="+", help="caches of views (.npz) that hold the validation fold")
-    line.add_argument("--signals", nargs="+", help="for models on signals: their caches (.npz)")
+    line.add_argument("--views", nargs="+", required=True, help="caches of views (.npz) that hold the validation fold")
     line.add_argument("--name", required=True, help="name of the entry, such as default-seen")
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)
     given = line.parse_args(arguments)
     found = load(given.model, given.backbone)
-    refuse_cues(found.scheme, "--model")
-    wanted = "views" if found.scheme.sees == "images" else "signals"
-    paths, pairs = getattr(given, wanted), folds(found.protocol, "validation")
-    if not paths:
-        raise InputError(f"--{wanted}: missing, the model sees {found.scheme.sees}")
-    if wanted == "views":
-        samples: Samples = ViewSamples(paths, found.scheme.columns, pairs)
-    else:
-        samples = SlowTimeSamples(paths, found.scheme.sees, found.scheme.columns, pairs)
+    samples = ViewSamples(given.views, found.scheme.columns, folds(found.protocol, "validation"))
     if samples.size != found.size:
-        raise InputError(f"--{wanted}: size {samples.size}, the model sees {found.size}")
+        raise InputError(f"--views: size {samples.size}, the model sees {found.size}")
     measured = entry(given.model, samples, given.name, given.out, given.backbone)
     print(
         f"{given.name}: {(given.out / given.name).with_suffix('.safetensors').stat().st_size} bytes, validation "

@@ -13,7 +13,7 @@ from lowalt.common.classes import CATEGORIES
 from lowalt.common.config import load_yaml, merge
 from lowalt.common.errors import InputError
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.schemes import SPECTRA, named, refuse_cues
+from lowalt.recognition.schemes import SPECTRA, named
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
 from lowalt.tiles.render import Renderer, split
@@ -91,7 +91,6 @@ def recogniser(block: dict):
     from lowalt.recognition.network import Recogniser
 
     scheme = named(block["table"], block["scheme"], ["A"])
-    refuse_cues(scheme, "recordings")
     palette = Images.from_settings(block["images"]).palette
     palettes = np.stack([palette] * len(SPECTRA))
     return Recogniser(scheme, block["network"], block["size"], palettes, len(CATEGORIES)), scheme

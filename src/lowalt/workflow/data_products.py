@@ -129,10 +129,3 @@ class DataProducts:
             return {}
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
         return {"reduced": f"{base}/reduced/{wildcards.size}/{chunk}.npy", "motion": self.motion(wildcards)}
-
-    def noisy_chunk(self, wildcards: Any) -> dict[str, str]:
-        """Noisy signals of a chunk and its motion table; nothing where shards hold the signals themselves."""
-        if self._config["shards"]["kind"] != "image":
-            return {}
-        noisy = f"results/{wildcards.run}/noisy/{wildcards.group}-{wildcards.part}.npy"
-        return {"noisy": noisy, "motion": self.motion(wildcards)}

@@ -63,40 +63,12 @@ def reduced_chunk(wildcards: Any, input: Any) -> list[str]:
     return [*_option("reduced", input.reduced), *_option("motion", input.motion)] if input.get("reduced") else []
 
 
-def extra(wildcards: Any, input: Any) -> list[str]:
-    """The shrunk images or the signals of other runs that are trained on too, and their measured heights."""
-    tracks = _option("extra-tracks", input.get("extra_tracks"))
-    return [*_option("extra", input.extra), *tracks] if input.get("extra") else []
-
-
-def noisy_chunk(wildcards: Any, input: Any) -> list[str]:
-    """The noisy signals of a chunk and its motion table, where shards hold images alone."""
-    return [*_option("noisy", input.noisy), *_option("motion", input.motion)] if input.get("noisy") else []
-
-
-def timed_model(wildcards: Any, input: Any) -> list[str]:
-    """The trained model to time, where its time depends on its training."""
-    return _option("model", input.model)
-
-
 def fidelity(wildcards: Any, input: Any) -> list[str]:
     """The table of models trained on echoes at a tolerance, where there is one."""
     return _option("fidelity", input.fidelity)
 
 
-def stream(wildcards: Any, input: Any) -> list[str]:
-    """The configuration whose fresh motion models are trained on."""
-    return _option("stream", input.get("stream"))
-
-
-def start(wildcards: Any, input: Any) -> list[str]:
-    """The trained model whose weights a training starts from."""
-    return _option("start", input.get("start"))
-
-
 def samples(wildcards: Any, input: Any) -> list[str]:
-    """Options that name the signals, the shrunk images, the index of the shards, or the configuration to make samples
-    from; and the measured heights, for a scheme with the cue."""
-    kind = next(name for name in ("dataset", "signals", "views", "index") if input.get(name))
-    tracks = _option("tracks", input.get("tracks")) if kind in ("views", "index") else []
-    return [*_option(kind, input.get(kind)), *tracks]
+    """Options that name the shrunk images, the index of the shards, or the configuration to make samples from."""
+    kind = next(name for name in ("dataset", "views", "index") if input.get(name))
+    return _option(kind, input.get(kind))

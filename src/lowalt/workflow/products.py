@@ -9,12 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from lowalt.common.errors import InputError
-from lowalt.common.files import slug
 from lowalt.common.shipped import shipped
 from lowalt.common.street import PACKAGE
-from lowalt.recognition import choose
 from lowalt.report.inputs import KEPT
-from lowalt.workflow import extra_runs
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near
 
@@ -36,17 +33,14 @@ class Products(DataProducts):
 
     def samples(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files of training and evaluation, by the configuration: images shrunk to the scheme's size, the index of the
-        shards, or clouds to make samples from; heights for a scheme with that cue; signals where it sees no images."""
+        shards, or clouds to make samples from."""
         base, scheme = f"results/{self._run.data}", self._run.schemes_by_slug[wildcards.scheme]
-        if scheme.sees != "images":
-            return {"signals": [f"{base}/slow_time/{shard}.npz" for shard in self._run.plan.shards]}
         if self._config["recognition"].get("input") == "dataset":
             return self._made()
-        tracks = {"tracks": self._tracks(base)} if scheme.cues else {}
         if not self._config["recognition"]["cache"]:
-            return {"index": f"{base}/shards/index.json", **tracks}
+            return {"index": f"{base}/shards/index.json"}
         size = self._run.pixels(scheme)
-        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards], **tracks}
+        return {"views": [f"{base}/views/{size}/{shard}.npz" for shard in self._run.plan.shards]}
 
     def _made(self) -> dict[str, str | list[str]]:
         """Files from which samples are made on the spot: configuration, clouds, and surfaces that hide points."""
@@ -57,15 +51,8 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and the same of other runs that the configuration adds."""
-        scheme = self._run.schemes_by_slug[wildcards.scheme]
-        names = self._config["recognition"].get("extra", [])
-        extra = extra_runs.of_scheme(names, scheme, self._run.pixels(scheme))
-        found = {**self.samples(wildcards), **extra, **self._own_backbone(wildcards)}
-        if self._config["recognition"]["training"].get("stream", 0) and scheme.sees == "images":
-            made = self._made()
-            found |= {"stream": made.pop("dataset"), **made}
-        return {**found, **self._run.start_model(wildcards)}
+        """Files that one training reads: `samples`, and the user's file that a backbone is made in."""
+        return {**self.samples(wildcards), **self._own_backbone(wildcards)}
 
     def _own_backbone(self, wildcards: Any) -> dict[str, str]:
         """The user's file that a scheme's backbone is made in, none for a library's backbone."""
@@ -81,54 +68,6 @@ class Products(DataProducts):
         """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
         sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
-
-    def slow_times(self, wildcards: Any) -> list[str]:
-        """Signals and features of this run's own samples, for schemes that see no images."""
-        return [f"results/{self._run.name}/slow_time/{shard}.npz" for shard in self._run.plan.shards]
-
-    def tracks(self, wildcards: Any) -> list[str]:
-        """Measured heights of this run's own samples, for schemes with that cue."""
-        return self._tracks(f"results/{self._run.name}")
-
-    def _tracks(self, base: str) -> list[str]:
-        """Measured heights of a run with this run's plan."""
-        return [f"{base}/tracks/{shard}.npz" for shard in self._run.plan.shards]
-
-    def timed_model(self, wildcards: Any) -> list[str]:
-        """The trained model that is timed, where its time depends on its training: a classical method's; else none."""
-        if self._run.schemes_by_slug[wildcards.scheme].sees != "features":
-            return []
-        seed = self._config["recognition"]["seeds"][0]
-        return [f"results/{wildcards.run}/models/unseen/{wildcards.scheme}/{seed}/model.pt"]
-
-    def frozen(self, wildcards: Any) -> list[str]:
-        """Checksums of the clouds and motion tables of all samples that are trained on."""
-        names = [self._run.data, *self._config["recognition"].get("extra", [])]
-        return [f"results/{name}/SHA256SUMS" for name in names]
-
-    def trial_views(self, wildcards: Any) -> list[str]:
-        """Images that a trial may see, shrunk to its candidate's size: group "seen", folds train and val."""
-        size = self._trial_size(wildcards)
-        shards = [name for name in self._run.plan.shards if name.startswith(("seen-train-", "seen-val-"))]
-        return [f"results/{self._run.data}/views/{size}/{shard}.npz" for shard in shards]
-
-    def trial_extra(self, wildcards: Any) -> list[str]:
-        """Images of the other runs whose samples a trial's candidate trains on too, none for most candidates."""
-        names = choose.read(choose.TABLE).extra(wildcards.candidate)
-        return [path for name in names for path in extra_runs.files(name, f"views/{self._trial_size(wildcards)}")]
-
-    def _trial_size(self, wildcards: Any) -> int:
-        """Pixels a side of the images that the candidate of a trial is trained on."""
-        changes = choose.read(choose.TABLE).changes(wildcards.candidate)
-        return choose.settled(self._config["recognition"], changes)["size"]
-
-    def trials(self, wildcards: Any) -> list[str]:
-        """Predictions of all candidates, folds and training seeds, the first candidate's first."""
-        table, seeds = choose.read(choose.TABLE), self._config["recognition"]["seeds"]
-        names = [
-            f"{slug(name)}/{fold}-{seed}" for name in table.candidates for fold in range(table.folds) for seed in seeds
-        ]
-        return [f"results/{wildcards.run}/choices/{name}/predictions.csv" for name in names]
 
     def asked_model(self, wildcards: Any) -> str:
         """The network that shows what effects do."""

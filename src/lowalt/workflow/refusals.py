@@ -6,13 +6,11 @@ Each function raises InputError that names key, value and what was expected. `Ru
 from collections.abc import Collection
 from pathlib import Path
 
-from lowalt.common.classes import AIRBORNE, CATEGORIES, classes_of
+from lowalt.common.classes import AIRBORNE, CATEGORIES
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED, as_named, located
 from lowalt.common.yaml_files import load_yaml
-from lowalt.recognition.protocols import folds
-from lowalt.recognition.schemes import Scheme
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, profiled
 from lowalt.targets.records import missing_inputs, records_of
@@ -74,77 +72,6 @@ def refuse_profiles(config: dict) -> None:
                 f"spectra: {list(named(config['spectra']))} and {key} is {value!r}, expected no {key}: range profiles "
                 "are made of clean targets, by stations that hear themselves, where tiles are"
             )
-
-
-def refuse_signals(config: dict, scheme: Scheme) -> None:
-    """Refuse a scheme on signals or features where their caches are not made, or of another number of symbols."""
-    block, symbols = config["recognition"], config["network"]["symbols"]
-    if not block["cache"]:
-        raise InputError(f"recognition: scheme {scheme.name!r} sees {scheme.sees}, expected cache: true")
-    if scheme.sees == "signals" and scheme.size != symbols:
-        raise InputError(f"scheme {scheme.name!r}: size {scheme.size}, expected the {symbols} symbols of a signal")
-
-
-def refuse_height(config: dict, scheme: Scheme) -> None:
-    """Refuse a scheme with measured heights where no track is made or where fresh samples without one join in."""
-    if not scheme.cues:
-        return
-    block = config["recognition"]
-    links = sorted(name for name, place in config["network"]["stations"].items() if "transmit" in place)
-    given = {
-        "effects": sorted(config["effects"]), "links": links, "input": block.get("input") == "dataset",
-        "timed": scheme.name in block["timed"], "training.stream": block["training"].get("stream"),
-    }  # fmt: skip
-    for key, value in given.items():
-        if value:
-            raise InputError(
-                f"recognition: scheme {scheme.name!r} has the cue {scheme.cues!r} and {key} is {value!r}, expected "
-                f"no {key}: heights are measured of stored samples, by stations that hear themselves"
-            )
-
-
-def refuse_starts(starts: dict[str, dict], trained: set[str]) -> None:
-    """Refuse a start that this run does not train, that has met samples which are tested, or that goes in a circle.
-
-    starts: of each training, {"from": ...}; trained: all trainings of the run, as PROTOCOL/SCHEME.
-    """
-    for name, entry in starts.items():
-        origin = entry["from"]
-        if origin not in trained:
-            raise InputError(f"recognition.start: {name} from {origin!r}, expected one of {sorted(trained)}")
-        own, theirs = name.split("/")[0], origin.split("/")[0]
-        parts = ("train", "validation")
-        if not all(folds(theirs, part) <= folds(own, part) for part in parts):
-            raise InputError(
-                f"recognition.start: {name} from {origin!r}, which trains on samples that {own!r} tests; expected a "
-                "training in a protocol whose samples are all among its own"
-            )
-        passed = [name]
-        while passed[-1] in starts:
-            passed.append(starts[passed[-1]]["from"])
-            if passed[-1] in passed[:-1]:
-                raise InputError(f"recognition.start: {' from '.join(passed)} is a circle")
-
-
-def refuse_extra(config: dict, name: str, classes: tuple[str, ...]) -> None:
-    """Refuse to train on a run that is missing, differs in network, spectra, images or classes, or has this seed."""
-    made = Path("results") / name / "config.yaml"
-    if name in (config["run"], config.get("data")) or not made.is_file():
-        raise InputError(f"recognition.extra: {name!r}, expected another, finished run; no {made} or it is this run")
-    if not config["recognition"]["cache"]:
-        raise InputError("recognition.extra: given without recognition.cache, expected true")
-    own, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
-    differ = [key for key in ("network", "spectra", "images") if own[key] != other[key]]
-    if differ:
-        raise InputError(f"recognition.extra: run {name!r} has other settings of {differ}, expected equal ones")
-    others = classes_of({name: record["published"] for name, record in records_of(located(other)["targets"]).items()})
-    if others != classes:
-        raise InputError(f"recognition.extra: run {name!r} has the classes {others}, expected {classes}")
-    if own["seed"] == other["seed"]:
-        raise InputError(
-            f"recognition.extra: run {name!r} has this run's seed {own['seed']}, so its motion models would be those "
-            "that are tested; expected another seed"
-        )
 
 
 def refuse_no_files(targets: dict, inputs: str | None) -> None:

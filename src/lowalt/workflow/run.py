@@ -25,16 +25,12 @@ from lowalt.workflow.refusals import (
     refuse_braces,
     refuse_companions,
     refuse_data,
-    refuse_extra,
-    refuse_height,
     refuse_heights,
     refuse_input,
     refuse_missing,
     refuse_no_files,
     refuse_profiles,
-    refuse_signals,
     refuse_sizes,
-    refuse_starts,
 )
 from lowalt.workflow.suited import refuse_region, refuse_speeds, schemes_of
 
@@ -77,10 +73,6 @@ class Run:
         refuse_region(config)
         refuse_speeds(config)
         schemes = schemes_of(config)
-        for scheme in schemes.values():
-            refuse_height(config, scheme)
-            if scheme.sees != "images":
-                refuse_signals(config, scheme)
         if config["run"] in block["transfer"]:
             raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
         refuse_sizes(config, classes)
@@ -98,18 +90,8 @@ class Run:
         refuse_input(config)
         if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
             raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
-        for name in block.get("extra", []):
-            refuse_extra(config, name, classes)
-        run = cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
-        for name in block.get("start", {}):
-            # An overlay may train less; a name that no table has is a slip.
-            try:
-                named(block["table"], name.partition("/")[2], run.stations)
-            except InputError as error:
-                raise InputError(f"recognition.start: {name}: {error}") from None
-        refuse_starts(run.starts, run.pairs)
         Launch.of(block)
-        return run
+        return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
 
     @property
     def sources(self) -> str:
@@ -172,34 +154,6 @@ class Run:
         ]
 
     @cached_property
-    def pairs(self) -> set[str]:
-        """PROTOCOL/SCHEME of every training, by the scheme's name."""
-        protocols = self.config["recognition"]["protocols"]
-        return {f"{one}/{scheme.name}" for scheme in self.trained for one in protocols if one in scheme.protocols}
-
-    @cached_property
-    def starts(self) -> dict[str, dict]:
-        """Entries of `recognition.start` for the trainings of this run, by PROTOCOL/SCHEME."""
-        given = self.config["recognition"].get("start", {})
-        return {name: entry for name, entry in given.items() if name in self.pairs}
-
-    def start_of(self, wildcards: Any) -> dict | None:
-        """The entry of `recognition.start` for a job, None where its training starts from fresh weights."""
-        if not self.starts:
-            return None
-        scheme = self.schemes_by_slug[wildcards.scheme]
-        return self.starts.get(f"{wildcards.get('protocol', '')}/{scheme.name}")
-
-    def start_model(self, wildcards: Any) -> dict[str, str]:
-        """The trained model whose weights a job's training starts from, of the same training seed; none for most."""
-        entry = self.start_of(wildcards)
-        if not entry:
-            return {}
-        protocol, _, name = entry["from"].partition("/")
-        folder = f"results/{wildcards.run}/models/{protocol}/{self.schemes[name].slug}"
-        return {"start": f"{folder}/{wildcards.train_seed}/model.pt"}
-
-    @cached_property
     def launch(self) -> Launch:
         """How a training is launched."""
         return Launch.of(self.config["recognition"])
@@ -217,15 +171,10 @@ class Run:
         Raises: InputError where no scheme is trained in the protocol "seen".
         """
         protocols = self.config["recognition"]["protocols"]
-        able = [
-            scheme
-            for scheme in self.trained
-            if scheme.sees == "images" and not scheme.cues and "seen" in scheme.protocols and "seen" in protocols
-        ]
+        able = [scheme for scheme in self.trained if "seen" in scheme.protocols and "seen" in protocols]
         if not able:
             raise InputError(
-                "recognition.schemes: none is trained in the protocol 'seen', expected one without cues to ask about "
-                "effects"
+                "recognition.schemes: none is trained in the protocol 'seen', expected one to ask about effects"
             )
         return max(able, key=lambda scheme: len(scheme.columns))
 
@@ -240,7 +189,7 @@ class Run:
     @cached_property
     def image_sizes(self) -> list[int]:
         """Pixels a side of the images that the trained schemes see."""
-        return sorted({self.pixels(scheme) for scheme in self.trained if scheme.sees == "images"})
+        return sorted({self.pixels(scheme) for scheme in self.trained})
 
     def pixels(self, scheme: Scheme) -> int:
         """Pixels a side that a scheme's network sees."""

@@ -135,36 +135,18 @@ class Settings:
         more = {"snr_db": snrs} if self._run.is_reduced(size) else {}
         return self._text("views", wildcards.size, *snrs, size=size, **more)
 
-    def slow_time(self, wildcards: Any) -> str:
-        """The SNRs of a chunk's signals."""
-        snrs = self._snrs(wildcards)
-        return self._text("slow_time", *snrs, snr_db=snrs)
-
     def training(self, wildcards: Any) -> str:
-        """How a network is trained: from its own seed, or from the run's where a job names no training seed; with its
-        own steps where it starts from another training."""
+        """How a network is trained: from its own seed, or from the run's where a job names no training seed."""
         block = self._config["recognition"]
         kept = {key: block[key] for key in ("size", "network", "training", "augmentation")}
         seed = int(wildcards.get("train_seed", self._config["seed"]))
-        entry = self._run.start_of(wildcards) or {}
-        own = {key: value for key, value in entry.items() if key != "from"}
-        kept["training"] = {**kept["training"], **own}
         return self._text(
             "training",
             seed,
-            *sorted(own.items()),
             seed=seed,
             colour_map=self._config["images"]["colour_map"],
             classes=self._run.classes,
             **kept,
-        )
-
-    def trial(self, wildcards: Any) -> str:
-        """Settings of training and evaluation before a candidate changes them, and the seed of a trial."""
-        block, seed = self._config["recognition"], int(wildcards.train_seed)
-        kept = {key: block[key] for key in ("size", "network", "training", "augmentation", "evaluation")}
-        return self._text(
-            "trial", seed, seed=seed, colour_map=self._config["images"]["colour_map"], classes=self._run.classes, **kept
         )
 
     def evaluation(self, wildcards: Any) -> str:

@@ -42,8 +42,7 @@ def _suited(config: dict, name: str) -> Scheme:
     """The scheme of the table, whose stations and spectra this configuration has."""
     table, stations = config["recognition"]["table"], station_names(config["network"])
     scheme = named(table, name, stations)
-    if scheme.sees == "images":
-        columns_in(scheme.columns, spectra_named(config["spectra"]), len(stations), table)
+    columns_in(scheme.columns, spectra_named(config["spectra"]), len(stations), table)
     return scheme
 
 

@@ -1,0 +1,84 @@
+"""Classical methods on physical features: support-vector machines and boosted trees, chosen on validation alone.
+
+Each method tries the candidates of GRID on the training samples and keeps the one with the least cross entropy on the
+validation samples; the test folds are never read. Boosting rounds, at most ROUNDS in steps of EVERY, and the
+temperature of the softmax over scores are chosen on validation too.
+Sources: Cortes and Vapnik, Mach. Learn. 20, 1995; Rifkin and Klautau, J. Mach. Learn. Res. 5, 2004 (one against the
+rest); Friedman, Ann. Stat. 29, 2001; Chen and Guestrin, XGBoost, 2016; Guo et al., 2017 (temperature).
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+from scipy.special import softmax
+
+from lowalt.recognition.statistics import cross_entropy
+
+GRID = {
+    "svm": [{"c": c, "gamma": gamma} for c in (3.0, 30.0) for gamma in (0.3, 1.0)],
+    "boosting": [{"leaves": 15, "rate": 0.1}, {"leaves": 31, "rate": 0.1}],
+    "xgboost": [{"depth": 4, "rate": 0.1}, {"depth": 6, "rate": 0.1}],
+}
+"""Candidates of each method; gamma is relative to one over the number of features."""
+ROUNDS, EVERY = 200, 25
+Scores = Callable[[np.ndarray], np.ndarray]
+
+
+def _svm(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the decision functions of one candidate's machines, one class against the rest."""
+    from sklearn.multiclass import OneVsRestClassifier
+    from sklearn.svm import SVC
+
+    mean, scale = features.mean(0), np.maximum(features.std(0), 1e-9)
+    machine = SVC(C=candidate["c"], gamma=candidate["gamma"] / features.shape[1])
+    model = OneVsRestClassifier(machine).fit((features - mean) / scale, labels)
+    yield lambda asked: model.decision_function((asked - mean) / scale)
+
+
+def _boosting(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the scores of scikit-learn's boosted trees of one candidate after every EVERY rounds."""
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    model = HistGradientBoostingClassifier(
+        learning_rate=candidate["rate"], max_leaf_nodes=candidate["leaves"], max_iter=ROUNDS, early_stopping=False,
+        random_state=seed,
+    ).fit(features, labels)  # fmt: skip
+    for count in range(EVERY, ROUNDS + 1, EVERY):
+        yield lambda asked, last=count: list(model.staged_decision_function(asked))[last - 1]
+
+
+def _xgboost(features: np.ndarray, labels: np.ndarray, candidate: dict, seed: int) -> Iterator[Scores]:
+    """Yield the scores of XGBoost's trees of one candidate after every EVERY rounds."""
+    import xgboost
+
+    given = {
+        "objective": "multi:softprob", "num_class": int(labels.max()) + 1, "max_depth": candidate["depth"],
+        "eta": candidate["rate"], "tree_method": "hist", "nthread": 1, "seed": seed, "base_score": 0.5,
+    }  # fmt: skip
+    model = xgboost.train(given, xgboost.DMatrix(features, labels), ROUNDS)
+    for count in range(EVERY, ROUNDS + 1, EVERY):
+        yield lambda asked, last=count: model.predict(
+            xgboost.DMatrix(asked), output_margin=True, iteration_range=(0, last)
+        )
+
+
+MAKERS = {"svm": _svm, "boosting": _boosting, "xgboost": _xgboost}
+
+
+def fit(method: str, train: tuple, validation: tuple, seed: int) -> Scores:
+    """Return the function from features (B, D) to class probabilities (B, classes) with the least cross entropy.
+
+    train, validation: features (B, D) and labels (B,) of both parts; every class has training samples.
+    """
+    asked, labels = validation
+    least, best = np.inf, None
+    for candidate in GRID[method]:
+        for scores in MAKERS[method](*train, candidate, seed):
+            found = scores(asked)
+            cost = lambda logarithm, found=found: cross_entropy(softmax(np.exp(logarithm) * found, 1), labels)  # noqa: E731
+            chosen = minimize_scalar(cost, bounds=(-3, 4), method="bounded")
+            if chosen.fun < least:
+                least, best = chosen.fun, (scores, float(np.exp(chosen.x)))
+    scores, temperature = best
+    return lambda features: softmax(temperature * scores(features), 1)
