@@ -11,8 +11,8 @@ from lowalt.recognition import recipe
 from trainings import TRAINING
 
 WHOLE = {"steps": 1, "batch": 1, "snrs_per_model": 0, "validate_every": 1, "patience": 0, "threads": 1, "workers": 0,
-         "accumulate": 1, "stream_models": 0}  # fmt: skip
-SHARES = ("warmup", "label_smoothing", "ema", "stream")
+         "accumulate": 1}  # fmt: skip
+SHARES = ("warmup", "label_smoothing", "ema")
 REAL = (*SHARES, "rate", "backbone_rate", "weight_decay", "clip", "alone", "checkpoint_s")
 
 
@@ -37,7 +37,7 @@ def test_real_numbers_are_taken_from_nought_to_their_largest_value(key):
 def test_settings_that_may_be_left_out_change_nothing_then():
     found = recipe.check(TRAINING)
     assert {key: value for key, value in found.items() if key not in TRAINING} == {
-        "accumulate": 1, "activation_checkpointing": False, "stream": 0.0, "stream_models": 0}  # fmt: skip
+        "accumulate": 1, "activation_checkpointing": False}  # fmt: skip
     assert recipe.check({**TRAINING, "batch": 3, "accumulate": 3})["accumulate"] == 3
     with pytest.raises(InputError, match="accumulate is 4, expected at most batch, 3"):
         recipe.check({**TRAINING, "batch": 3, "accumulate": 4})

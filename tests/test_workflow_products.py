@@ -14,8 +14,7 @@ from configured import parts, run_of
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.workflow import options
-from lowalt.workflow.effect_calls import EffectCalls
-from lowalt.workflow.products import FIDELITY, Products
+from lowalt.workflow.products import FIDELITY
 
 ROOT = Path(__file__).parent.parent
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
@@ -167,17 +166,12 @@ def test_times_are_told_of_the_stages_that_a_run_of_this_kind_has(kind, cache):
     assert made.count("shard") == len(run.plan.shards) and made.count("echo") == 3 * len(run.plan.sources)
 
 
-def test_fresh_samples_are_made_only_where_asked_for_and_an_own_backbone_is_read():
-    job = SimpleNamespace(run="default", scheme="abc-vrp-trp-vt", get=lambda key, default: "seen", train_seed="0")
-    for training, keys in (({"stream": 0}, []), ({"stream": 0.5}, ["stream", "clouds"])):
-        _, products, _ = parts({"recognition": {"training": training}})
-        assert list(products.training_samples(job)) == ["views", *keys]
-    own = {"network": {"backbone": "docs/notebooks.py:made"}}
-    _, products, _ = parts({"recognition": own})
+def test_an_own_backbone_is_read_by_its_training():
+    job = SimpleNamespace(run="default", scheme="abc-vrp-trp-vt", train_seed="0")
+    _, products, _ = parts()
+    assert list(products.training_samples(job)) == ["views"]
+    _, products, _ = parts({"recognition": {"network": {"backbone": "docs/notebooks.py:made"}}})
     assert products.training_samples(job)["backbone"] == "docs/notebooks.py"
-    run = run_of()
-    run.config["recognition"]["training"].pop("stream", None)
-    assert list(Products(run, EffectCalls(run)).training_samples(job)) == ["views"]
 
 
 def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signals():
@@ -196,7 +190,7 @@ def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signal
 
 def test_training_reads_images_of_the_scheme_s_own_size():
     run, products, _ = parts(
-        {"recognition": {"table": "config/accuracy.csv", "schemes": ["base", "48 pixels"], "timed": []}}
+        {"recognition": {"table": "config/cost/accuracy.csv", "schemes": ["base", "48 pixels"], "timed": []}}
     )
     for scheme, size in (("base", 24), ("48-pixels", 48)):
         views = products.samples(SimpleNamespace(scheme=scheme))["views"]

@@ -84,10 +84,7 @@ def test_settings_of_different_jobs_differ_and_are_json():
 
 def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
     """Texts are kept, so a key that leaves out what a job differs by would hand it another job's text."""
-    start = {"seen/ABC:VRP+TRP+VT": {"from": "unseen/ABC:VRP+TRP+VT", "steps": 7}}
-    run, _, settings = parts(
-        {"added": [{"snr_db": [1.5]}], "tiles": {"reduced": [24]}, "recognition": {"start": start}}
-    )
+    run, _, settings = parts({"added": [{"snr_db": [1.5]}], "tiles": {"reduced": [24]}})
     scheme = next(one.slug for one in run.trained if one.name == "ABC:VRP+TRP+VT")
     common = {"run": run.name, "scheme": scheme}
     chunks = [name.split("-", 1) for name in ("seen-00000", "seen-00001", run.plan.chunks[-1])]
@@ -102,7 +99,7 @@ def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
         for one in rest
     ]
     stages = [
-        "cloud", "motion", "echo", "noise", "shard", "views", "slow_time", "training", "trial", "images", "index",
+        "cloud", "motion", "echo", "noise", "shard", "views", "training", "images", "index",
     ]  # fmt: skip
     for stage in stages:
         told = [getattr(settings, stage)(job) for job in jobs]

@@ -76,7 +76,7 @@ def _texts() -> list[Reader]:
     from lowalt.common.csv_tables import read_csv
     from lowalt.common.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
-    from lowalt.recognition import choose, freeze, orderings, schemes
+    from lowalt.recognition import freeze, orderings, schemes
     from lowalt.recordings.record import read_record
     from lowalt.shards import manifest
     from lowalt.targets.records import load_records, load_table
@@ -104,10 +104,9 @@ def _texts() -> list[Reader]:
                lambda p: load_records("config/targets.csv", [*config["targets"]["records"][:3], p])),
         Reader("table of targets", "a.csv", table, load_table),
         Reader("schemes", "a.csv", Path("config/schemes.csv").read_bytes(), lambda p: schemes.read(p, "ABC")),
-        Reader("candidates", "a.yaml", Path("config/choices/default.yaml").read_bytes(), choose.read),
         Reader("published accuracies", "a.csv", Path("config/published_accuracy.csv").read_bytes(),
                orderings.read_published),
-        Reader("table", "a.csv", Path("config/accuracy.csv").read_bytes(), read_csv),
+        Reader("table", "a.csv", Path("config/cost/accuracy.csv").read_bytes(), read_csv),
         Reader("motion table", "a.csv", _bytes(lambda p: write_table(p, [row(n) for n in range(5)]), "a.csv"),
                read_table),
         Reader("manifest", "a.sha256", Path("results/reference/tiny.sha256").read_bytes(), manifest.read),
@@ -138,7 +137,6 @@ def _captures() -> list[Reader]:
 def _arrays() -> list[Reader]:
     """Readers of arrays, shards and models, each with a good file."""
     import torch
-    from lowalt.recognition.tracked import Tracked
 
     from lowalt.common.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
@@ -166,8 +164,6 @@ def _arrays() -> list[Reader]:
         np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
     )  # fmt: skip
     cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
-    ones, measured = np.ones((count, 3)), SimpleNamespace(facts=facts, size=16)
-    heights = _bytes(lambda p: np.savez(p, key=facts.key, height_m=ones, range_m=ones), "a.npz")
     rows = np.zeros(count, table.SAMPLE)
     header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
     surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
@@ -178,7 +174,6 @@ def _arrays() -> list[Reader]:
         Reader("cloud", "a.npz", _bytes(lambda p: write_cloud(p, craft()), "a.npz"), read_cloud, seal=ARCHIVE),
         Reader("occluders", "a.npz", surfaces, occluders.read, seal=ARCHIVE),
         Reader("views", "a.npz", cache, lambda p: samples.ViewSamples([p], [0, 1], {("seen", "train")}), seal=ARCHIVE),
-        Reader("tracks", "a.npz", heights, lambda p: Tracked(measured, [p], (0, 1)), seal=ARCHIVE),
         Reader("shard table", "a.npz", header, lambda p: (read_header(p), map_samples(p)), seal=ARCHIVE),
         Reader("index", "index.json", _index(render), load_index, seal=INDEX),
         Reader("tiles", "a.npz", tiles, lambda p: _all(Tiles(p)), seal=ARCHIVE),

@@ -149,7 +149,7 @@ def scheme(row: dict, where: str, stations: Sequence[str]) -> Scheme:
         fusion=row["fusion"],
         backbone=row["backbone"],
         protocols=protocols,
-        size=int(_number(row, "size", int, 8, 4096 if method else 1024, where)),
+        size=int(_number(row, "size", int, 8, 1024, where)),
         steps=int(_number(row, "steps", int, 1, 1e9, where)),
         share=float(_number(row, "share", float, 1e-6, 1.0, where)),
     )
