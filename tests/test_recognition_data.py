@@ -56,14 +56,14 @@ def test_wrong_schemes_are_refused(tmp_path, line, words):
 def test_a_row_may_bring_its_own_size_steps_and_share(tmp_path):
     path = tmp_path / "schemes.csv"
     head = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
-    path.write_text(f"{head}\nsmall,A,VT,mean,,seen,24,70,0.25,,\nplain,A,VT,mean,,seen,,,,,\n")
+    path.write_text(f"{head}\nsmall,A,VT,mean,,seen,24,70,0.25\nplain,A,VT,mean,,seen,,,\n")
     small, plain = schemes.read(path, "ABC").values()
     block = {"size": 48, "training": {"steps": 100, "batch": 4}, "seed": 1}
     assert small.settled(block) == {"size": 24, "training": {"steps": 70, "batch": 4}, "seed": 1}
     assert plain.settled(block) == block
     assert (small.share, plain.share) == (0.25, 1.0)
     bare = schemes.Scheme("plain", (0,), (2,))
-    assert bare.settled(block) == block and (bare.share, bare.sees, bare.fusion) == (1.0, "images", "attention")
+    assert bare.settled(block) == block and (bare.share, bare.fusion) == (1.0, "attention")
     assert bare.protocols == ("seen", "unseen")
     for column, value in (("size", "4"), ("steps", "0"), ("share", "1.5"), ("share", "half")):
         path.write_text(f"{','.join((*schemes.COLUMNS, column))}\nx,A,VT,mean,,seen,{value}\n")
