@@ -16,7 +16,7 @@ A table may have more columns, which a row leaves empty to take the configuratio
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from lowalt.common.csv_tables import read_csv

@@ -9,7 +9,7 @@ from pathlib import Path
 from lowalt.common.classes import AIRBORNE, CATEGORIES
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
-from lowalt.common.shipped import SHIPPED, as_named, located
+from lowalt.common.shipped import SHIPPED, as_named
 from lowalt.common.yaml_files import load_yaml
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, profiled

@@ -14,7 +14,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.network import Network, station_names
 from lowalt.common.plan import Plan
-from lowalt.recognition.schemes import Scheme, named
+from lowalt.recognition.schemes import Scheme
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
