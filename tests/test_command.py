@@ -37,7 +37,6 @@ report.__main__: --settings, --manifest, --stages, --figures, --out
 report.figures.accuracy_cost: --table, --figure
 report.figures.echo_cost: --table, --pixels, --figure
 report.figures.effects: --table, --samples, --figure
-report.figures.fresh_models: --table, --figure
 report.figures.house: --figure
 report.measured: --pairs, --tables, --page
 shards.__main__ index: --settings, --shards, --out

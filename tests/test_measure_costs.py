@@ -1,7 +1,6 @@
 """What the cost tables of `lowalt.measure` hold: methods, clocks and samples are made up, so all follows by hand."""
 
 import copy
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -12,10 +11,8 @@ from craft import NETWORK, craft
 from lowalt.common.config import load
 from lowalt.common.errors import BelowFloor
 from lowalt.common.network import Network
-from lowalt.measure import echo_cost, fresh_models, scale
-from lowalt.recognition import predictions
+from lowalt.measure import echo_cost, scale
 from lowalt.recognition.schemes import named
-from made_predictions import facts
 
 PUBLISHED = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
 MOTION = {
@@ -129,32 +126,6 @@ def test_every_cloud_distance_and_number_of_points_is_measured_and_the_direct_su
     assert rows == [1] * 8
     assert [(one, count, given["direct_repeats"]) for one, count, given in asked] == [
         (30.0, 77, 0), (30.0, 40, 0), (150.0, 77, 3), (150.0, 40, 3)] * 2  # fmt: skip
-
-
-def test_fresh_images_are_made_once_for_all_streams_and_their_time_is_counted(monkeypatch):
-    clock = iter([1.0, 3.5, 10.0, 10.25])
-    monkeypatch.setattr(fresh_models, "time", SimpleNamespace(process_time=lambda: next(clock)))
-    monkeypatch.setattr(fresh_models.Stream, "_images", lambda self, place: [place])
-    shared, cost = {}, {"samples": 0, "s": 0.0}
-    streams = [fresh_models.Remembered.__new__(fresh_models.Remembered) for _ in range(2)]
-    for one in streams:
-        one.shared, one.cost = shared, cost
-    assert [streams[number]._images(place) for number, place in ((0, "a"), (1, "a"), (1, "b"), (0, "b"))] == [
-        ["a"], ["a"], ["b"], ["b"]]  # fmt: skip
-    assert cost == {"samples": 2, "s": 2.75}
-
-
-def test_accuracies_of_held_out_and_kept_subtypes_resample_motion_models(tmp_path):
-    found = facts(models=20)
-    held = sorted(set(found.subtype.tolist()))[:1]
-    wrong = np.where(np.isin(found.subtype, held), found.model < 5, found.model < 2)
-    classes = ("UAV", "Bird", "Vehicle", "Pedestrian")
-    predictions.write(tmp_path / "p.csv", predictions.from_facts(found, (0,), np.eye(4)[(found.label + wrong) % 4]))
-    (tmp_path / "p.json").write_text(json.dumps({"classes": classes}))
-    told = fresh_models._told(tmp_path / "p.csv", held)
-    assert (told["held"][0], told["kept"][0]) == (75.0, 90.0)
-    # Twenty models decide, not their samples: 1.96 sqrt(p (1 - p) / 20).
-    assert told["held"][2] - told["held"][1] == pytest.approx(2 * 196 * np.sqrt(0.25 * 0.75 / 20), rel=0.2)
 
 
 def test_an_estimate_adds_stages_rounds_hours_and_gigabytes_and_counts_a_recipe_s_one_signal():

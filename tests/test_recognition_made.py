@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 import yaml
-from lowalt.recognition.stream import Stream
 
 from configured import Inputs, parts
 from lowalt.common.classes import CATEGORIES
@@ -150,11 +149,6 @@ def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeyp
     one = dataset.maker.signal(row, 8.0, [1])
     assert asked == ["A", "B", "C", "B"]
     assert (one[1] == whole[1]).all() and not one[[0, 2]].any()
-    asked.clear()
-    station = [len(schemes.SPECTRA) + spectrum for spectrum in range(3)]
-    fresh = Stream(opened(run / "config.yaml"), station, SIZE, ["seen"])
-    images = fresh.views(np.arange(2))
-    assert asked == ["B", "B"] and np.unique(images).size > 30
 
 
 def test_all_stations_are_asked_for_range_profiles(run):

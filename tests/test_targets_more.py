@@ -26,7 +26,8 @@ from lowalt.targets.make import make
 from lowalt.targets.records import load_records, records_of
 
 ROOT = Path(__file__).parents[1]
-CONFIG = load([ROOT / "config/default.yaml", ROOT / "config/more.yaml"], ROOT / "workflow/schemas/config.schema.yaml")
+LAYERS = [ROOT / "config/default.yaml", ROOT / "studies/more/config.yaml"]
+CONFIG = load(LAYERS, ROOT / "workflow/schemas/config.schema.yaml")
 RECORDS = records_of(CONFIG["targets"])
 LEGS = ("left fore", "right hind", "right fore", "left hind")
 MORE = list(RECORDS)[40:]
