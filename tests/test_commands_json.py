@@ -64,12 +64,15 @@ def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
     effects = "effects: {iq_imbalance: {}, adc: {bits: 24, clip: false}}"
     overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
     scene = ["explain", str(overlay), "--sample", "Crow:3"]
-    found, status = answer(*scene, "--suggest", "1e-3", "--out", str(mine))
+    model = str(ROOT / "results/zoo/default-unseen.safetensors")
+    found, status = answer(*scene, "--suggest", "1e-3", "--out", str(mine), "--model", model)
     assert status == 0 and [one["station"] for one in found["findings"]] == ["A", "B", "C"]
     assert all(one["right"] > 0.99 and one["subtype"] == "Crow" for one in found["findings"])
     changes = {one["effect"]: one for one in found["changes"]}
     assert set(changes) == set(PLACES) and [one["effect"] for one in found["changes"]][:2] == ["iq_imbalance", "adc"]
     assert changes["iq_imbalance"]["signal"] > 1e-3 > changes["adc"]["signal"]
+    # 24 bits change no image, so no answer; leakage buries the target.
+    assert changes["adc"]["more"] == {"pixels": 0, "answers": 0} and changes["transmit_leakage"]["more"]["pixels"] > 0.5
     assert "there is no clutter to cancel" in changes["canceller"]["refused"]
     # The suggested scene has the effects that matter, and is a scene.
     assert load([CONFIG, mine], SCHEMA)["effects"] == {"iq_imbalance": {}}

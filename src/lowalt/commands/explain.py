@@ -103,27 +103,29 @@ def _comparison(
     whole = Renderer.from_settings(blocks)
     seen = replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
-    answer = None
+    answered = None
     if model is not None:
-        from lowalt.recognition.one_sample import of_tile
+        from lowalt.recognition.one_sample import answer
         from lowalt.recognition.zoo import opened
+        from lowalt.spectra.catalogue import named
+        from lowalt.tiles import split
 
-        trained, settings = opened(model)
+        trained, _ = opened(model)
 
-        def answer(tile: np.ndarray) -> str:
+        def answered(tile: np.ndarray) -> str:
             """The most probable class of a tile."""
-            found = of_tile(trained, tile, settings or blocks)
-            return max(found, key=found.__getitem__)
+            shares = answer(trained, split(tile, len(named(config["spectra"]))), blocks, "--model")
+            return max(shares, key=shares.__getitem__)
 
     def compare(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
         """Shares of pixels whose index differs by more than 8 of 255, and of answers that differ."""
         pairs = [
-            [renderer.tile(signals.astype(np.complex64)).astype(int) for signals in pair]
+            [renderer.tile(signals.astype(np.complex64)) for signals in pair]
             for pair in zip(before, after, strict=True)
         ]
-        result = {"pixels": float(np.mean([abs(a - b) > visible for a, b in pairs]))}
-        if answer is not None:
-            result["answers"] = float(np.mean([answer(a) != answer(b) for a, b in pairs]))
+        result = {"pixels": float(np.mean([abs(a.astype(int) - b) > visible for a, b in pairs]))}
+        if answered is not None:
+            result["answers"] = float(np.mean([answered(a) != answered(b) for a, b in pairs]))
         return result
 
     return compare

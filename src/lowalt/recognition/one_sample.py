@@ -47,18 +47,22 @@ def _signals(path: Path) -> np.ndarray:
     return found
 
 
-def _seen(trained: Trained, path: Path, settings: dict) -> np.ndarray:
-    """Return the images that a model sees, (1, views, S, S), from a signal file or a tile."""
-    images = images_of(path, settings)
-    names = named(settings["spectra"])
-    places = columns_in(trained.scheme.columns, names, len(images) // len(names), str(path))
-    return resize(images, trained.size)[places][None]
-
-
 def predict(trained: Trained, path: Path, settings: dict) -> dict[str, float]:
     """Return the probability of each category for one signal file or tile, in full precision."""
+    return answer(trained, images_of(path, settings), settings, str(path))
+
+
+def answer(trained: Trained, images: np.ndarray, settings: dict, where: str) -> dict[str, float]:
+    """Return the probability of each category for all index images (stations spectra, S, S) uint8 of one sample.
+
+    settings: {network, spectra, images}; where: what the images are of, for refusals.
+    Raises: InputError naming `where`, for images that the model does not see, or an answer that is not finite.
+    """
+    names = named(settings["spectra"])
+    places = columns_in(trained.scheme.columns, names, len(images) // len(names), where)
+    seen = torch.from_numpy(resize(images, trained.size)[places][None])
     with torch.inference_mode():
-        found = trained.model(torch.from_numpy(_seen(trained, path, settings))).double().softmax(1)[0]
+        found = trained.model(seen).double().softmax(1)[0]
     if not torch.isfinite(found).all():
-        raise InputError(f"{trained.path}: answers {path} with numbers that are not finite, expected another model")
+        raise InputError(f"{trained.path}: answers {where} with numbers that are not finite, expected another model")
     return dict(zip(trained.classes, found.tolist(), strict=True))
