@@ -7,7 +7,7 @@ import re
 import pytest
 
 COMMANDS = (
-    "measure.network_speed", "measure.rotor_estimates", "measure.rotor_made", "recognition.rates", "shards.size",
+    "measure.network_speed", "shards.size",
     "workflow.campaign",
 )  # fmt: skip
 

@@ -33,7 +33,7 @@ class Numbers:
     def __init__(self):
         self.read = []
 
-    def views(self, numbers):
+    def inputs(self, numbers):
         self.read.append(numbers.tolist())
         return numbers.astype(np.float32)
 

@@ -99,7 +99,7 @@ def test_a_training_on_made_samples_ends_in_the_same_weights(run, tmp_path):
         main([*line, f"--{name}", str(source), "--out", str(tmp_path / name)])
         weights.append(checkpoint.load(tmp_path / name / "model.pt")[1]["weights"])
     assert all(torch.equal(weights[0][name], weights[1][name]) for name in weights[1])
-    with pytest.raises(InputError, match="one of --views, --signals, --index and --dataset"):
+    with pytest.raises(InputError, match="one of --views, --index and --dataset"):
         main([*line, "--out", str(tmp_path / "none")])
 
 

@@ -151,7 +151,7 @@ class _Held:
         """views: (K, S, V, size, size) uint8; columns: the network's views among the V."""
         self.images = views.reshape(-1, *views.shape[2:])[:, columns]
 
-    def views(self, numbers: np.ndarray) -> np.ndarray:
+    def inputs(self, numbers: np.ndarray) -> np.ndarray:
         """Return the images (len(numbers), columns, size, size) uint8 of the samples `numbers`."""
         return self.images[numbers]
 

@@ -17,7 +17,7 @@ class Unchanged(Dataset):
     """Index images of samples as they are: the map from sample numbers to a batch that evaluation reads."""
 
     def __init__(self, source: Any) -> None:
-        """source: samples, with a method `views`."""
+        """source: samples, with a method `inputs`."""
         self.source = source
 
     def __getitem__(self, numbers: np.ndarray) -> Any:

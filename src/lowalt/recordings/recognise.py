@@ -27,7 +27,7 @@ class Windows(NamedTuple):
     images: np.ndarray
     facts: Facts
 
-    def views(self, numbers: np.ndarray) -> np.ndarray:
+    def inputs(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), 3, size, size) uint8 of the samples `numbers`."""
         return self.images[numbers]
 

@@ -1,0 +1,204 @@
+"""Lengths of the authors' craft and birds, read from their videos: rotors, layers, hubs, shares of points, wings.
+
+A view is orthographic, so a place (x, y, z) lies at pixel O + x e_x + y e_y + z e_z, and the ticks of the axes give the
+three vectors. Rotors turn about z: the union of a rotor's dots over the frames is an ellipse whose width tells the
+radius and whose height, beyond that, the distance between two layers. Wings are mirror images of each other in x: two
+tips give all three coordinates. Run as `python read.py FOLDER readings.csv`; FOLDER holds `videos/`.
+"""
+
+import csv
+import sys
+from pathlib import Path
+
+import av
+import numpy as np
+from scipy import ndimage
+
+# Corner, end of the x edge, of the y edge, and top of the z edge, in pixels of the first frame.
+BOXES = {
+    "UAV": ((560, 822), (1112, 672), (134, 628), (134, 202)),
+    "Bird": ((492, 822), (1110, 697), (134, 608), (134, 177)),
+}
+# First label and step of the x, y and z axis, in metres, read by eye; the places of the ticks are found.
+LABELS = {
+    "UAV_01_DJI_Mini_2": (-0.15, 0.05, -0.1, 0.1, -0.2, 0.1),
+    "UAV_02_DJI_Mini_4_Pro": (-0.3, 0.1, -0.2, 0.1, -0.4, 0.2),
+    "UAV_03_DJI_Avata": (-0.15, 0.05, -0.1, 0.1, -0.06, 0.02),
+    "UAV_04_DJI_Mavic_3_Pro": (-0.2, 0.1, -0.2, 0.1, -0.2, 0.1),
+    "UAV_05_DJI_Mavic_4_Pro": (-0.4, 0.2, -0.4, 0.2, -0.4, 0.2),
+    "UAV_06_DJI_Inspire_2": (-0.6, 0.2, -0.5, 0.5, -0.5, 0.5),
+    "UAV_07_Type_A_Firefighting_UAV": (-2.0, 1.0, -2.0, 1.0, -1.0, 0.5),
+    "UAV_08_Type_B_Firefighting_UAV": (-2.0, 1.0, -2.0, 1.0, -1.0, 0.5),
+    "UAV_09_DJI_Matrice_600_Pro": (-1.0, 0.5, -1.0, 0.5, -1.0, 0.5),
+    "UAV_10_EH_216_S": (-6.0, 2.0, -5.0, 5.0, -3.0, 1.0),
+    "Bird_01_Crow": (0.5, -0.5, 0.5, -0.5, -0.5, 0.5),
+    "Bird_02_Eagle": (1.0, -0.5, 1.0, -0.5, -1.0, 0.5),
+    "Bird_03_Kingfisher": (0.2, -0.1, 0.2, -0.2, -0.3, 0.1),
+    "Bird_04_Parrot": (0.2, -0.1, 0.2, -0.2, -0.3, 0.1),
+    "Bird_05_Pigeon": (0.2, -0.1, 0.2, -0.2, -0.3, 0.1),
+    "Bird_06_Ramphastidae": (0.5, -0.5, 0.5, -0.5, -0.5, 0.5),
+    "Bird_07_Sparrow": (0.2, -0.1, 0.2, -0.2, -0.3, 0.1),
+    "Bird_08_Seagull": (1.0, -0.5, 1.0, -0.5, -1.0, 0.5),
+    "Bird_09_Owl": (1.0, -0.5, 1.0, -0.5, -1.0, 0.5),
+    "Bird_10_Wild_Goose": (0.5, -0.5, 0.5, -0.5, -0.5, 0.5),
+}
+COLOURS = {
+    "body": (0, 114, 189), "red": (255, 0, 0), "black": (0, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255),
+    "yellow": (255, 255, 0), "magenta": (255, 0, 255),
+}  # fmt: skip
+FRAMES = 90
+"""Frames that are looked at, evenly over a video: a rotor has passed all its angles in them."""
+DOT = 2.0
+"""Pixels by which a dot's middle may be off, mostly where dots overlap."""
+
+
+def frames(path: Path, count: int) -> list[np.ndarray]:
+    """Return `count` frames (rows, columns, 3) of a video, evenly over its time."""
+    with av.open(str(path)) as video:
+        shown = [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
+    return [shown[place] for place in np.linspace(0, len(shown) - 1, count).round().astype(int)]
+
+
+def ticks(dark: np.ndarray, start: tuple, end: tuple, outward: np.ndarray) -> np.ndarray:
+    """Return the places of an axis's ticks (pixels from its start); they stand out of its line along `outward`."""
+    start, along = np.array(start), np.subtract(end, start)
+    steps = np.arange(-2, int(np.hypot(*along)) + 3)
+    line = start + along * steps[:, None] / np.hypot(*along)
+    seen = sum(dark[tuple(np.rint(line + outward * away).astype(int)[:, ::-1].T)] for away in (5, 7, 9)) >= 2
+    runs, count = ndimage.label(seen)
+    return np.array([steps[runs == number].mean() for number in range(1, count + 1)])
+
+
+def axes(frame: np.ndarray, name: str) -> np.ndarray:
+    """Return the projection (4, 2): pixels of the origin, and pixels a metre of x, y and z."""
+    corner, x_end, y_end, top = BOXES[name.split("_")[0]]
+    dark, labels = frame.max(2) < 170, LABELS[name]
+    edges = ((corner, x_end, np.subtract(corner, y_end)), (corner, y_end, np.subtract(corner, x_end)),
+             (y_end, top, np.array((-2, -1))))  # fmt: skip
+    origin, vectors = np.array(corner, float), []
+    for number, (start, end, outward) in enumerate(edges):
+        places = ticks(dark, start, end, outward / np.hypot(*outward))
+        unit = np.subtract(end, start) / np.hypot(*np.subtract(end, start))
+        first, step = labels[2 * number : 2 * number + 2]
+        scale = np.polyfit(np.arange(len(places)), places, 1)
+        vectors.append(unit * scale[0] / step)
+        origin += unit * (scale[1] - scale[0] * first / step)
+    return np.array([origin, *vectors])
+
+
+def dots(frame: np.ndarray, box: str) -> dict[str, tuple[np.ndarray, int]]:
+    """Return of each colour the middles (dots, 2) of its dots inside the axes, in pixels, and its count of pixels."""
+    corner, x_end, y_end, top = map(np.array, BOXES[box])
+    rows, columns = np.nonzero(frame.min(2) < 180)
+    places = np.stack([columns, rows], 1)
+    inside = np.all([_beyond(places, corner, x_end) < -8, _beyond(places, corner, y_end) > 8,
+                     columns > top[0] + 8, columns < x_end[0], rows > 60], axis=0)  # fmt: skip
+    rows, columns = rows[inside], columns[inside]
+    away = ((frame[rows, columns][:, None, :] - np.array(list(COLOURS.values()))) ** 2).sum(2)
+    found = {}
+    for number, colour in enumerate(COLOURS):
+        mask = np.zeros(frame.shape[:2], bool)
+        own = (away.argmin(1) == number) & (away[:, number] < 120**2)
+        mask[rows[own], columns[own]] = True
+        # Lines and the rims of other dots are thinner than a dot.
+        mask = ndimage.binary_opening(mask, np.ones((3, 3)))
+        runs, count = ndimage.label(mask)
+        middles = np.array(ndimage.center_of_mass(mask, runs, range(1, count + 1))).reshape(-1, 2)
+        found[colour] = middles[:, ::-1], int(mask.sum())
+    return found
+
+
+def _beyond(places: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """Pixels by which places (K, 2) lie to the right of the line from start to end, seen along it with y down."""
+    along = (end - start) / np.hypot(*(end - start))
+    return along[0] * (places[:, 1] - start[1]) - along[1] * (places[:, 0] - start[0])
+
+
+def craft(name: str, shown: list[np.ndarray]) -> list[tuple]:
+    """Return the readings of a craft: share that turns, and each rotor's diameter, distance of layers and place."""
+    base = axes(shown[0], name)
+    plan = base[1:3].T
+    seen = [dots(frame, "UAV") for frame in shown]
+    # Shares follow from pixels, since dots of all colours overlap alike.
+    pixels = {colour: np.mean([found[colour][1] for found in seen]) for colour in COLOURS}
+    share = 1 - pixels["body"] / sum(pixels.values())
+    rows, hubs, unit = [(name, "share of points that turn", share, 0.03, "1")], {}, np.sqrt((plan**2).sum(1))
+    for colour in list(COLOURS)[1:]:
+        places = np.concatenate([found[colour][0] for found in seen])
+        if pixels[colour] < 40 or (colour == "magenta" and name.startswith("UAV_10")):
+            continue  # no such rotor, or three pairs in one colour
+        low, high = np.percentile(places, 0.2, axis=0), np.percentile(places, 99.8, axis=0)
+        radius = (high - low)[0] / 2 / unit[0]
+        gap = ((high - low)[1] - 2 * radius * unit[1]) / abs(base[3, 1])
+        hubs[colour] = (low + high) / 2
+        rows.append((name, f"{colour} rotor, diameter", 2 * radius, 2 * DOT / unit[0], "m"))
+        rows.append((name, f"{colour} rotor, layers apart", gap, 2 * DOT * 1.5 / abs(base[3, 1]), "m"))
+    # Hubs of one height differ in x and y alone. Four or six of them stand about their middle.
+    places = np.array(list(hubs.values()))
+    spots = np.linalg.solve(plan, (places - places.mean(0)).T).T
+    for colour, spot in zip(hubs, spots, strict=True):
+        rows += [(name, f"{colour} hub, {axis}", value, 2 * DOT / np.hypot(*plan[:, 0]), "m")
+                 for axis, value in zip("xy", spot, strict=True)]  # fmt: skip
+    rows.append((name, "hub circle, diameter", 2 * circle(spots), 4 * DOT / np.hypot(*plan[:, 0]), "m"))
+    body = np.concatenate([found["body"][0] for found in seen[::30]])
+    rows.append((name, "body, height in the picture", np.ptp(body[:, 1]) / abs(base[3, 1]), np.nan, "m, at most"))
+    return rows
+
+
+def circle(places: np.ndarray) -> float:
+    """Return the radius of the circle through places (K, 2) in the sense of least squares."""
+    solved = np.linalg.lstsq(np.column_stack([2 * places, np.ones(len(places))]), (places**2).sum(1), rcond=None)[0]
+    return float(np.sqrt(solved[2] + solved[0] ** 2 + solved[1] ** 2))
+
+
+def bird(name: str, shown: list[np.ndarray]) -> list[tuple]:
+    """Return the readings of a bird: share of its wings, span from tip to tip, range of the tips, chord at the root."""
+    base = axes(shown[0], name)
+    seen = [dots(frame, "Bird") for frame in shown]
+    pixels = {colour: np.mean([found[colour][1] for found in seen]) for colour in ("body", "red", "black")}
+    body = np.concatenate([found["body"][0] for found in seen]).mean(0)
+    tips, off = [], []
+    for found in seen:
+        ends = []
+        for colour in ("red", "black"):
+            places = found[colour][0]
+            ends.append(places[np.argmax(((places - body) ** 2).sum(1))])
+        apart = ends[0] - ends[1]
+        # Both tips have equal y and z, so they lie apart along e_x alone.
+        x = abs(apart @ base[1]) / (base[1] @ base[1]) / 2
+        off.append(abs(base[1, 0] * apart[1] - base[1, 1] * apart[0]) / np.hypot(*base[1]))
+        y, z = np.linalg.solve(base[2:].T, np.mean(ends, axis=0) - base[0])
+        tips.append((x, y, z))
+    tips, off = np.array(tips), np.array(off)
+    good = tips[off < 12]  # frames in which both tips are the same place of either wing
+    error = 2 * DOT / np.hypot(*base[1])
+    widest = good[np.argsort(good[:, 0])[-5:]]
+    return [
+        (name, "share of points on wings", 1 - pixels["body"] / sum(pixels.values()), 0.03, "1"),
+        (name, "span tip to tip, widest", 2 * np.median(widest[:, 0]), error, "m"),
+        (name, "tip at the widest, z", np.median(widest[:, 2]), error, "m"),
+        (name, "tip highest, z", good[:, 2].max(), error, "m"),
+        (name, "tip highest, x", good[good[:, 2].argmax(), 0], error, "m"),
+        (name, "tip lowest, z", good[:, 2].min(), error, "m"),
+        (name, "tip lowest, x", good[good[:, 2].argmin(), 0], error, "m"),
+        (name, "frames with equal tips", len(good) / len(tips), np.nan, "1"),
+    ]
+
+
+def main(folder: Path, out: Path) -> None:
+    """Read all craft and birds and write the table."""
+    rows = []
+    for name in LABELS:
+        shown = frames(folder / "videos" / f"Target40_{name}.mp4", FRAMES)
+        rows += (craft if name.startswith("UAV") else bird)(name, shown)
+        print(name, file=sys.stderr)
+    with out.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("target", "quantity", "value", "error", "unit"))
+        writer.writerows(
+            (target, what, f"{value:.4g}", f"{error:.2g}", unit) for target, what, value, error, unit in rows
+        )
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))
