@@ -23,14 +23,13 @@ from lowalt.common.files import replacing
 from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.common.streams import stream
 from lowalt.echo import Rigid, echo_signal, refine
-from lowalt.echo.slow_time import pose_series
 from lowalt.measure.echo_baselines import judge
 from lowalt.measure.echo_cost import hardware
 
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48
-PRICES = ((refine.PROBE_COST, pose_series.INTERPOLATION_COST), (-np.inf, 1))
-"""Costs that a cheap plan and interpolation must save: as shipped, and none, so that they are always tried."""
+PRICES = (refine.PROBE_COST, -np.inf)
+"""What a cheap plan must save: as shipped, and nothing, so that it is always tried."""
 NEAR_TIE = 1e-12
 
 
@@ -80,8 +79,7 @@ def examine(seed: int, index: int) -> list[dict]:
         }  # fmt: skip
         try:
             with (
-                patch.object(refine, "PROBE_COST", PRICES[index % 2][0]),
-                patch.object(pose_series, "INTERPOLATION_COST", PRICES[index % 2][1]),
+                patch.object(refine, "PROBE_COST", PRICES[index % 2]),
             ):
                 result = echo_signal(network, station, motion, rcs, aim, tolerance, sample=f"scene {index}")
         except BelowFloor:

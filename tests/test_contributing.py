@@ -105,7 +105,6 @@ from lowalt.common.network import Network
 from lowalt.recognition.augment import augment
 from lowalt.recognition.schemes import columns_in, scheme
 from lowalt.spectra import Spectra, spectrum
-from lowalt.tiles.device import DeviceRenderer
 from lowalt.tiles.render import Renderer, split
 
 for overlays in ([], sys.argv[1:]):
@@ -115,11 +114,10 @@ for overlays in ([], sys.argv[1:]):
     signals = rng.standard_normal((3, 400, 2)).view(np.complex128)[..., 0].astype(np.complex64)
     tile = tiles.tile(signals)
     images = split(tile, len(tiles.spectra))
-    device = DeviceRenderer(tiles).images(signals[None]).numpy()[0]
     row = {"scheme": "BC:VRP+POWER", "stations": "BC", "spectra": "VRP+POWER", "fusion": "mean"}
     row |= {"backbone": "", "protocols": "seen"}
     seen = scheme(row, "here", ["A", "B", "C"])
-    facts = {"spectra": list(tiles.spectra), "shape": tile.shape, "device": bool((device == images).all())}
+    facts = {"spectra": list(tiles.spectra), "shape": tile.shape}
     if "power" in tiles.spectra:
         facts["columns"] = columns_in(seen.columns, list(tiles.spectra), 3, "here")
         blank = dict.fromkeys(("mirror", "shift_doppler", "shift_time", "contrast", "mask_time", "drop_view"), 0.0)
@@ -189,8 +187,8 @@ def test_one_new_file_and_its_schema_entry_add_a_spectrum_that_is_run_documented
     assert listed[line + 1] == "  any textbook, ch. 3"
     before, found = map(json.loads, python("-c", SPECTRUM_TRIAL, "more.yaml").splitlines())
     # The configuration decides: without an entry there, the new file changes nothing.
-    assert before == {"spectra": ["vrp", "trp", "vt"], "shape": [768, 768], "device": True}
-    assert found["spectra"] == ["vrp", "vt", "power"] and found["shape"] == [768, 768] and found["device"]
+    assert before == {"spectra": ["vrp", "trp", "vt"], "shape": [768, 768]}
+    assert found["spectra"] == ["vrp", "vt", "power"] and found["shape"] == [768, 768]
     assert found["columns"] == [3, 5, 6, 8]
     assert found["zeros"] == [0, 128, 0, 128]
     assert found["mean"] < 0.02

@@ -131,14 +131,13 @@ def test_a_proved_lead_is_the_computed_one_less_the_bounds_of_both_cells():
 
 
 def test_the_words_on_a_signal_give_each_number_its_own_place():
-    method = Method(1.5e-4, True, (5, 7, 11), True, 21, 22, 23, (31, 32), 0.125, 2.5, (0.0, 0.0), (41, 42, 43))
+    method = Method(1.5e-4, True, (5, 7, 11), True, 21, 22, 23, 0.125, 2.5, (0.0, 0.0), (41, 42, 43))
     result = EchoResult(np.ones(1), np.ones(1), 51, 6.1e-7, method, np.ones(1), np.ones(1))
     assert method_text(result).splitlines() == [
         "target radius 2.5 m, at most 0.125 of the range",
         "plan for 1.5e-04 of the sum of amplitudes: float32 after the phase, ranges by polynomials, "
         "orders of cosine 5, sine 7, cell kernel 11",
         "symbols: 21 by that plan, 22 by the exact one, 23 by the pointwise kernel",
-        "points interpolated in slow time: 31, from 32 nodes",
         "symbols computed again so that complex64 is rounded correctly: 41",
         "error proved below 6.1e-07 of the largest value; near-ties 51",
     ]

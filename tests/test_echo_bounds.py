@@ -15,26 +15,7 @@ from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
 from lowalt.echo.pointwise import sums as sums_of_points
 from lowalt.echo.pointwise.sums import far_bound
 from lowalt.echo.pointwise.terms import cell_sum
-from lowalt.echo.radar import Exact, constants, radar
-from lowalt.echo.slow_time.node_count import _growth, choose, nodes
-from lowalt.echo.slow_time.pose_series import series_sizes
-from test_echo import network
-
-
-def test_sizes_of_a_series_of_poses_are_those_of_plain_sums():
-    """Two groups of points on two parts; numbers of both signs, so that no sign or entry can be lost."""
-    rng = np.random.default_rng(7)
-    reference, offset = rng.normal(size=(3, 3)), rng.normal(size=(3, 2, 3))
-    turned, left = rng.normal(size=(3, 2, 3, 3)), abs(rng.normal(size=5))
-    rows, centres, radii = np.array([1, 0]), rng.normal(size=(2, 3)), np.array([0.3, 0.7])
-    moves, sizes, stray = series_sizes(reference, offset, turned, left, rows, centres, radii)
-    assert moves == pytest.approx(np.linalg.norm(reference, axis=1), rel=1e-14)
-    places = np.linalg.norm(offset[:, rows] + np.einsum("kgij,gj->kgi", turned[:, rows], centres), axis=2)
-    matrix = turned[:, rows]
-    squared = abs(matrix @ matrix.swapaxes(-1, -2)).sum(axis=-1).max(axis=-1)
-    assert sizes == pytest.approx((places + np.sqrt(squared) * radii).max(axis=1), rel=1e-14)
-    reach = np.linalg.norm(centres, axis=1) + radii
-    assert stray == pytest.approx((left[1 + rows] + left[3 + rows] * reach).max(), rel=1e-14)
+from lowalt.echo.radar import Exact, constants
 
 
 def test_a_sum_that_may_be_off_by_half_its_size_proves_no_strongest_cell(monkeypatch):
@@ -67,16 +48,6 @@ def test_the_bound_of_far_cells_of_one_point_is_the_strongest_of_them(place):
     assert bound == pytest.approx(truth.max(), rel=1e-8, abs=1e-13)
 
 
-def test_the_growth_of_an_amplitude_on_an_ellipse_is_that_of_a_range_along_the_line_of_sight():
-    """A point that moves straight away: its largest range over its smallest, squared, is nearly the bound."""
-    rho, reference = 3.0, np.array([100.0, 4.0])
-    turns = np.exp(1j * np.linspace(0, 2 * np.pi, 9))
-    ranges = abs(reference[0] + reference[1] * 0.5 * (rho * turns + 1 / (rho * turns)))
-    whole, bare, v = _growth(rho, reference, np.zeros(2), 0.0, 0.0, 0.0, 0.0)
-    least = 2 * np.log(ranges.max() / ranges.min())
-    assert least <= bare <= 1.02 * least and whole == bare and v == 0.0
-
-
 @pytest.mark.parametrize("side", ["transmit_h", "receive_h", "transmit_v", "receive_v"])
 def test_an_element_more_on_any_side_adds_the_same_to_the_risk_of_a_direction(side):
     """Roundings of a direction cosine turn the array's phase by pi kappa / 2 an element beyond the first of a side."""
@@ -89,22 +60,10 @@ def test_an_element_more_on_any_side_adds_the_same_to_the_risk_of_a_direction(si
     assert found[0] == share and (found[1] - risk) / unit == pytest.approx(each, rel=1e-12)
 
 
-def test_a_plan_saves_a_part_of_the_exact_one_and_more_where_single_precision_is_enough(monkeypatch):
-    monkeypatch.setattr(refine, "slow_parts", lambda *_: None)
+def test_a_plan_saves_a_part_of_the_exact_one_and_more_where_single_precision_is_enough():
     sample = SimpleNamespace(scene=None, radar=None, lay=SimpleNamespace(amplitude=np.ones(30)), refs=np.ones((20, 7)))
     loose, tight = refine._Sample.saving(sample, 1e-2), refine._Sample.saving(sample, 1e-9)
     assert 0 < tight < loose < 20 * 30
-
-
-def test_smaller_parts_leave_a_smaller_error_of_their_series():
-    """Nothing is left of either series but roundings, which grow with a part's reach."""
-    seen, table = radar(network(), network().stations[0]), cell_polynomials(256, 0.5, 1e-9)
-    found = [
-        nodes(seen, (np.array([100.0, 0.01]), size * np.array([1.0, 1e-3]), 0.0), 0.0, table, 1e-6, 1.0, 60)
-        for size in (1e-3, 1e-2, 0.1)
-    ]
-    phases = [each.phase for each in found]
-    assert 0 < phases[0] <= phases[1] < phases[2] < 1e-9
 
 
 def test_the_norm_of_a_pose_is_bounded_by_the_rows_of_its_square():
@@ -117,33 +76,6 @@ def test_the_norm_of_a_pose_is_bounded_by_the_rows_of_its_square():
 def test_constants_of_a_radar_are_pairs_in_the_order_of_their_rows():
     rows = np.arange(16.0).reshape(8, 2)
     assert constants(rows) == Exact(*map(tuple, rows.tolist()))
-
-
-def test_where_no_degree_in_time_is_enough_none_is_chosen():
-    moves, sizes = np.array([100.0, 0.01, 1e-5]), np.array([0.5, 1e-3, 1e-6])
-    arguments = (moves, sizes, 30.0, 1.0, 0.02, 1.0, 1.0, 8, (1.0, 1.0, 1.0))
-    ellipses = np.array([1.5, 3.0, 8.0])
-    best, error, flat, bent = choose(*arguments, 1e-6, 40, ellipses)
-    assert 4 <= best <= 40 and 0 < error <= 1e-6 and 0 < flat < np.inf and 0 < bent < np.inf
-    assert choose(*arguments, 1e-6, best - 1, ellipses) == (0, np.inf, np.inf, np.inf)
-
-
-@pytest.mark.parametrize(("slack", "wide"), [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0), (3.0, 3.0)])
-def test_a_place_counts_as_a_cell_polynomial_s_whole_width_at_least(slack, wide):
-    """Points that stay at the reference's range have v = 0, so |v| is `slack` alone, and sums of v^2 bend with it."""
-    moves, sizes = np.array([100.0, 0.01, 1e-5]), np.array([0.5, 1e-3, 1e-6])
-    ellipses = np.array([1.5, 3.0, 8.0])
-    *_, flat, bent = choose(moves, sizes, 30.0, 0.0, slack, 1.0, 1.0, 8, (1.0, 1.0, 1.0), 1e-6, 40, ellipses)
-    assert bent == pytest.approx(wide**2 * flat, rel=1e-12)
-
-
-def test_coefficients_of_high_orders_weigh_as_the_powers_of_a_place_beyond_the_polynomials_width():
-    """A bound falls by rho a degree; what stands before it is c_0, c_1 |v| or the others' sum times |v|^7."""
-    rho, moves, sizes, first = 3.0, np.array([100.0, 0.01]), np.array([0.5, 1e-3]), []
-    for kernel in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
-        degree, error, *_ = choose(moves, sizes, 3.0, 0.0, 2.5, 1.0, 1.0, 8, kernel, 1e-6, 40, np.array([rho]))
-        first.append(error * rho**degree)
-    assert first == pytest.approx(first[0] * np.array([1.0, 2.5, 2.5**7]), rel=1e-12)
 
 
 def test_cells_are_added_by_eights_before_all_of_them_are_computed(monkeypatch):

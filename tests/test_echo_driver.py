@@ -5,14 +5,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from driven_echo import MOTION, SMALL, bare, computed, slow_of, truth_of
+from driven_echo import MOTION, bare, computed, truth_of
 from interpreted import interpreted
 from lowalt.echo import refine
 from lowalt.echo.fast import driver
 from lowalt.echo.fast.range_bounds import SPREAD
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN
-from lowalt.echo.fast.workspace import Found, SlowMoments
-from lowalt.echo.pointwise.reference_range import RANGE
+from lowalt.echo.fast.workspace import Found
 from small_echo import NETWORK, pieces, places
 
 
@@ -107,40 +106,6 @@ def test_a_cell_s_number_wraps_and_turns_by_its_own_phase():
     turned = (0.3 - 0.4j) * np.exp(1j * np.pi * 63 * np.array([5, 64 + 5, 7]) / 64)
     np.testing.assert_allclose(found.values, turned, rtol=1e-13)
     assert found.gaps.tolist() == [0.25, 0.25, 0.0]
-
-
-def test_slow_points_count_as_if_they_had_been_summed():
-    """The same target twice over: once as points, once as moments; then every sum is double and so is the value."""
-    once, _, approximation, there = computed(MOTION)
-    moments, sums = slow_of(there, MOTION, approximation.cells.half, approximation.cells.kernels.shape[2])
-    error = SMALL * there.lay.total * np.array([1.0, 2.0])
-    twice, *_ = computed(MOTION, slow=SlowMoments(moments.copy(), sums, error), change=bare())
-    np.testing.assert_allclose(twice.values, 2 * once.values, rtol=1e-10)
-    assert (twice.cells == once.cells).all()
-    np.testing.assert_allclose(twice.totals, 2 * once.totals, rtol=1e-10)
-    np.testing.assert_allclose(twice.bounds, error / there.refs[:, RANGE] ** 2, rtol=1e-6)
-    table, *_ = computed(MOTION, slow=SlowMoments(moments.copy(), sums, 0 * error), change=bare(cells={"error": SMALL}))
-    np.testing.assert_allclose(table.bounds, twice.totals * SMALL, rtol=1e-6)
-
-
-def test_the_second_sum_of_slow_points_grows_as_cauchy_and_schwarz_allow():
-    """|v + a|^2 <= v^2 + 2 |a| |v| + a^2, and the mean of |v| is at most the root of that of v^2."""
-    slow = SlowMoments(np.empty((2, 2, 4)), np.array([[1.0, 1.0], [12.0, 3.0]]), np.array([1.0, 20.0]))
-    for away in (-0.3, 0.5):
-        total, second, error = interpreted(driver.slow_sums)(slow, 1, away, 4.0)
-        assert (total, error) == (3.0, 5.0)
-        # All points at v = 1/2 attain the bound: 3 (1/2 + |a|)^2.
-        assert second == pytest.approx(3 * (0.5 + abs(away)) ** 2, rel=1e-14)
-
-
-def test_moments_shift_and_turn_with_their_reference():
-    rng = np.random.default_rng(4)
-    z, v, away, turned = rng.normal(size=9) + 1j * rng.normal(size=9), rng.uniform(-1, 1, 9), -0.3, 0.2
-    old = z @ v[:, None] ** np.arange(8)
-    found = np.ones((2, 8))
-    interpreted(driver.add_slow)(np.stack([old.real, old.imag]), turned, away, 3.0, found)
-    truth = 3 * np.exp(-2j * np.pi * turned) * z @ (v[:, None] + away) ** np.arange(8)
-    assert abs(found[0] + 1j * found[1] - (1 + 1j) - truth).max() < 1e-13
 
 
 @pytest.mark.parametrize("error", [1e-3, 1e-6])

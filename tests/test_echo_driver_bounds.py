@@ -5,18 +5,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from driven_echo import MOTION, SMALL, bare, computed, slow_of, sums_of, weights
+from driven_echo import MOTION, SMALL, bare, computed, sums_of
 from interpreted import interpreted
 from lowalt.echo import refine
 from lowalt.echo.fast import driver, segment
 from lowalt.echo.fast.error_model import SINGLE_BLOCK
-from lowalt.echo.fast.range_bounds import MEAN, SIZE, SPREAD, cut_segments
+from lowalt.echo.fast.range_bounds import MEAN, SIZE, cut_segments
 from lowalt.echo.fast.strip import STRIP
-from lowalt.echo.fast.workspace import SlowMoments, Symbols, workspace
-from lowalt.echo.pointwise.reference_range import CELL, REST, TURN
-from small_echo import pieces, prepared
-
-MOMENTS_AT = interpreted(driver.moments_at)
+from lowalt.echo.fast.workspace import workspace
+from small_echo import pieces
 
 
 def test_each_kind_of_error_adds_its_own_part_to_the_bound():
@@ -95,66 +92,3 @@ def test_an_error_of_the_gains_counts_relative_to_the_peak_amplitudes():
     np.testing.assert_allclose(found.totals, total + peaks * fits[0], rtol=1e-5)
     assert (abs(found.totals - total) <= 1.01 * peaks * fits[0]).all()
     np.testing.assert_allclose(found.bounds, peaks * fits[0], rtol=1e-6)
-    out, _, sample, approximation, there, _ = at_nodes(
-        lambda given: {"plan": bare()(given)["plan"]._replace(fit=1e-5), "cells": bare()(given)["cells"]}
-    )
-    gains, work, segments = approximation.gains, workspace(approximation, there.lay.amplitude), np.empty((2, 6))
-    cut_segments(sample.extents, gains.rates_h[0], gains.rates_v[0], 1, segments)
-    fits = [
-        interpreted(segment.fit_gains)(row, there.aims, gains, 1e-5, 2.0**-53, approximation.fold, work)[2]
-        for row in segments
-    ]
-    np.testing.assert_allclose(out.errors, there.lay.total / (1 - sample.extents[:, SPREAD]) ** 2 * fits, rtol=1e-5)
-
-
-def at_nodes(change=lambda _: {}, symbols=2):
-    """What `moments_at` fills, its answer, the sample, and the approximation."""
-    motion = pieces(symbols=symbols)
-    there = prepared(motion, weights(28))
-    sample = refine._Sample(there.scene, there.radio, there.refs, there.aims)
-    approximation = sample.approximation(sample.plan(0.0))
-    approximation = approximation._replace(**change(approximation))
-    gains, segments = approximation.gains, np.empty((symbols, 6))
-    count = cut_segments(sample.extents, gains.rates_h[0], gains.rates_v[0], 1, segments)
-    refs = there.refs.copy()
-    refs[:, [TURN, CELL, REST]] = 0.0
-    orders = approximation.cells.kernels.shape[2]
-    out = SlowMoments(np.full((symbols, 2, orders), np.nan), np.full((symbols, 2), np.nan), np.full(symbols, np.nan))
-    fine = MOMENTS_AT(
-        there.scene, there.lay, there.radio, 0, Symbols(np.arange(symbols), refs, sample.extents, segments[:count]),
-        there.aims, approximation, workspace(approximation, there.lay.amplitude), out,
-    )  # fmt: skip
-    return out, fine, sample, approximation, there, motion
-
-
-def test_moments_at_nodes_are_those_of_all_points_about_the_reference():
-    out, fine, _, approximation, there, motion = at_nodes()
-    moments, sums = slow_of(there, motion, approximation.cells.half, approximation.cells.kernels.shape[2])
-    size = there.lay.total
-    assert fine and abs(out.moments - moments).max() < 1e-12 * size
-    np.testing.assert_allclose(out.sums, sums, rtol=1e-11)
-    assert (out.sums >= sums * (1 - 1e-15)).all()
-    assert (out.errors < 1e-11 * size).all()
-
-
-def test_each_kind_of_error_adds_its_own_part_to_the_bound_at_nodes():
-    out, _, sample, approximation, there, _ = at_nodes(bare(cells={"sizes": (0.0, 0.0, 0.0)}))
-    total, second = out.sums.T
-    peaks = there.lay.total / (1 - sample.extents[:, SPREAD]) ** 2
-    assert (out.errors < 1e-12 * total).all()
-    for name, weight in (("share", total), ("peak", peaks), ("phase", np.minimum(
-            total * sample.extents[:, SIZE], peaks * sample.extents[:, MEAN]))):  # fmt: skip
-        more, *_ = at_nodes(bare(plan={name: SMALL}, cells={"sizes": (0.0, 0.0, 0.0)}))
-        np.testing.assert_allclose(more.errors, weight * SMALL, rtol=1e-7, err_msg=name)
-    rounding = interpreted(driver.precision)(approximation.plan, 32, approximation.cells.kernels.shape[2])[2]
-    for sizes, weight in (
-        ((1e8, 0.0, 0.0), total),
-        ((0.0, 1e8, 0.0), np.sqrt(total * second)),
-        ((0.0, 0.0, 1e8), second),
-    ):
-        more, *_ = at_nodes(bare(cells={"sizes": sizes}))
-        np.testing.assert_allclose(more.errors, 1e8 * rounding * weight, rtol=1e-6)
-
-
-def test_nodes_whose_gains_turn_too_fast_are_refused():
-    assert at_nodes(lambda given: {"plan": given.plan._replace(fit=1e-300)})[1] is False

@@ -9,12 +9,11 @@ from interpreted import interpreted
 from lowalt.echo import refine
 from lowalt.echo.fast import driver
 from lowalt.echo.fast.range_bounds import SPREAD
-from lowalt.echo.fast.workspace import Found, SlowMoments
-from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN
+from lowalt.echo.fast.workspace import Found
+from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST
 from small_echo import NETWORK, TAU, dirichlet, pieces, places, prepared, seen
 
 RUN = interpreted(driver.run)
-NONE = SlowMoments(np.empty((0, 2, 1)), np.empty((0, 2)), np.empty(0))
 
 
 def weights(count, seed=5):
@@ -26,7 +25,7 @@ def computed(motion, error=0.0, **given):
     """Return the kernel's results for a motion, the sample, the approximation and what `prepared` gives.
 
     error: for which a plan is made; given: `net`; `change`: a function from the approximation to its changed fields;
-    `final` and `slow` of the kernel; `extents`: columns set to a number or to numbers of symbols; `symbols`: which.
+    `final` of the kernel; `extents`: columns set to a number or to numbers of symbols; `symbols`: which.
     """
     there = prepared(motion, weights(places(motion).shape[1]), given.get("net", NETWORK))
     sample = refine._Sample(there.scene, there.radio, there.refs, there.aims)
@@ -39,7 +38,7 @@ def computed(motion, error=0.0, **given):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(refine, "driver", SimpleNamespace(run=RUN))
         symbols = given.get("symbols", np.arange(len(there.refs)))
-        sample.compute(symbols, approximation.plan, given.get("final", True), found, slow=given.get("slow", NONE))
+        sample.compute(symbols, approximation.plan, given.get("final", True), found)
     return found, sample, approximation, there
 
 
@@ -90,14 +89,3 @@ def sums_of(motion):
 MOTION = pieces(symbols=2)
 SMALL = 1e-4
 """An error that is far above all roundings, and whose square is far below it."""
-
-
-def slow_of(there, motion, half, orders):
-    """Moments of all points about the reference's range, without its phase, times r^2, and their sums; by long sums."""
-    z, cells = amplitudes(there, motion)
-    square = there.refs[:, RANGE] ** 2
-    v = (cells - there.refs[:, [CELL]] - there.refs[:, [REST]]) / half
-    plain = z * np.exp(1j * TAU * there.refs[:, [TURN]]) * square[:, None]
-    moments = (plain[:, None, :] * v[:, None, :] ** np.arange(orders)[:, None]).sum(-1)
-    sums = np.stack([abs(plain).sum(1), (abs(plain) * v**2).sum(1)], axis=1)
-    return np.stack([moments.real, moments.imag], axis=1).astype(float), sums.astype(float)

@@ -36,8 +36,7 @@ class EchoResult(NamedTuple):
     bound of the error relative to max |signal|, inf where nothing can be said; method: how it was computed, and why;
     gap: (N,) float64, certified lower bound of |Y| at the strongest cell less |Y| at any other, 0 where none is known;
     totals: (N,) float64, sum of all points' and paths' |amplitudes|, array gains included. With a tolerance it is an
-    upper bound, too large by at most the tolerance times the largest, or by more where points were interpolated in
-    slow time.
+    upper bound, too large by at most the tolerance times the largest.
     """
 
     signal: np.ndarray
@@ -123,7 +122,6 @@ def method_text(result: EchoResult) -> str:
         f"sine {method.orders[1]}, cell kernel {method.orders[2]}",
         f"symbols: {method.cheap} by that plan, {method.exact} by the exact one, "
         f"{method.general} by the pointwise kernel",
-        f"points interpolated in slow time: {method.slow[0]}, from {method.slow[1]} nodes",
         f"symbols computed again so that complex64 is rounded correctly: {method.again[0]}",
         f"error proved below {result.bound:.1e} of the largest value; near-ties {result.near_ties}",
     ])  # fmt: skip

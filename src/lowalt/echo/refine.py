@@ -23,8 +23,6 @@ from lowalt.echo.fast.workspace import Approximation, Found, Symbols, workspace
 from lowalt.echo.pointwise.reference_range import RANGE
 from lowalt.echo.radar import Radar
 from lowalt.echo.scene import EchoScene
-from lowalt.echo.slow_time import pose_series
-from lowalt.echo.slow_time.interpolation import NO_SLOW_POINTS, SlowParts, interpolated, slow_parts, subset
 
 LONGEST = 100
 """Most symbols of a segment."""
@@ -41,11 +39,10 @@ class Method(NamedTuple):
 
     error: the error that the cheap plan had to keep, relative to the sum of amplitudes (None: exact mode only); single:
     float32 after the phase; orders: polynomial orders of cosine, sine and the cell kernel; near: ranges by polynomials,
-    not roots; cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; slow:
-    points interpolated in time, from how many nodes in all; spread: largest target radius over range; size_m: largest
-    radius (m); pointwise_bound: error bound of the pointwise kernel relative to its sums of amplitudes and of risks;
-    again: symbols computed again so that complex64 is rounded correctly, how many of them in double-double throughout,
-    and how many that leaves open.
+    not roots; cheap, exact, general: symbols by the cheap plan, by the exact plan and by the pointwise kernel; spread:
+    largest target radius over range; size_m: largest radius (m); pointwise_bound: error bound of the pointwise kernel
+    relative to its sums of amplitudes and of risks; again: symbols computed again so that complex64 is rounded
+    correctly, how many of them in double-double throughout, and how many that leaves open.
     """
 
     error: float | None
@@ -55,7 +52,6 @@ class Method(NamedTuple):
     cheap: int
     exact: int
     general: int
-    slow: tuple[int, int]
     spread: float
     size_m: float
     pointwise_bound: tuple[float, float]
@@ -84,8 +80,8 @@ def compute(
         error = 0.5 * tolerance * share
         chosen = sample.plan(error)
         shorter = chosen.functions.cosine.size < exact.functions.cosine.size
-        if (shorter or sample.slow_parts) and sample.cells(chosen) is not None:
-            sample.compute_all(chosen, error / 4, found)
+        if shorter and sample.cells(chosen) is not None:
+            sample.compute(symbols, chosen, False, found)
             good = (found.state == CERTAIN) & (found.bounds <= tolerance * _least_largest(found))
             cheap = int(good.sum())
             symbols = np.flatnonzero(~good)
@@ -112,8 +108,6 @@ class _Sample:
         self.lay = layout(scene, self.peak)
         self.extents = np.empty((len(refs), 5))
         self.first = int(scene.part[0]) if len(scene.part) else 0
-        self.slow_parts: SlowParts | None = None
-        self.slow, self.nodes = 0, 0
         self.spread = fill_extents(scene, self.first, self.lay, refs, radar, self.extents)
         self.size_m = float(self.extents[:, SIZE].max())
 
@@ -126,49 +120,16 @@ class _Sample:
         return self.lay.total / (self.refs[symbols, RANGE] * (1 - self.extents[symbols, SPREAD])) ** 2
 
     def saving(self, tolerance: float) -> float:
-        """Return the cost that a tolerance may save, in points x symbols of the exact plan; finds the slow parts."""
-        self.slow_parts = slow_parts(self.scene, self.radar, self.lay)
-        symbols = len(self.refs)
-        saved = (SAVED_SINGLE if 0.5 * tolerance > SINGLE_ERROR else SAVED) * symbols * len(self.lay.amplitude)
-        if self.slow_parts is None:
-            return saved
-        return saved + (np.count_nonzero(self.slow_parts.mask) * symbols - pose_series.INTERPOLATION_COST)
-
-    def compute_all(self, chosen: EchoPlan, allowed: float, found: Found) -> None:
-        """Compute all symbols into `found`, slow parts by interpolation where their error stays below `allowed`,
-        relative to the sum of peak amplitudes."""
-        slow, symbols = self.slow_parts, np.arange(len(self.refs))
-        if slow is None:
-            self.compute(symbols, chosen, False, found)
-            return
-        quick = subset(self.scene, ~slow.mask)
-        rest = quick, layout(quick, self.peak)
-        exact = self.approximation(self.plan(0.0))._replace(cells=self._kernels(chosen))
-        for block in np.array_split(symbols, -(-len(symbols) // pose_series.BLOCK)):
-            part = slice(block[0], block[-1] + 1)
-            there = self.scene._replace(rotation=self.scene.rotation[part], translation=self.scene.translation[part])
-            carried = interpolated(
-                there, self.radar, self.refs[part], self.aims, slow, exact, (self.spread, self.size_m), allowed,
-                self.peak,
-            )  # fmt: skip
-            if carried is None:
-                self.compute(block, chosen, False, found)
-            else:
-                self.slow, self.nodes = int(slow.mask.sum()), self.nodes + carried[1]
-                self.compute(block, chosen, False, found, rest, carried[0])
+        """Return the cost that a tolerance may save, in points x symbols of the exact plan."""
+        share = SAVED_SINGLE if 0.5 * tolerance > SINGLE_ERROR else SAVED
+        return share * len(self.refs) * len(self.lay.amplitude)
 
     def approximation(self, chosen: EchoPlan) -> Approximation:
         """Return everything that replaces a function in the chosen plan."""
         return Approximation(chosen, array_gains(self.radar), self._kernels(chosen), folding())
 
-    def compute(
-        self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found, points=None, slow=NO_SLOW_POINTS
-    ) -> None:  # fmt: skip
-        """Compute `symbols` into `found` by the plan chosen; `final`: leads that are not proved are accepted.
-
-        points: (scene, layout) of the points to compute (None: all); slow: the others' share at these symbols.
-        """
-        scene, lay = points or (self.scene, self.lay)
+    def compute(self, symbols: np.ndarray, chosen: EchoPlan, final: bool, found: Found) -> None:
+        """Compute `symbols` into `found` by the plan chosen; `final`: leads that are not proved are accepted."""
         refs, extents = self.refs, self.extents
         if len(symbols) < len(refs):
             refs, extents = refs[symbols], extents[symbols]
@@ -177,8 +138,8 @@ class _Sample:
         segments = np.empty((len(symbols), 6))
         count = cut_segments(extents, gains.rates_h[0], gains.rates_v[0], LONGEST, segments)
         driver.run(
-            scene, lay, self.radar, self.first, Symbols(symbols, refs, extents, segments[:count]), self.aims,
-            approximation, final, slow, workspace(approximation, lay.amplitude), found,
+            self.scene, self.lay, self.radar, self.first, Symbols(symbols, refs, extents, segments[:count]), self.aims,
+            approximation, final, workspace(approximation, self.lay.amplitude), found,
         )  # fmt: skip
 
     def cells(self, chosen: EchoPlan) -> CellPolynomials | None:
@@ -199,6 +160,6 @@ class _Sample:
             len(functions.cosine) - 1, len(functions.sine) - 1, cells.kernels.shape[2] - 1 if cells else 0,
         )  # fmt: skip
         return Method(
-            error, chosen.single, orders, chosen.near, cheap, exact, general, (self.slow, self.nodes), self.spread,
-            self.size_m, bound,
+            error, chosen.single, orders, chosen.near, cheap, exact, general, self.spread, self.size_m,
+            bound,
         )  # fmt: skip

@@ -1,6 +1,6 @@
 """The motions that the echo takes, and their checks: rigid parts with their poses, or plain positions.
 
-Rigid parts are the better form: no array of symbols x points ever exists, and slow parts can be interpolated in time.
+Rigid parts are the better form: no array of symbols x points ever exists.
 """
 
 import math

@@ -1,7 +1,5 @@
 """Short-time Fourier spectra: the functions that VRP and TRP share. They differ in their settings only."""
 
-from typing import Any
-
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
@@ -64,27 +62,3 @@ def fill_known(
     starts = out.shape[1]
     sums = line_sums(signal, times, np.fft.fftfreq(settings.points), settings.window, starts)
     out[:] = np.abs(sums) * (settings.window * shares(signal, settings.window, starts))
-
-
-def on_device(re: Any, im: Any, settings: Fourier, tables: list, starts: int) -> Any:
-    """Return the values of `fill` for tensors (B, stations, symbols): (B, stations, points, starts), the same bits.
-
-    tables: tensors (stations, points) of cosines and sines.
-    """
-    import torch
-
-    cosine, sine = tables
-    re, im = re.unsqueeze(-2), im.unsqueeze(-2)
-    stride, rows = settings.window // 2, settings.points // settings.window
-    while stride:
-        count = starts + stride - 1
-        which = torch.arange(rows, device=re.device) * stride % settings.points
-        c, s = cosine[:, which, None], sine[:, which, None]
-        far_re, far_im = re[..., stride : stride + count], im[..., stride : stride + count]
-        b_re, b_im = far_re * c - far_im * s, far_re * s + far_im * c
-        a_re, a_im = re[..., :count], im[..., :count]
-        re = torch.cat([a_re + b_re, a_re - b_re], dim=-2)
-        im = torch.cat([a_im + b_im, a_im - b_im], dim=-2)
-        stride, rows = stride // 2, 2 * rows
-    # torch's float32 square root is not correctly rounded on every processor (AVX2); a double's, rounded once, is.
-    return torch.sqrt((re * re + im * im).double()).float()

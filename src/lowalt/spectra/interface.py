@@ -74,12 +74,3 @@ class OfProfiles(Protocol):
     def fill_profile(self, profile: np.ndarray, settings: Any, out: np.ndarray) -> None:
         """Fill out (rows, starts) as `fill`, of magnitudes (cells, symbols) float32 of one profile, at most 1."""
         ...
-
-
-@runtime_checkable
-class OnDevice(Protocol):
-    """A spectrum that PyTorch can compute too; the others are computed on the processor."""
-
-    def on_device(self, re: Any, im: Any, settings: Any, tables: list, starts: int) -> Any:
-        """Return `fill` of tensors (B, stations, symbols): (B, stations, rows, starts); tables are (stations, ...)."""
-        ...

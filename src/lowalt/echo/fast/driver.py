@@ -16,7 +16,7 @@ from lowalt.echo.fast.range_bounds import END, MEAN, SIZE, SPREAD, START
 from lowalt.echo.fast.segment import constants, fill_offsets, fit_gains
 from lowalt.echo.fast.strip import STRIP, strip_size
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN, certify
-from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST, TURN
+from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST
 from lowalt.echo.pointwise.terms import cell_phase
 
 
@@ -97,12 +97,11 @@ def precision(plan, padded, orders):
 
 
 @LEAN
-def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, found):
+def run(scene, lay, radar, q, symbols, aims, approximation, final, work, found):
     """Compute the symbols into `found`.
 
-    q: part (or point, without rotations) whose translation is the reference; symbols, approximation, slow, work,
-    found: the bundles of `workspace`, slow being rows of `symbols` or empty; final: a lead that is not proved is
-    accepted, because no finer plan exists.
+    q: part (or point, without rotations) whose translation is the reference; symbols, approximation, work,
+    found: the bundles of `workspace`; final: a lead that is not proved is accepted, because no finer plan exists.
     """
     plan, table = approximation.plan, approximation.cells
     orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
@@ -141,11 +140,6 @@ def run(scene, lay, radar, q, symbols, aims, approximation, final, slow, work, f
             summed = rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
             bound = total * (plan.share + table.error) + summed + peaks * (plan.peak + gains)
             bound += plan.phase * min(total * extents[i, SIZE], peaks * extents[i, MEAN])
-            if len(slow.moments):
-                away = (refs[i, REST] - centre) / half
-                add_slow(slow.moments[i], refs[i, TURN], away, 1.0 / (r * r), moments)
-                more, more_second, error = slow_sums(slow, i, away, r * r)
-                total, second, bound = total + more, second + more_second, bound + (error + more * table.error)
             found.totals[n], found.bounds[n] = total, bound
             state, row, tie, lead = certify(
                 table, place, centre, moments, extents[i, SIZE] * radar.cells, (total, second),
@@ -168,72 +162,3 @@ def keep(found, n, cell, value, subcarriers, tie, lead):
     """
     found.values[n] = complex(value[0], value[1]) * cell_phase(cell, subcarriers)
     found.cells[n], found.ties[n], found.gaps[n] = cell % subcarriers, tie, max(lead, 0.0)
-
-
-@INLINED
-def slow_sums(slow, i, away, square):
-    """Return a symbol's interpolated sums of |z| and of |z| (v + away)^2, and the error of its moments, all over r^2.
-
-    square: r^2 (m2). The second sum is a bound, by Cauchy and Schwarz.
-    """
-    total, second = slow.sums[i, 0] / square, slow.sums[i, 1] / square
-    moved = abs(away) * (2.0 * math.sqrt(total * second) + abs(away) * total)
-    return total, second + moved, slow.errors[i] / square
-
-
-@INLINED
-def add_slow(slow, turn, away, scale, moments):
-    """Add a symbol's interpolated moments slow (2, orders), turned by the reference's phase and shifted by `away`.
-
-    Sums of z (v + a)^k are binomial sums of those of z v^k, here by differences as in Pascal's triangle. slow is
-    overwritten.
-    """
-    orders = slow.shape[1]
-    for low in range(1, orders):
-        for order in range(orders - 1, low - 1, -1):
-            slow[0, order] += away * slow[0, order - 1]
-            slow[1, order] += away * slow[1, order - 1]
-    c, s = scale * math.cos(2.0 * math.pi * turn), -scale * math.sin(2.0 * math.pi * turn)
-    for order in range(orders):
-        re, im = slow[0, order], slow[1, order]
-        moments[0, order] += c * re - s * im
-        moments[1, order] += c * im + s * re
-
-
-@LEAN
-def moments_at(scene, lay, radar, q, symbols, aims, approximation, work, out):
-    """Fill `out` (`SlowMoments`) with the moments of all points at every symbol, about the reference's range.
-
-    Arguments as `run`, except that columns TURN, CELL and REST of the reference ranges are zero. out.sums: sums of |z|
-    and of |z| v^2; out.errors: bounds of the moments' errors as the cell kernels weight them.
-    Returns False where the gains need polynomials that are too long.
-    """
-    plan, table = approximation.plan, approximation.cells
-    orders, half, sizes = table.kernels.shape[2], table.half, table.sizes
-    padded = len(work.share)
-    unit, block, rounding = precision(plan, padded, orders)
-    length = strip_size(padded)
-    for index in range(len(symbols.segments)):
-        segment = symbols.segments[index]
-        degree_h, degree_v, gains = fit_gains(
-            segment, aims, approximation.gains, plan.fit, unit, approximation.fold, work
-        )
-        if degree_h < 0 or degree_v < 0:
-            return False
-        for i in range(int(segment[START]), int(segment[END])):
-            geometry, placing = constants(radar, symbols.refs[i], segment, aims, 0.0, half)
-            total, second = sum_points(
-                scene, lay, radar, q, i, symbols.refs[i, RANGE], geometry, placing, (degree_h, degree_v), plan, block,
-                work,
-            )  # fmt: skip
-            for order in range(orders):
-                out.moments[i, 0, order] = work.moments[0, order] * lay.total
-                out.moments[i, 1, order] = work.moments[1, order] * lay.total
-            total *= lay.total * (1.0 + unit * (length + 20))
-            second *= lay.total * (1.0 + unit * (length + 24))
-            out.sums[i, 0], out.sums[i, 1] = total, second
-            peaks = lay.total / (1.0 - symbols.extents[i, SPREAD]) ** 2
-            out.errors[i] = total * plan.share + peaks * (plan.peak + gains)
-            out.errors[i] += plan.phase * min(total * symbols.extents[i, SIZE], peaks * symbols.extents[i, MEAN])
-            out.errors[i] += rounding * (sizes[0] * total + sizes[1] * math.sqrt(total * second) + sizes[2] * second)
-    return True

@@ -33,15 +33,6 @@ class Symbols(NamedTuple):
     segments: np.ndarray
 
 
-class SlowMoments(NamedTuple):
-    """The share of slow points at each of B symbols, times r^2 and without the reference's phase: moments about the
-    reference's range (B, 2, orders), bounds of the sums of |z| and |z| v^2 (B, 2), bounds of the error (B,)."""
-
-    moments: np.ndarray
-    sums: np.ndarray
-    errors: np.ndarray
-
-
 class Found(NamedTuple):
     """The results of every symbol, each (N,): the strongest cell's value and index; `strongest_cell`'s state; sum of
     |amplitudes|; bound of the value's error; whether there is a near-tie; certified lead over every other cell."""

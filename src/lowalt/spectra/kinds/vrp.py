@@ -7,7 +7,6 @@ from lowalt.spectra.fourier import (  # noqa: F401
     definition,
     fill,
     fill_known,
-    on_device,
     rows,
     speeds,
     tables,

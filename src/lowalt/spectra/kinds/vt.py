@@ -1,7 +1,5 @@
 """VT: the velocity-transfer spectrum, the difference of two filters matched to each speed."""
 
-from typing import Any
-
 import numpy as np
 
 from lowalt.common.network import SPEED_OF_LIGHT
@@ -74,21 +72,3 @@ def fill_known(
         for count in (length, length + 1)
     )
     out[:] = longer**2 - short**2
-
-
-def on_device(re: Any, im: Any, settings: Transfer, tables: list, starts: int) -> Any:
-    """Return the values of `fill` for tensors (B, stations, symbols): (B, stations, speeds, starts), the same bits.
-
-    tables: tensors (stations, ...) of `tables` of every station.
-    """
-    cosine, sine, share = tables
-    re, im = re.unsqueeze(-2), im.unsqueeze(-2)
-    x = re[..., :starts].expand(-1, -1, cosine.shape[1], -1)
-    y = im[..., :starts].expand_as(x)
-    for step in range(1, settings.window + 1):
-        c, s = cosine[..., step, None], sine[..., step, None]
-        near, far = re[..., step : step + starts], im[..., step : step + starts]
-        ahead_x, ahead_y = x + (near * c - far * s), y + (near * s + far * c)
-        if step < settings.window:
-            x, y = ahead_x, ahead_y
-    return (ahead_x * ahead_x + ahead_y * ahead_y) * share[..., None] - (x * x + y * y)
