@@ -10,7 +10,10 @@ import csv
 import sys
 from pathlib import Path
 
-import av
+try:
+    import av
+except ModuleNotFoundError:  # pairs.py reads pictures alone
+    av = None
 import numpy as np
 from scipy import ndimage
 
@@ -55,8 +58,10 @@ DOT = 2.0
 def frames(path: Path, count: int) -> list[np.ndarray]:
     """Return `count` frames (rows, columns, 3) of a video, evenly over its time."""
     with av.open(str(path)) as video:
-        shown = [frame.to_ndarray(format="rgb24").astype(int) for frame in video.decode(video=0)]
-    return [shown[place] for place in np.linspace(0, len(shown) - 1, count).round().astype(int)]
+        total = video.streams.video[0].frames
+        wanted = set(np.linspace(0, total - 1, count).round().astype(int).tolist())
+        shown = enumerate(video.decode(video=0))
+        return [frame.to_ndarray(format="rgb24") for place, frame in shown if place in wanted]
 
 
 def ticks(dark: np.ndarray, start: tuple, end: tuple, outward: np.ndarray) -> np.ndarray:
@@ -94,7 +99,7 @@ def dots(frame: np.ndarray, box: str) -> dict[str, tuple[np.ndarray, int]]:
     inside = np.all([_beyond(places, corner, x_end) < -8, _beyond(places, corner, y_end) > 8,
                      columns > top[0] + 8, columns < x_end[0], rows > 60], axis=0)  # fmt: skip
     rows, columns = rows[inside], columns[inside]
-    away = ((frame[rows, columns][:, None, :] - np.array(list(COLOURS.values()))) ** 2).sum(2)
+    away = ((frame[rows, columns].astype(int)[:, None, :] - np.array(list(COLOURS.values()))) ** 2).sum(2)
     found = {}
     for number, colour in enumerate(COLOURS):
         mask = np.zeros(frame.shape[:2], bool)
@@ -156,21 +161,18 @@ def bird(name: str, shown: list[np.ndarray]) -> list[tuple]:
     base = axes(shown[0], name)
     seen = [dots(frame, "Bird") for frame in shown]
     pixels = {colour: np.mean([found[colour][1] for found in seen]) for colour in ("body", "red", "black")}
-    body = np.concatenate([found["body"][0] for found in seen]).mean(0)
-    tips, off = [], []
+    unit, tips = base[1] / np.hypot(*base[1]), []
     for found in seen:
-        ends = []
-        for colour in ("red", "black"):
-            places = found[colour][0]
-            ends.append(places[np.argmax(((places - body) ** 2).sum(1))])
-        apart = ends[0] - ends[1]
-        # Both tips have equal y and z, so they lie apart along e_x alone.
-        x = abs(apart @ base[1]) / (base[1] @ base[1]) / 2
-        off.append(abs(base[1, 0] * apart[1] - base[1, 1] * apart[0]) / np.hypot(*base[1]))
-        y, z = np.linalg.solve(base[2:].T, np.mean(ends, axis=0) - base[0])
-        tips.append((x, y, z))
-    tips, off = np.array(tips), np.array(off)
-    good = tips[off < 12]  # frames in which both tips are the same place of either wing
+        left, right = found["red"][0][:, None], found["black"][0][None]
+        apart = right - left
+        # Mirror images have equal y and z, so they lie apart along e_x alone. The tips are the farthest such pair.
+        off = abs(unit[0] * apart[..., 1] - unit[1] * apart[..., 0])
+        along = np.where(off < 2 * DOT, abs(apart @ unit), 0)
+        tip = np.unravel_index(along.argmax(), along.shape)
+        x = along[tip] / np.hypot(*base[1]) / 2
+        middle = (left[tip[0], 0] + right[0, tip[1]]) / 2
+        tips.append((x, *np.linalg.solve(base[2:].T, middle - base[0])))
+    good = np.array(tips)
     error = 2 * DOT / np.hypot(*base[1])
     widest = good[np.argsort(good[:, 0])[-5:]]
     return [
@@ -181,23 +183,19 @@ def bird(name: str, shown: list[np.ndarray]) -> list[tuple]:
         (name, "tip highest, x", good[good[:, 2].argmax(), 0], error, "m"),
         (name, "tip lowest, z", good[:, 2].min(), error, "m"),
         (name, "tip lowest, x", good[good[:, 2].argmin(), 0], error, "m"),
-        (name, "frames with equal tips", len(good) / len(tips), np.nan, "1"),
     ]
 
 
 def main(folder: Path, out: Path) -> None:
     """Read all craft and birds and write the table."""
-    rows = []
-    for name in LABELS:
-        shown = frames(folder / "videos" / f"Target40_{name}.mp4", FRAMES)
-        rows += (craft if name.startswith("UAV") else bird)(name, shown)
-        print(name, file=sys.stderr)
     with out.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("target", "quantity", "value", "error", "unit"))
-        writer.writerows(
-            (target, what, f"{value:.4g}", f"{error:.2g}", unit) for target, what, value, error, unit in rows
-        )
+        for name in LABELS:
+            shown = frames(folder / "videos" / f"Target40_{name}.mp4", FRAMES)
+            for target, what, value, error, unit in (craft if name.startswith("UAV") else bird)(name, shown):
+                writer.writerow((target, what, f"{value:.4g}", f"{error:.2g}", unit))
+            print(name, file=sys.stderr)
 
 
 if __name__ == "__main__":

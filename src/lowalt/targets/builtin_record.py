@@ -75,6 +75,8 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
         raise InputError(f"{where}: moving_share is {share!r}, expected a number between 0 and 1")
     _check_flap(extra.get("flap", {}), where)
     wanted, figures = layouts[extra["model"]], extra.get("figures", {})
+    if extra["size_is"] == "body diagonal":
+        wanted = wanted | {"motor_diagonal": "length"}
     wrong = sorted(set(wanted) ^ set(figures))
     if wrong:
         raise InputError(f"{where}: figures {wrong} missing or unknown, expected exactly {sorted(wanted)}")

@@ -9,11 +9,12 @@ import numpy as np
 from lowalt.common import portable
 from lowalt.targets import aircraft
 from lowalt.targets.assemble import Part
-from lowalt.targets.surfaces import box, hull, ring, tube
+from lowalt.targets.surfaces import box, cylinder, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
-DIAGONALS = ("motor diagonal", "span over ducts", "span over rotors")
-"""Meanings of a multirotor's published size: the largest distance between motor axes, or across ducts or blade tips."""
+DIAGONALS = ("motor diagonal", "body diagonal", "span over ducts", "span over rotors")
+"""Meanings of a multirotor's published size: the largest distance between motor axes, a length that does not tell it (the
+figure `motor_diagonal` does), or the distance across ducts or blade tips."""
 SIZES = (*DIAGONALS, *dict.fromkeys(aircraft.SIZES.values()))
 """Meanings of the published size of all craft."""
 
@@ -23,16 +24,20 @@ _COMMON = {
     "motor_diameter": "length", "motor_height": "length", "arm_diameter": "length", "leg_height": "length",
 }  # fmt: skip
 _QUAD = _COMMON | {"spacing_ratio": "ratio"}
+_ROUND = _COMMON | {"hub_turn": "offset"}
+_LAYERS = {"layer_gap": "length", "layer_turn": "offset"}
 FIGURES = {
     "folding": _QUAD | {"camera_diameter": "length"},
     "ducted": _QUAD | {"motor_diagonal": "length", "duct_height": "length", "camera_diameter": "length"},
     "raised": _QUAD | {"camera_diameter": "length", "frame_rise": "length"},
-    "radial": _COMMON | {"camera_diameter": "length", "battery_length": "length"},
-    "cabin": _COMMON | {"coaxial_gap": "length"},
-    "tanker": _QUAD | {"tank_diameter": "length", "tank_length": "length", "lance_length": "length"},
+    "radial": _ROUND | {"camera_diameter": "length", "battery_length": "length"},
+    "cabin": _ROUND | _LAYERS,
+    "tanker": _QUAD | _LAYERS | {"tank_diameter": "length", "tank_length": "length", "lance_length": "length"},
     **aircraft.FIGURES,
 }
-"""The figures each layout needs and what each is: a length (m), a count or a ratio."""
+"""The figures each layout needs and what each is: a length (m), a count or a ratio. `hub_turn` is how far the first hub
+stands from the front, in parts of the angle between hubs. A rotor of two layers has equal blades `layer_gap` apart, the
+lower ones turned by `layer_turn` of a whole turn."""
 
 MOVING_SHARE = 0.4
 
@@ -46,19 +51,20 @@ def fault(record: dict) -> str | None:
         return f"size_is is {record['size_is']!r}, expected one of {DIAGONALS} with model {record['model']}"
     if record["size_is"] == "span over ducts" and record["model"] != "ducted":
         return f"size_is is 'span over ducts', expected model ducted, not {record['model']}"
-    if motor_diagonal(record) <= 0 or record["published"]["size_m"] < motor_diagonal(record):
+    told = record["size_is"] != "body diagonal"
+    if motor_diagonal(record) <= 0 or (told and record["published"]["size_m"] < motor_diagonal(record)):
         return f"motor diagonal is {motor_diagonal(record):.4g} m in a craft of {record['published']['size_m']} m"
-    places = hubs(record, figures.get("spacing_ratio"))
+    places = hubs(record, figures)
     count = record["published"]["n_rotors_or_wings"]
     if len(places) != count:
         return f"model is {record['model']}, which has {len(places)} rotors, expected one of {count}"
-    if record.get("coaxial") and record["model"] != "cabin":
-        return f"coaxial is True, expected it with model cabin only, not {record['model']}"
+    if record.get("coaxial") and "layer_gap" not in figures:
+        return f"coaxial is True, expected it with model cabin or tanker only, not {record['model']}"
     gap = portable.norm(places - np.roll(places, 1, 0)).min()
     diameter = figures["propeller_diameter"]
     if diameter >= gap:
         return f"figures.propeller_diameter is {diameter:.4g} m, expected less than the {gap:.4g} m between motors"
-    blades = int(figures["blade_count"]) * len(places) * (2 if record.get("coaxial") else 1)
+    blades = int(figures["blade_count"]) * len(places) * (2 if "layer_gap" in figures else 1)
     if record["points"] <= blades:
         return f"points is {record['points']}, expected more than one for each of {blades} blades"
     return None
@@ -66,7 +72,7 @@ def fault(record: dict) -> str | None:
 
 def folding(record: dict, f: dict) -> list[Part]:
     """Return a folding camera quadrotor: fuselage, swung-out arms, front legs, nose gimbal."""
-    places, top = hubs(record, f["spacing_ratio"]), 0.5 * f["body_height"]
+    places, top = hubs(record, f), 0.5 * f["body_height"]
     shells = [fuselage(f), *motors(places, top, f), *camera(f, 0.44 * f["body_length"], -0.42 * f["body_height"])]
     arm = f["arm_diameter"] / 2
     for x, y in places:
@@ -82,7 +88,7 @@ def folding(record: dict, f: dict) -> list[Part]:
 
 def ducted(record: dict, f: dict) -> list[Part]:
     """Return a ducted quadrotor: four rings around the propellers, a narrow pod, a battery and a nose camera."""
-    places = hubs(record, f["spacing_ratio"])
+    places = hubs(record, f)
     outer = (record["published"]["size_m"] - motor_diagonal(record)) / 2
     inner, half = f["propeller_diameter"] / 2 * 1.04, f["duct_height"] / 2
     middle, wall = (inner + outer) / 2, (outer - inner) / 2
@@ -107,7 +113,7 @@ def ducted(record: dict, f: dict) -> list[Part]:
 
 def raised(record: dict, f: dict) -> list[Part]:
     """Return an H-frame craft in flight: side booms raised above the pod, cross tubes, a big gimbal below the nose."""
-    places = hubs(record, f["spacing_ratio"])
+    places = hubs(record, f)
     boom, arm = f["frame_rise"], f["arm_diameter"] / 2
     reach_x, reach_y = abs(places).max(0)
     shells = [fuselage(f, 0.7), *motors(places, boom + arm + f["motor_height"], f)]
@@ -127,7 +133,7 @@ def raised(record: dict, f: dict) -> list[Part]:
 
 def radial(record: dict, f: dict) -> list[Part]:
     """Return a radial multirotor: a round centre with a ring of batteries, straight arms, two skids and a gimbal."""
-    places, arm = hubs(record, None), f["arm_diameter"] / 2
+    places, arm = hubs(record, f), f["arm_diameter"] / 2
     centre = hull([(y * f["body_length"], w * f["body_width"] / 2, -h * f["body_height"], h * f["body_height"])
                    for y, w, h in ((0.5, 0.25, 0.3), (0.42, 0.6, 0.42), (0.2, 0.95, 0.5), (-0.2, 0.95, 0.5),
                                    (-0.42, 0.6, 0.42), (-0.5, 0.25, 0.3))])  # fmt: skip
@@ -151,29 +157,27 @@ def radial(record: dict, f: dict) -> list[Part]:
 
 def cabin(record: dict, f: dict) -> list[Part]:
     """Return a passenger craft: a drop-shaped two-seat cabin on eight low arms and two skids."""
-    places, arm = hubs(record, None), f["arm_diameter"] / 2
+    places, arm = hubs(record, f), f["arm_diameter"] / 2
     length, half, height = f["body_length"], f["body_width"] / 2, f["body_height"]
     shape = ((0.5, 0.2, -0.3, -0.1), (0.44, 0.55, -0.42, 0.1), (0.25, 0.95, -0.5, 0.38), (0, 1, -0.5, 0.5),
              (-0.25, 0.85, -0.5, 0.44), (-0.42, 0.45, -0.44, 0.2), (-0.5, 0.15, -0.35, -0.05))  # fmt: skip
     shells = [hull([(y * length, w * half, a * height, b * height) for y, w, a, b in shape], 2.3, bow=0.02 * length)]
     level = -0.42 * height
-    gap = f["coaxial_gap"] if record.get("coaxial") else 0.0
-    top = level + arm + f["motor_height"]
-    shells += motors(places, top, f)
-    if gap:
-        shells += motors(places, level - arm, f)
+    # The arms carry their motors half-way between the two layers of blades.
+    top = level + f["layer_gap"] / 2
+    shells += [cylinder(f["motor_diameter"] / 2, (x, y, top - f["layer_gap"]), (x, y, top)) for x, y in places]
     for x, y in places:
         shells.append(tube([(0.12 * x, 0.2 * y, level), (x, y, level)], [1.5 * arm, arm]))
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.9 * half, 0.75 * length, -0.45 * height, bottom, 0.7 * arm)
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, gap and gap + 2 * arm)]
+    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, bool(record.get("coaxial")))]
 
 
 def tanker(record: dict, f: dict) -> list[Part]:
     """Return a firefighting quadrotor: box frame, straight arms, a tank under it, wide skids and a nozzle lance."""
-    places, arm = hubs(record, f["spacing_ratio"]), f["arm_diameter"] / 2
+    places, arm = hubs(record, f), f["arm_diameter"] / 2
     length, width, height = f["body_length"], f["body_width"], f["body_height"]
-    top = 0.5 * height + f["motor_height"]
+    top = 0.5 * height + max(f["motor_height"], f["layer_gap"] / 2)
     shells = [hull([(0.5 * length, 0.3 * width, -0.35 * height, 0.35 * height),
                     (0.35 * length, 0.5 * width, -0.5 * height, 0.5 * height),
                     (-0.35 * length, 0.5 * width, -0.5 * height, 0.5 * height),
@@ -197,7 +201,7 @@ def tanker(record: dict, f: dict) -> list[Part]:
                        [0.6 * arm, 0.35 * arm], 8))  # fmt: skip
     bottom = -0.5 * height - f["leg_height"]
     shells += skids(0.75 * width, 1.3 * length, -0.3 * height, bottom, 0.5 * arm)
-    return [Part("body", "body", tuple(shells)), *rotors(places, top, f)]
+    return [Part("body", "body", tuple(shells)), *rotors(places, top, f, bool(record.get("coaxial")))]
 
 
 LAYOUTS = {

@@ -13,19 +13,20 @@ from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tu
 def motor_diagonal(record: dict) -> float:
     """Return the largest distance between motor axes (m) that gives the craft its published size."""
     size, figure = record["published"]["size_m"], record["figures"]
-    if record["size_is"] == "span over ducts":
+    if record["size_is"] in ("body diagonal", "span over ducts"):
         return figure["motor_diagonal"]["si"]
     if record["size_is"] == "span over rotors":
         return size - figure["propeller_diameter"]["si"]
     return size
 
 
-def hubs(record: dict, ratio: float | None) -> np.ndarray:
+def hubs(record: dict, figure: dict) -> np.ndarray:
     """Return the motor axes' places (R, 2) in plan (m), counted anticlockwise seen from above.
 
-    With a `ratio` (lateral over longitudinal spacing) four axes stand at the corners of a rectangle. Otherwise they
-    stand evenly on a circle, with the front half-way between two of them.
+    With a `spacing_ratio` (lateral over longitudinal) four axes stand at the corners of a rectangle. Otherwise they
+    stand evenly on a circle, the first by `hub_turn` of the angle between two of them from the front.
     """
+    ratio = figure.get("spacing_ratio")
     reach = motor_diagonal(record) / 2
     count = record["published"]["n_rotors_or_wings"]
     if ratio is not None:
@@ -33,7 +34,7 @@ def hubs(record: dict, ratio: float | None) -> np.ndarray:
         front = np.array([1, 1, -1, -1]) / slant
         right = np.array([1, -1, -1, 1]) * ratio / slant
     else:
-        front, right = portable.sine_cosine_turns(1 / 4 + (np.arange(count) - 0.5) / count)
+        front, right = portable.sine_cosine_turns(1 / 4 + (np.arange(count) - figure["hub_turn"]) / count)
     return reach * np.stack([right, front], 1)
 
 
@@ -48,30 +49,41 @@ def blade(radius: float, chord: float, root: float = 0.08) -> Surface:
     return foil([(x * radius, 0, 0, c, t) for x, c, t in zip(stations, chords, twist, strict=True)], 0.10)
 
 
-def rotor(name: str, hub: np.ndarray, sense: int, figure: dict) -> Part:
-    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade square to the arm."""
+def rotor(name: str, hub: np.ndarray, sense: int, figure: dict, layers: tuple[tuple[float, float], ...]) -> Part:
+    """Return the rotor about `hub` (3,): equal blades, the axis `sense` times up, the first blade square to the arm.
+
+    layers: depth below the hub (m) and turn of each layer of blades.
+    """
     shell = blade(figure["propeller_diameter"] / 2, figure["blade_chord"])
     if sense < 0:
         shell = shell.mapped(np.diag([1.0, -1.0, 1.0]))
     # Turn the blade to the hub's direction and by a quarter turn more.
     far = np.sqrt(hub[0] * hub[0] + hub[1] * hub[1])
     sine, cosine = (hub[0] / far, -hub[1] / far) if far > 0 else (1.0, 0.0)
-    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    shells = []
+    for depth, turn in layers:
+        more, less = portable.sine_cosine_turns(np.array(turn))
+        sine, cosine = sine * less + cosine * more, cosine * less - sine * more
+        matrix = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+        shells.append(shell.mapped(matrix).moved(hub - [0, 0, depth]))
     axis = (0.0, 0.0, float(sense))
-    return Part(name, "rotor", (shell.mapped(turn).moved(hub),), tuple(hub), axis, copies=int(figure["blade_count"]))
+    return Part(name, "rotor", tuple(shells), tuple(hub), axis, copies=int(figure["blade_count"]))
 
 
-def rotors(places: np.ndarray, height: float, figure: dict, gap: float = 0.0) -> list[Part]:
+def rotors(places: np.ndarray, height: float, figure: dict, apart: bool = False) -> list[Part]:
     """Return the rotors on the motor axes (R, 2) at `height`; neighbours turn in opposite senses.
 
-    With a `gap` (m) each axis carries a coaxial pair, whose lower rotor turns against the upper one.
+    With a figure `layer_gap` each rotor has two layers of blades. apart: whether the lower layer is a rotor of its own,
+    which turns against the upper one.
     """
-    parts = []
+    parts, single = [], ((0.0, 0.0),)
+    layers = single if apart or "layer_gap" not in figure else (*single, (figure["layer_gap"], figure["layer_turn"]))
     for index, (x, y) in enumerate(places):
         sense = 1 if index % 2 == 0 else -1
-        parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure))
-        if gap:
-            parts.append(rotor(f"rotor {index + 1} lower", np.array([x, y, height - gap]), -sense, figure))
+        parts.append(rotor(f"rotor {index + 1}", np.array([x, y, height]), sense, figure, layers))
+        if apart:
+            low = np.array([x, y, height - figure["layer_gap"]])
+            parts.append(rotor(f"rotor {index + 1} lower", low, -sense, figure, single))
     return parts
 
 
