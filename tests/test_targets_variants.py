@@ -1,5 +1,6 @@
 """Built-in models with other settings: counts of points, coaxial rotors, rolling wheels, wing beats."""
 
+import numpy as np
 import pytest
 
 from builtin_records import NAMES, RECORDS, TABLE, WRITTEN
@@ -8,7 +9,6 @@ from lowalt.targets.assemble import allot
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES
 from lowalt.targets.records import merge
-from lowalt.targets.uav_pieces import hubs, motor_diagonal
 
 
 def variant(name, **changes):
@@ -47,10 +47,24 @@ def test_the_eh216_may_fly_sixteen_rotors_in_coaxial_pairs():
     assert len(rotors) == 16 and len(cloud.points) == 396
     for upper, lower in zip(rotors[::2], rotors[1::2], strict=True):
         apart = cloud.hinges[upper] - cloud.hinges[lower]
-        assert apart[2] > 0.3 and abs(apart[:2]).max() < 1e-12
+        assert apart == pytest.approx([0, 0, 1.29], abs=1e-12)
         assert cloud.axes[upper] @ cloud.axes[lower] == -1
-    assert 2 * motor_diagonal(RECORDS["EH 216 S"]) > 5
-    assert len(hubs(RECORDS["EH 216 S"], None)) == 8
+
+
+@pytest.mark.parametrize(
+    ("name", "turn"), [("EH 216 S", 0.25), ("Type-A Firefighting UAV", 0), ("Type-B Firefighting UAV", 1 / 6)]
+)
+def test_a_rotor_of_two_layers_turns_as_one_with_its_lower_blades_ahead(name, turn):
+    cloud, figures = variant(name, points=3000), RECORDS[name]["figures"]
+    for rotor in cloud.parts_of("rotor"):
+        points = cloud.points[cloud.part == rotor] - cloud.hinges[rotor]
+        upper, lower = (points[abs(points[:, 2] + depth) < 0.1] for depth in (0, figures["layer_gap"]["si"]))
+        assert len(upper) + len(lower) == len(points) and abs(len(upper) - len(lower)) < 0.2 * len(points)
+        # The sums of (x + i y)^n over n equal blades have n times the angle of a blade.
+        count = figures["blade_count"]["value"]
+        told = [np.angle(((layer[:, 0] + 1j * layer[:, 1]) ** count).sum()) for layer in (upper, lower)]
+        off = (told[1] - told[0]) / count / (2 * np.pi) - turn
+        assert abs(off * count - round(off * count)) < 0.05 * count
 
 
 def test_wheels_may_have_their_rolling_diameter():

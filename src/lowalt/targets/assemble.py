@@ -82,11 +82,15 @@ def _exposed(points: np.ndarray, normals: np.ndarray, part: Part) -> np.ndarray:
 def sample_part(part: Part, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` points (count, 3) on the part's outer skin and their unit normals (count, 3).
 
-    The outermost points along each axis are kept first, so that a cloud is as large as its model.
+    The outermost points along each axis are kept first, so that a cloud is as large as its model; of a blade with few
+    points the one farthest from the hinge alone, so that the others lie along it.
     """
     whole = merged(part.shells)
     points, normals = sample_surface(whole.vertices, whole.faces, CANDIDATES_PER_POINT * count + 200, rng)
     tips, facing = _tips(whole)
+    if part.kind == "rotor" and count < 2 * len(tips):
+        farthest = portable.norm(tips - np.array(part.hinge)).argmax()
+        tips, facing = tips[farthest : farthest + 1], facing[farthest : farthest + 1]
     points, normals = np.concatenate([tips, points]), np.concatenate([facing, normals])
     seen = _exposed(points, normals, part)
     kept = min(int(seen[: len(tips)].sum()), count)

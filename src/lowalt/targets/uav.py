@@ -13,8 +13,8 @@ from lowalt.targets.surfaces import box, cylinder, hull, ring, tube
 from lowalt.targets.uav_pieces import camera, fuselage, hubs, motor_diagonal, motors, rotors, skids
 
 DIAGONALS = ("motor diagonal", "body diagonal", "span over ducts", "span over rotors")
-"""Meanings of a multirotor's published size: the largest distance between motor axes, a length that does not tell it (the
-figure `motor_diagonal` does), or the distance across ducts or blade tips."""
+"""Meanings of a multirotor's published size: the largest distance between motor axes, a length that does not tell it
+(the figure `motor_diagonal` does), or the distance across ducts or blade tips."""
 SIZES = (*DIAGONALS, *dict.fromkeys(aircraft.SIZES.values()))
 """Meanings of the published size of all craft."""
 
