@@ -58,7 +58,8 @@ def test_a_rotor_of_two_layers_turns_as_one_with_its_lower_blades_ahead(name, tu
     cloud, figures = variant(name, points=3000), RECORDS[name]["figures"]
     for rotor in cloud.parts_of("rotor"):
         points = cloud.points[cloud.part == rotor] - cloud.hinges[rotor]
-        upper, lower = (points[abs(points[:, 2] + depth) < 0.1] for depth in (0, figures["layer_gap"]["si"]))
+        gap = figures["layer_gap"]["si"]
+        upper, lower = (points[abs(points[:, 2] + depth) < gap / 2] for depth in (0, gap))
         assert len(upper) + len(lower) == len(points) and abs(len(upper) - len(lower)) < 0.2 * len(points)
         # The sums of (x + i y)^n over n equal blades have n times the angle of a blade.
         count = figures["blade_count"]["value"]
