@@ -8,14 +8,12 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 import snakemake_runs
 from lowalt.common.processes import started
-from lowalt.workflow import interrupts
-from lowalt.workflow.locks import guarded, holders, install, numbers, take, take_over
+from lowalt.workflow.locks import guarded, holders, numbers, take, take_over
 from lowalt.workflow.owner import TOKEN, Owner
 
 ROOT = Path(__file__).parent.parent
@@ -24,9 +22,9 @@ KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
 GONE = replace(Owner.current(), pid=2**22 + 1, token="gone")
 
 SNAKEFILE = """
-from lowalt.workflow.locks import install
+from lowalt.workflow import mends
 
-install()
+mends.install()
 
 rule all:
     output: "out.txt"
@@ -87,40 +85,6 @@ def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
     assert f"process {os.getpid()} of {Owner.current().host} is running" in text
     assert "host elsewhere, which cannot be seen from here" in text
     assert "7.output.lock: no record of its owner" in text and "--unlock" in text
-
-
-def test_unlock_leaves_the_lock_of_an_owner_that_lives(tmp_path, monkeypatch, capsys):
-    persistence = pytest.importorskip("snakemake.persistence.file").FilePersistence
-    for name in ("lock", "lock_warn_only", "cleanup_locks"):
-        monkeypatch.setattr(persistence, name, getattr(persistence, name))
-    install()
-    unlocked, locks = [], tmp_path / "locks"
-    folder = SimpleNamespace(path=tmp_path, _lockdir=locks, unlock=lambda: unlocked.append("all"))
-    take(locks, GONE, KEYS)
-    persistence.cleanup_locks(folder)
-    assert unlocked == ["all"]
-    take(locks, Owner.current(), KEYS)
-    with pytest.raises(SystemExit, match=r"^2$"):
-        persistence.cleanup_locks(folder)
-    assert f"not unlocked: process {os.getpid()}" in capsys.readouterr().err
-    assert unlocked == ["all"]
-
-
-def test_only_the_first_ctrl_c_interrupts_and_later_ones_are_answered(capfd):
-    before = signal.getsignal(signal.SIGINT)
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        interrupts.install()
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        for _ in range(2):
-            signal.raise_signal(signal.SIGINT)
-        assert capfd.readouterr().err == 2 * interrupts.ANSWER.decode()
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        interrupts.install()
-        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def test_jobs_that_outlived_their_run_are_ended(tmp_path):

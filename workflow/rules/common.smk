@@ -8,7 +8,7 @@ from lowalt.common.command import refusing
 from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
 from lowalt.scene.catalogue import dotted
-from lowalt.workflow import interrupts, locks, options, polling, scheduling, space_check
+from lowalt.workflow import mends, options, space_check
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
@@ -16,10 +16,7 @@ from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
-interrupts.install()
-locks.install()
-scheduling.install()
-polling.install()
+mends.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
 with refusing():

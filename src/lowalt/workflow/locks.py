@@ -2,7 +2,7 @@
 
 Snakemake locks a working directory by files that stay when it is killed. Here each pair of lock files has a third with
 the owner (`owner.py`), so the next run takes the files of a dead owner away and refuses with the name of a living one.
-`install` puts this in the place of Snakemake's lock; the Snakefile calls it, so every run profits.
+`mends.py` puts this in the place of Snakemake's lock.
 """
 
 import contextlib
@@ -13,10 +13,9 @@ import time
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 from lowalt.common.errors import InputError
-from lowalt.workflow.owner import TOKEN, Owner
+from lowalt.workflow.owner import Owner
 
 KINDS = ("input", "output")
 GRACE_S = 10.0
@@ -130,58 +129,3 @@ def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> int:
     for kind in KINDS:
         _lock_path(locks, number, kind).write_text("".join(f"{key}\n" for key in keys[kind]))
     return number
-
-
-def cleanup_locks(self: Any) -> None:
-    """Remove all locks of a persistence of Snakemake's, as `--unlock` asks.
-
-    Raises: SystemExit after one line that names a holder which is seen to live.
-    """
-    from lowalt.common.command import refusing
-
-    with refusing(), guarded(Path(self.path)):
-        alive = living(Path(self._lockdir))
-        if alive:
-            raise InputError("not unlocked: " + "; ".join(alive))
-        self.unlock()
-
-
-def install() -> None:
-    """Put locks with owners in the place of those of Snakemake's file backend."""
-    from snakemake.logging import logger
-    from snakemake.persistence.file import FilePersistence
-
-    from lowalt.common.command import refusing
-
-    @contextlib.contextmanager
-    def lock(self: FilePersistence) -> Iterator[None]:
-        """Hold the lock of a working directory for the length of a block.
-
-        Raises: SystemExit after one line that names the holders, or the folder that no lock can be written into.
-        """
-        folder, locks, owner = Path(self.path), Path(self._lockdir), Owner.current()
-        with refusing():
-            try:
-                with guarded(folder):
-                    take_over(locks, logger.warning)
-                    if self.locked:
-                        raise InputError(holders(locks))
-                    keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
-                    number = take(locks, owner, {kind: [str(key) for key in found] for kind, found in keys.items()})
-            except OSError as error:
-                raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
-        os.environ[TOKEN] = owner.token
-        try:
-            yield
-        finally:
-            drop(locks, number)
-
-    @contextlib.contextmanager
-    def lock_warn_only(self: FilePersistence) -> Iterator[None]:
-        """Say who holds the lock and go on, as Snakemake does for runs that write nothing."""
-        if self.locked:
-            logger.info(holders(Path(self._lockdir)))
-        yield
-
-    FilePersistence.lock, FilePersistence.lock_warn_only = lock, lock_warn_only
-    FilePersistence.cleanup_locks = cleanup_locks
