@@ -8,7 +8,7 @@ from lowalt.common.command import refusing
 from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
 from lowalt.scene.catalogue import dotted
-from lowalt.workflow import mends, options, space_check
+from lowalt.workflow import mends, options, space
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
@@ -21,7 +21,7 @@ SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
 with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
-    space_check.writable(Path.cwd(), RUN.name)
+    space.writable(Path.cwd(), RUN.name)
 
 calls = EffectCalls(RUN)
 products = Products(RUN, calls)

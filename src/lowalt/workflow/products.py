@@ -110,7 +110,7 @@ class Products(DataProducts):
             for name, file in KEPT.items()
             if shipped(f"{REFERENCE}/{file}").is_file()
         }
-        # No rule makes this file, so that no run needs the package mpmath: `make hard-cases` makes it.
+        # No rule makes this file, so that no run needs the package mpmath: `python -m lowalt.measure.hard_cases` does.
         if Path(f"{base}/hard_cases.csv").is_file():
             files["hard_cases"] = f"{base}/hard_cases.csv"
         if self._run.trainings:

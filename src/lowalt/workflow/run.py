@@ -133,7 +133,7 @@ class Run:
 
     def own_backbone(self, scheme: Scheme) -> str:
         """FILE.py:FUNCTION of a scheme's backbone, "" for a library's."""
-        name = "" if scheme.method else scheme.backbone_of(self.config["recognition"]["network"])
+        name = scheme.backbone_of(self.config["recognition"]["network"])
         return name if ".py:" in name else ""
 
     @cached_property

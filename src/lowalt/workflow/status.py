@@ -1,4 +1,4 @@
-"""The state of a run in a file, for another terminal: `python -m lowalt.workflow.status`, or `make status`.
+"""The state of a run in a file, for another terminal: `lowalt status`.
 
 Each run writes .snakemake/status/{process id}.json in its working directory. Files of runs that have ended stay until
 the next run starts there; the command shows runs that live, else the one that ended last.
