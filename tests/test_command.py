@@ -22,7 +22,6 @@ measure.echo_pixels: --settings, --table, --clouds, --out
 measure.effects_cost: --settings, --samples, --model, --out
 measure.effects_samples: --settings, --motion, --clouds, --out
 measure.hard_cases: --out
-measure.rotor_estimates: --run, --out
 measure.scale: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
 noise.__main__: --settings, --motion, --echoes, --out

@@ -54,7 +54,7 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
     assert not {"transfer", "echo_cost", "effects", "accuracy_cost", "measured"} & set(page)
-    accuracy, measured = "config/accuracy.csv", "config/schemes.csv"
+    accuracy, measured = "config/cost/accuracy.csv", "config/schemes.csv"
     _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": accuracy, "measured": measured},
                             "recognition": {"transfer": ["other"]}})  # fmt: skip
     more = {name: path for name, path in products.report(CHUNK).items() if name not in page}

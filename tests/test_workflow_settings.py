@@ -138,7 +138,7 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
     shown = {
         "cost": True,
         "effects": True,
-        "accuracy": "config/accuracy.csv",
+        "accuracy": "config/cost/accuracy.csv",
         "published": "config/published_accuracy.csv",
     }
     for overlay, names in (

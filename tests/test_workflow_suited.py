@@ -45,7 +45,6 @@ def test_what_suits_is_taken(overlay):
         (recognition(timed=["x"]), "recognition.timed: 'x'"),
         (recognition(schemes=[A, "a-vrp-trp-vt"]), "expected every scheme once"),
         (recognition(schemes=["ABC:mean fusion"], protocols=["seen"]), r"recognition.protocols: .* gives \['unseen'\]"),
-        (recognition(start={"seen/x": {"from": f"seen/{A}", "steps": 1}}), "recognition.start: seen/x: scheme 'x'"),
         (
             {"network": {"carrier_hz": 28e9, "symbol_interval_s": 1e-3}},
             r"speed_max_mps 6.1, .* to 2.68: .* 2.8e\+10 .* 0.001",
