@@ -4,7 +4,7 @@
 from functools import partial
 from pathlib import Path
 
-from lowalt.common.command import refusing
+from lowalt.common.command import Refusing, refusing
 from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
 from lowalt.scene.catalogue import dotted
@@ -23,9 +23,9 @@ with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
     space.writable(Path.cwd(), RUN.name)
 
-calls = EffectCalls(RUN)
-products = Products(RUN, calls)
-settings = Settings(RUN, calls)
+calls = Refusing(EffectCalls(RUN))
+products = Refusing(Products(RUN, calls))
+settings = Refusing(Settings(RUN, calls))
 code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.

@@ -205,7 +205,7 @@ rule transfer:
             other=config["recognition"]["transfer"],
             training=RUN.trainings,
         ),
-        configs=expand("results/{name}/config.yaml", name=[RUN.name, *config["recognition"]["transfer"]]),
+        configs=products.transferred,
         schemes=config["recognition"]["table"],
     output:
         report("results/{run}/transfer.csv", caption="../report/transfer.rst", category="Recognition"),

@@ -18,6 +18,8 @@ from lowalt.common.schema import faults, plain
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
+SCHEMA = "workflow/schemas/config.schema.yaml"
+
 
 def merge(base: dict, overlay: dict) -> dict:
     """Return `base` with `overlay` laid over it: mappings merge key by key, anything else is replaced."""
