@@ -16,8 +16,7 @@ from typing import Any
 
 from lowalt.common.command import refusing
 from lowalt.common.errors import InputError
-from lowalt.workflow.locks import drop, guarded, holders, living, take, take_over
-from lowalt.workflow.owner import TOKEN, Owner
+from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
 
 def install() -> None:
@@ -49,22 +48,25 @@ def _lock(self: Any) -> Iterator[None]:
     """
     from snakemake.logging import logger
 
-    folder, locks, owner = Path(self.path), Path(self._lockdir), Owner.current()
+    folder, locks, owner = Path(self.path), Path(self._lockdir), Owner()
     with refusing():
         try:
             with guarded(folder):
                 take_over(locks, logger.warning)
                 if self.locked:
-                    raise InputError(holders(locks))
+                    raise InputError(refusal(locks))
                 keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
-                number = take(locks, owner, {kind: [str(key) for key in names] for kind, names in keys.items()})
+                number, holding = take(
+                    locks, owner, {kind: [str(key) for key in names] for kind, names in keys.items()}
+                )
         except OSError as error:
             raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
     os.environ[TOKEN] = owner.token
-    try:
-        yield
-    finally:
-        drop(locks, number)
+    with holding:
+        try:
+            yield
+        finally:
+            drop(locks, number)
 
 
 @contextlib.contextmanager
@@ -73,14 +75,14 @@ def _lock_warn_only(self: Any) -> Iterator[None]:
     from snakemake.logging import logger
 
     if self.locked:
-        logger.info(holders(Path(self._lockdir)))
+        logger.info(refusal(Path(self._lockdir)))
     yield
 
 
 def _cleanup_locks(self: Any) -> None:
     """Remove all locks, as `--unlock` asks. Raises: SystemExit after one line that names a holder seen to live."""
     with refusing(), guarded(Path(self.path)):
-        alive = living(Path(self._lockdir))
+        alive = holders(Path(self._lockdir), living=True)
         if alive:
             raise InputError("not unlocked: " + "; ".join(alive))
         self.unlock()
