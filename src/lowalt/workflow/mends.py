@@ -55,10 +55,8 @@ def _lock(self: Any) -> Iterator[None]:
                 take_over(locks, logger.warning)
                 if self.locked:
                     raise InputError(refusal(locks))
-                keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
-                number, holding = take(
-                    locks, owner, {kind: [str(key) for key in names] for kind, names in keys.items()}
-                )
+                keys = {"input": [*map(str, self.all_inputfiles())], "output": [*map(str, self.all_outputfiles())]}
+                number, holding = take(locks, owner, keys)
         except OSError as error:
             raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
     os.environ[TOKEN] = owner.token
