@@ -18,7 +18,7 @@ from lowalt.common.schema import faults, plain
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
-SCHEMA = "workflow/schemas/config.schema.yaml"
+DEFAULT, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
 
 
 def merge(base: dict, overlay: dict) -> dict:
@@ -103,6 +103,11 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     for path in paths:
         result = merge(result, load_yaml(shipped(path)))
     return located(check(result, shipped(schema_path)))
+
+
+def overlaid(overlays: Iterable[str | Path]) -> dict:
+    """Return the embedded default with overlays laid over it, in order, as `load` does."""
+    return load([DEFAULT, *overlays], SCHEMA)
 
 
 def main(arguments: list[str]) -> None:
