@@ -127,6 +127,7 @@ class Refusing:
 
         @functools.wraps(found)
         def asked(*given: Any, **named: Any) -> Any:
+            """Answer, or end the process after one line."""
             with refusing():
                 return found(*given, **named)
 

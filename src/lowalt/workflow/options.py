@@ -22,6 +22,7 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
     """Return the function of the options that name these inputs of a job, as far as the job has them."""
 
     def words(wildcards: Any, input: Any) -> list[str]:
+        """The options of one job."""
         return [word for name in names for word in _option(name, input.get(name))]
 
     return words
