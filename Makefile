@@ -12,14 +12,11 @@ KERNELS := .venv/set-up-kernels
 BYTECODE := .venv/set-up-bytecode
 SNAKEMAKE := $(BIN)/snakemake --cores $(CORES)
 
-# The oldest and the newest NumPy that pyproject.toml allows.
-NUMPYS := 2.0.0 2.4.6
-OLDEST_SNAKEMAKE := 9.23.0
-REFERENCE := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
-
+# The small tables of a run that are kept.
+TABLES := accuracy.csv stages.csv subtypes.csv comparisons.csv confusion.csv seeds.csv orderings.csv
 DOCS := .venv/set-up-docs
 
-.PHONY: all audit docs docs-pages notebooks default data real measured test test-slow fuzz lint format bench bench-workflow bench-make bench-walk long-run status cost gallery hard-cases accuracy-cost study effects-cost estimate space campaign reference reference-accuracy pictures pins check-bytes check-numpy check-snakemake check-arm manifest help
+.PHONY: all default data real measured cost accuracy-cost study test test-slow fuzz lint docs check-bytes reference help
 
 all: default
 
@@ -45,7 +42,7 @@ $(BASE): pyproject.toml envs/constraints.txt
 	$(PYTHON) -m pip --python $(BIN)/python install --quiet --disable-pip-version-check -c envs/constraints.txt uv \
 		2>/dev/null || { $(PIP) -c envs/constraints.txt uv || true; }
 	$(call install,-e '.[workflow$(comma)cost]' pip)
-	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) $(BYTECODE) .venv/set-up-methods .venv/set-up-audit
+	rm -f $(SETUP) $(TESTING) $(DOCS) $(KERNELS) $(BYTECODE)
 	touch $@
 
 $(SETUP): $(BASE)
@@ -127,135 +124,37 @@ style:
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
-format: $(TESTING)
-	$(BIN)/ruff check --fix .
-	$(BIN)/ruff format .
-	$(BIN)/snakefmt Snakefile workflow
-
-# Benchmarks need a finished `make data`, a quiet machine and the extra `bench` (zlib-ng, a peer of the PNG writer).
-.venv/bench: $(SETUP)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c envs/constraints.txt -e '.[bench]'
-	touch $@
-
-bench: .venv/bench  ## all benchmarks, into results/benchmarks
-	$(SNAKEMAKE) -- data
-	$(BIN)/python benchmarks/echo.py --clouds results/default/clouds/*.npz
-	$(BIN)/python benchmarks/rounding.py --out results/benchmarks/rounding.csv
-	$(BIN)/python benchmarks/images.py --run results/default --out results/benchmarks/images.csv
-	$(BIN)/python benchmarks/loader.py --run results/default --out results/benchmarks/loader.csv
-	$(BIN)/python benchmarks/scenes.py --run results/default --out results/benchmarks/scenes.csv
-	$(BIN)/python benchmarks/interval_coverage.py --out results/benchmarks/interval_coverage.csv
-
-bench-workflow: $(SETUP)  ## time of Snakemake itself for 1 000 and for 10 000 short jobs: results/benchmarks/scheduling.csv
-	$(BIN)/python benchmarks/workflow.py --out results/benchmarks/scheduling.csv
-
-# LABEL names the rows, for example a revision; COLD=--cold fetches all packages from their index.
-LABEL ?= this revision
-bench-make: $(SETUP)  ## wall and processor time of `make` from an empty clone, part by part: results/benchmarks/workflow.csv
-	$(BIN)/python benchmarks/from_clone.py --out results/benchmarks/workflow.csv --label '$(LABEL)' $(COLD)
-
-bench-walk: $(SETUP)  ## a new user's walk through the documents, each step timed, from clone to a network of one's own in the report: results/benchmarks/walk.csv
-	$(BIN)/python benchmarks/walk.py --out results/benchmarks/walk.csv --label '$(LABEL)'
-
-# The default's samples twenty times over: make long-run MODELS=2000
-long-run: $(BASE)  ## 200 000 samples end to end as signals, verified, with time and peak memory by stage: results/benchmarks/long_run.csv
-	$(BIN)/python benchmarks/long_run.py $(if $(MODELS),--models $(MODELS)) --out results/benchmarks/long_run.csv
-
-status: $(SETUP)  ## the state of a run in another terminal
-	@$(BIN)/python -m lowalt.workflow.status
-
 cost: $(SETUP)  ## time of the echo over its accuracy, up to 1600 points: results/cost/cost.csv and cost.png
 	$(SNAKEMAKE) --configfile config/cost/echo.yaml -- cost
-
-gallery: $(BASE)  ## a page that links all runs and compares any two: results/index.html
-	$(BIN)/lowalt report --gallery
-
-hard-cases: $(BASE)  ## inputs on which a naive formula fails, its error, ours and the bound: results/default/hard_cases.csv
-	$(BIN)/python -m lowalt.measure.hard_cases --out results/default/hard_cases.csv
 
 accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .png
 	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/cost/fidelity.yaml config/cost/fidelity-1e-$$order.yaml -- models || exit 1; done
 	$(SNAKEMAKE) --configfile config/cost/fidelity.yaml -- results/fidelity-exact/transfer.csv
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 
-effects-cost: $(SETUP)  ## time and influence of each effect, alone and together: results/default/effects.csv and .png
-	$(SNAKEMAKE) -- effects_cost
-
 study:  ## a study of studies/: make study NAME=rotors
 	$(MAKE) --no-print-directory -C studies/$(NAME)
-
-# The classical methods' packages, which nothing else needs.
-METHODS := .venv/set-up-methods
-$(METHODS): $(SETUP)
-	$(call install,$(call of_extra,methods))
-	touch $@
-
-# Its own stamp: nothing else needs pip-audit. Without the internet the table is all there is, and the status says so.
-.venv/set-up-audit: $(BASE)
-	$(call install,$(call of_extra,audit))
-	touch $@
-
-audit: .venv/set-up-audit  ## known vulnerabilities of the pinned packages; without internet their versions and dates, .venv/pins.csv
-	$(BIN)/python .ci/audit_pins.py --pins envs/constraints.txt --out .venv/pins.csv
 
 check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/reference and compare every byte
 	for run in $(filter-out $(if $(LOWALT_INPUTS),,real),$(basename $(notdir $(wildcard results/reference/*.sha256)))); do $(SNAKEMAKE) --forceall --configfile config/$$run.yaml -- data && \
 		$(BIN)/python -m lowalt.shards.manifest check --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 
-# Two environments of their own, so that this one keeps its NumPy.
-check-numpy: $(SETUP)  ## the tiny data set with the oldest and the newest NumPy that pyproject.toml allows
-	for version in $(NUMPYS); do .ci/numpy.sh $(PYTHON) $$version || exit 1; done
-
-# An environment of its own too; the newest Snakemake is the pinned one, which the tests run.
-check-snakemake:  ## the tiny data set with the oldest Snakemake that pyproject.toml allows
-	.ci/snakemake.sh $(PYTHON) $(OLDEST_SNAKEMAKE)
-
-# Debian's packages of another architecture; everything goes into ARM, nothing is installed.
-ARM ?= .venv/arm
-check-arm: $(SETUP)  ## the tiny data set on an emulated 64-bit ARM processor: Debian on x86-64, ten minutes
-	.ci/arm.sh $(ARM)
-
-manifest:  ## keep the checksums of the finished default and tiny runs
-	for run in default tiny; do $(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
-
-estimate: $(SETUP)  ## time and disk of the larger configurations, scaled from the reference run's measured stages
+# Of runs that are finished: tables, manifests and pictures. What changed, git shows.
+reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs, and write the tables into the documents
+	for run in default real; do for table in $(TABLES); do cp results/$$run/$$table results/reference/$$run-$$table 2>/dev/null || true; done; done
+	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end 2>/dev/null || true; done
+	for run in default tiny; do test ! -e results/$$run/shards || \
+		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
+	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
-
-# Full disks need root; add MEMORY_GROUP=/sys/fs/cgroup for kills by the kernel's out-of-memory killer.
-KILLS ?= 30
-DISKS ?= 5
-CONFIGFILE ?= config/tiny.yaml
-campaign: $(SETUP)  ## kill runs and fill disks at random, resume, compare bytes: make campaign KILLS=100 CONFIGFILE=config/default.yaml
-	$(BIN)/python -m lowalt.workflow.campaign --configfile $(CONFIGFILE) --kills $(KILLS) --disks $(DISKS) \
-		$(if $(MEMORY_GROUP),--memory-group $(MEMORY_GROUP)) --out results/benchmarks/campaign.csv
-
-space: $(SETUP)  ## disk and memory of jobs, measured: make space RUNS='results/tiny results/default' (finished, small to large)
-	$(BIN)/python -m lowalt.workflow.space_measured --runs $(RUNS) \
-		--stages results/reference/default-stages.csv --config config/default.yaml --out results/reference/space.csv
-
-reference-accuracy: $(SETUP)  ## keep the table of a finished `make accuracy-cost` and write it into the documents
-	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end; done
-	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
-
-reference:  ## keep the small tables of the finished default and real runs
-	for run in default real; do for table in $(REFERENCE); do cp results/$$run/$$table results/reference/$$run-$$table; done; done
-
-pictures: $(SETUP)  ## the README's picture, from the finished default run
 	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
 
-pins: $(TESTING)  ## write the installed versions as the pins
-	( head -2 envs/constraints.txt; $(BIN)/python -m pip freeze --all --exclude-editable ) > .venv/pins && mv .venv/pins envs/constraints.txt
-
-docs-pages: $(BASE)  ## write the page of the configuration's keys from its schema, and the picture of a sample
+# The page of keys is made of the schema, and the picture of a sample by the command that it shows.
+docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
 	$(BIN)/python -m lowalt.common.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
 	$(BIN)/lowalt sample 'DJI Mini 2' 0 --out site/sample && cp site/sample/*-axes.png docs/pictures/sample.png
-
-docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
-
-notebooks: $(TESTING)  ## a notebook of every tutorial, made from its Markdown, in the folder notebooks
-	$(BIN)/python docs/notebooks.py --out notebooks
 
 help:
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/:/'

@@ -28,11 +28,11 @@ onstart:
     print(RUN.sources, file=sys.stderr)
     with refusing():
         RUN.launch.before(workflow)
-        space_check.before(workflow, RUN.plan, config)
+        space.before(workflow, RUN.plan, config)
 
 
 onerror:
-    space_check.after()
+    space.after()
 
 
 rule all:

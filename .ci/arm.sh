@@ -1,9 +1,9 @@
 #!/bin/sh
-# Build the tiny data set on a 64-bit ARM processor that qemu emulates, and compare it with its manifest: .ci/arm.sh FOLDER
+# Build the tiny data set on a 64-bit ARM processor that qemu emulates, and compare it with its manifest: .ci/arm.sh [FOLDER]
 # Debian on x86-64, as root: emulator and ARM's Python come from Debian's packages, ARM's wheels from the package index,
 # all into FOLDER. Nothing is installed on this machine. Ten minutes of one core, most of them compiling kernels.
 set -e
-folder=$(realpath -m "$1")
+folder=$(realpath -m "${1:-.venv/arm}")
 mkdir -p "$folder/state/lists/partial" "$folder/cache/archives/partial" "$folder/root" "$folder/host"
 if ! test -e "$folder/ready"; then
     (cd "$folder/host" && apt-get download qemu-user-static && dpkg -x qemu-user-static*.deb .)

@@ -14,7 +14,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.common.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
-from lowalt.recognition import checkpoint, schemes
+from lowalt.recognition import checkpoint, freeze, schemes
 from lowalt.recognition.one_sample import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
@@ -53,6 +53,13 @@ def test_a_number_of_a_motion_model_beyond_floating_point_is_refused(tmp_path):
 def test_a_name_that_no_file_can_have_is_that_of_no_file(tmp_path):
     with pytest.raises(InputError, match=r"frozen file: no file at .*too long"):
         existing(tmp_path / ("9" * 5000), "frozen file")
+
+
+def test_a_frozen_file_whose_name_has_a_null_byte_is_refused(tmp_path):
+    path = tmp_path / "SHA256SUMS"
+    path.write_text(f"{'0' * 64}  clouds/a\0.npz\n")
+    with pytest.raises(InputError, match=r"SHA256SUMS line 1: 'clouds/a\\x00\.npz', expected a file below"):
+        freeze.verify(path)
 
 
 @pytest.mark.parametrize("offsets", [[0, 9, 4, 6], [0, 2, 4, 7], [0, -2, 4, 6], []])

@@ -57,8 +57,6 @@ targets.download: --out
 targets.gallery: --clouds, --out
 targets.occluders: --settings, --out
 tiles.__main__: --settings, --signals, --out
-workflow.campaign: --out
-workflow.space_measured: --runs, --out
 """
 
 

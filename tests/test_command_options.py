@@ -6,10 +6,7 @@ import re
 
 import pytest
 
-COMMANDS = (
-    "measure.network_speed", "shards.size",
-    "workflow.campaign",
-)  # fmt: skip
+COMMANDS = ("measure.network_speed", "shards.size")
 
 
 class _AskedError(Exception):

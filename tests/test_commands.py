@@ -88,12 +88,6 @@ def test_run_passes_overlays_targets_and_the_exit_status_on(tmp_path, monkeypatc
     assert main(["run"]) == 2 and "has no workflow" in capsys.readouterr().err
 
 
-def test_status_of_a_folder_where_nothing_ran_is_an_error(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["status"]) == 2
-    assert "no run has started here" in capsys.readouterr().err
-
-
 def test_every_command_has_help_with_an_example_that_parses(capsys, monkeypatch):
     with pytest.raises(SystemExit):
         main(["--help"])

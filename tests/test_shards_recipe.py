@@ -56,6 +56,14 @@ def test_other_versions_and_damage_are_refused_and_other_samples_told(finished, 
     (tmp_path / "text.tar").write_text("no archive")
     with pytest.raises(InputError, match="not a recipe"):
         recipe.unpack(tmp_path / "text.tar", tmp_path / "made")
+    damage = {
+        r"published\.Crow: missing key": {"published": {"Crow": {}}},
+        "config: value 3": {"config": 3},
+        "seed: value -1": {"config": configuration() | {"seed": -1}},
+    }
+    for words, head in damage.items():
+        with pytest.raises(InputError, match=words):
+            recipe.unpack(changed(finished, tmp_path / "head.tar", **head), tmp_path / "made")
     other = changed(finished, tmp_path / "seed.tar", config=configuration(seed=5))
     with pytest.raises(SystemExit):
         recipe.main(["unpack", str(other), "--out", str(tmp_path / "made")])
@@ -75,6 +83,15 @@ def test_a_run_s_data_set_opens_in_a_folder_without_its_tables(tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     there = Dataset(config, tmp_path)
     assert there.config == config and there.published == here.published and len(there) == len(here) == 160
+
+
+def test_a_configuration_that_a_path_names_is_checked_as_that_of_a_run(tmp_path):
+    path = tmp_path / "config.yaml"
+    path.write_text(yaml.safe_dump(configuration()))
+    assert Dataset(path).config["seed"] == configuration()["seed"]
+    path.write_text(yaml.safe_dump(configuration(seed="x")))
+    with pytest.raises(InputError, match="seed: value 'x', expected type integer"):
+        Dataset(path)
 
 
 def test_an_index_behind_a_link_is_checked_where_its_shards_are(tmp_path, capsys):

@@ -1,8 +1,6 @@
-"""Jobs that a dead run left behind get a signal, time to end, and then another one; a lock begins and ends."""
+"""Jobs that a dead run left behind get a signal, time to end, and then another one."""
 
-import fcntl
 import os
-import re
 import signal
 from types import SimpleNamespace
 
@@ -10,7 +8,6 @@ import pytest
 
 from lowalt.common.errors import InputError
 from lowalt.workflow import locks
-from lowalt.workflow.owner import TOKEN, Owner
 
 
 @pytest.mark.parametrize(("stubborn", "signals", "spent_s"), [
@@ -47,7 +44,6 @@ def test_every_user_may_open_the_guard_and_a_system_without_locks_is_refused(tmp
     assert (tmp_path / "lowalt.guard").stat().st_mode & 0o777 == 0o666
 
     def refuse(descriptor, how):
-        assert how == fcntl.LOCK_EX
         raise OSError(37, "No locks available")
 
     monkeypatch.setattr(locks.fcntl, "flock", refuse)
@@ -61,38 +57,3 @@ def test_what_a_crash_left_of_a_lock_is_removed(left, tmp_path):
         (tmp_path / name).touch()
     locks.drop(tmp_path, 0)
     assert [path.name for path in tmp_path.iterdir()] == ["1.output.lock"]
-
-
-def test_snakemake_s_lock_is_one_with_an_owner_for_the_length_of_its_block(tmp_path, monkeypatch, capsys):
-    persistence = pytest.importorskip("snakemake.persistence.file").FilePersistence
-    from snakemake.logging import logger
-
-    for name in ("lock", "lock_warn_only", "cleanup_locks"):
-        monkeypatch.setattr(persistence, name, getattr(persistence, name))
-    monkeypatch.setenv(TOKEN, "before")
-    said = []
-    monkeypatch.setattr(logger, "info", said.append)
-    locks.install()
-    folder = tmp_path / "deep/locks"
-
-    class Kept(SimpleNamespace):
-        @property
-        def locked(self):
-            return bool(locks.numbers(folder))
-
-    kept = Kept(path=tmp_path, _lockdir=folder, all_inputfiles=lambda: ["a", "b"], all_outputfiles=lambda: ["c"])
-    with persistence.lock_warn_only(kept):
-        assert not said
-    with persistence.lock(kept):
-        assert (folder / "0.input.lock").read_text() == "a\nb\n" and (folder / "0.output.lock").read_text() == "c\n"
-        assert Owner.read(folder / "0.owner.json") == Owner.current() and os.environ[TOKEN] == Owner.current().token
-        with pytest.raises(SystemExit, match=r"^2$"), persistence.lock(kept):
-            pytest.fail("two runs at once")
-        assert re.fullmatch(rf"error: .*process {os.getpid()} of .* is running.*\n", capsys.readouterr().err)
-        with persistence.lock_warn_only(kept):
-            assert f"process {os.getpid()}" in said[0]
-    assert locks.numbers(folder) == []
-    kept.path = tmp_path / "none"
-    with pytest.raises(SystemExit, match=r"^2$"), persistence.lock(kept):
-        pytest.fail("a lock in a folder that is not there")
-    assert "cannot write a lock" in capsys.readouterr().err

@@ -1,5 +1,6 @@
 """Locks: a dead owner's is taken over, a living one's refused by name, and of many at once exactly one wins."""
 
+import errno
 import json
 import os
 import signal
@@ -8,25 +9,23 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
 import snakemake_runs
 from lowalt.common.processes import started
-from lowalt.workflow import interrupts
-from lowalt.workflow.locks import guarded, holders, install, numbers, take, take_over
-from lowalt.workflow.owner import TOKEN, Owner
+from lowalt.workflow import locks
+from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refusal, take, take_over
 
 ROOT = Path(__file__).parent.parent
 KEYS = {"input": ["in.txt"], "output": ["out.txt"]}
 # The process id of a process that has ended, and whose number the system has not given to another.
-GONE = replace(Owner.current(), pid=2**22 + 1, token="gone")
+GONE = Owner(pid=2**22 + 1, token="gone")
 
 SNAKEFILE = """
-from lowalt.workflow.locks import install
+from lowalt.workflow import mends
 
-install()
+mends.install()
 
 rule all:
     output: "out.txt"
@@ -38,89 +37,54 @@ def takers(locks):
     return [Owner.read(locks / f"{number}.owner.json") for number in numbers(locks)]
 
 
-def test_this_process_lives_and_is_known_by_more_than_its_number():
-    owner = Owner.current()
-    assert owner.here and owner.alive
-    assert not replace(owner, started=owner.started - 1).alive
-    assert not replace(owner, boot="another").alive
-    assert not GONE.alive
-    child = subprocess.Popen(["cat"], stdin=subprocess.PIPE)
-    assert started(child.pid) is not None
-    child.stdin.close()
-    # It ends, but nobody asks for its status: a zombie holds no lock.
-    stop = time.monotonic() + 10
-    while started(child.pid) is not None:
-        assert time.monotonic() < stop
-    child.wait()
+def leave(locks, owner=GONE):
+    """Take a lock and end, as a killed run does: its record is no longer held."""
+    number, holding = take(locks, owner, KEYS)
+    holding.close()
+    return number
 
 
-def test_only_the_same_host_and_namespace_can_tell_who_lives():
-    owner = Owner.current()
-    assert not replace(owner, host="elsewhere").here
-    assert not replace(owner, namespace="pid:[1]").here
-    # Namespaces are numbered anew at every start of the machine; what ran before is dead whatever its namespace was.
-    assert replace(owner, namespace="pid:[1]", boot="another").here
-
-
-def test_a_record_read_back_is_the_owner_and_a_damaged_one_is_none(tmp_path):
-    path = tmp_path / "0.owner.json"
-    Owner.current().write(path)
-    assert Owner.read(path) == Owner.current()
+def test_a_damaged_record_has_no_owner(tmp_path):
+    number, holding = take(tmp_path, Owner(), KEYS)
+    path = tmp_path / f"{number}.owner.json"
     whole = path.read_text()
+    assert Owner.read(path) == Owner(token=json.loads(whole)["token"])
     for text in ("", whole[:-5], "{}", "[1]", whole.replace("pid", "pit")):
         path.write_text(text)
         assert Owner.read(path) is None
     assert Owner.read(tmp_path / "none") is None
+    holding.close()
 
 
 def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
-    elsewhere = replace(GONE, host="elsewhere")
-    for owner in (GONE, Owner.current(), elsewhere, replace(GONE, boot="before the power loss")):
-        take(tmp_path, owner, KEYS)
+    mine = Owner()
+    leave(tmp_path)
+    _, holding = take(tmp_path, mine, KEYS)
+    leave(tmp_path, replace(GONE, host="elsewhere"))
     (tmp_path / "7.output.lock").write_text("out.txt\n")
     said = []
     take_over(tmp_path, said.append)
     assert numbers(tmp_path) == [1, 2, 7]
-    assert takers(tmp_path)[:2] == [Owner.current(), elsewhere]
-    assert len(said) == 2 and all(str(GONE.pid) in line for line in said)
-    text = holders(tmp_path)
-    assert f"process {os.getpid()} of {Owner.current().host} is running" in text
+    assert takers(tmp_path)[:2] == [mine, replace(GONE, host="elsewhere")]
+    assert len(said) == 1 and str(GONE.pid) in said[0]
+    text = refusal(tmp_path)
+    assert f"process {os.getpid()} of {mine.host} is running" in text
     assert "host elsewhere, which cannot be seen from here" in text
     assert "7.output.lock: no record of its owner" in text and "--unlock" in text
+    assert holders(tmp_path, living=True) == [f"process {os.getpid()} of {mine.host} is running; wait for it or end it"]
+    holding.close()
+    take_over(tmp_path, said.append)
+    assert numbers(tmp_path) == [2, 7]
 
 
-def test_unlock_leaves_the_lock_of_an_owner_that_lives(tmp_path, monkeypatch, capsys):
-    persistence = pytest.importorskip("snakemake.persistence.file").FilePersistence
-    for name in ("lock", "lock_warn_only", "cleanup_locks"):
-        monkeypatch.setattr(persistence, name, getattr(persistence, name))
-    install()
-    unlocked, locks = [], tmp_path / "locks"
-    folder = SimpleNamespace(path=tmp_path, _lockdir=locks, unlock=lambda: unlocked.append("all"))
-    take(locks, GONE, KEYS)
-    persistence.cleanup_locks(folder)
-    assert unlocked == ["all"]
-    take(locks, Owner.current(), KEYS)
-    with pytest.raises(SystemExit, match=r"^2$"):
-        persistence.cleanup_locks(folder)
-    assert f"not unlocked: process {os.getpid()}" in capsys.readouterr().err
-    assert unlocked == ["all"]
+def test_a_lock_that_cannot_be_written_whole_leaves_nothing(tmp_path, monkeypatch):
+    def full(descriptor):
+        raise OSError(errno.ENOSPC, "No space left on device")
 
-
-def test_only_the_first_ctrl_c_interrupts_and_later_ones_are_answered(capfd):
-    before = signal.getsignal(signal.SIGINT)
-    try:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        interrupts.install()
-        with pytest.raises(KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        for _ in range(2):
-            signal.raise_signal(signal.SIGINT)
-        assert capfd.readouterr().err == 2 * interrupts.ANSWER.decode()
-        signal.signal(signal.SIGINT, signal.SIG_IGN)
-        interrupts.install()
-        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-    finally:
-        signal.signal(signal.SIGINT, before)
+    monkeypatch.setattr(locks.os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        take(tmp_path, Owner(), KEYS)
+    assert not list(tmp_path.iterdir())
 
 
 def test_jobs_that_outlived_their_run_are_ended(tmp_path):
@@ -132,7 +96,7 @@ def test_jobs_that_outlived_their_run_are_ended(tmp_path):
     for job in jobs:
         job.stdout.readline()
     assert GONE.left_behind() == [jobs[0].pid]
-    take(tmp_path, GONE, KEYS)
+    leave(tmp_path)
     said = []
     take_over(tmp_path, said.append)
     assert str(jobs[0].pid) in said[0] and "ending its 1 processes" in said[0]
@@ -143,10 +107,8 @@ def test_jobs_that_outlived_their_run_are_ended(tmp_path):
 
 RACE = """
 import sys, time
-from dataclasses import replace
 from pathlib import Path
-from lowalt.workflow.locks import guarded, numbers, take, take_over
-from lowalt.workflow.owner import Owner
+from lowalt.workflow.locks import Owner, guarded, numbers, take, take_over
 
 folder, start = Path(sys.argv[1]), float(sys.argv[2])
 time.sleep(start - time.time())
@@ -154,14 +116,14 @@ with guarded(folder):
     take_over(folder / "locks", lambda line: None)
     if not numbers(folder / "locks"):
         time.sleep(0.02)
-        take(folder / "locks", Owner.current(), {"input": [], "output": ["out.txt"]})
+        held = take(folder / "locks", Owner(), {"input": [], "output": ["out.txt"]})
         print("won")
 sys.stdin.read()
 """
 
 
 def test_of_many_that_find_a_dead_owner_at_the_same_moment_one_wins(tmp_path):
-    take(tmp_path / "locks", GONE, KEYS)
+    leave(tmp_path / "locks")
     start = str(time.time() + 1.5)
     command = [sys.executable, "-c", RACE, str(tmp_path), start]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
@@ -209,7 +171,7 @@ def test_snakemake_refuses_a_living_owner_and_takes_over_a_killed_one(tmp_path):
     status, text = ended(tmp_path)
     (sentence,) = [line for line in text.splitlines() if "process" in line]
     assert status == 2 and text.endswith(f"{sentence}\n") and "  File" not in text
-    assert sentence.startswith("error: ") and f"process {first.pid} of {Owner.current().host} is running" in sentence
+    assert sentence.startswith("error: ") and f"process {first.pid} of {Owner().host} is running" in sentence
     # A refused run takes nothing from the one that runs.
     assert takers(tmp_path / ".snakemake/locks")[0].pid == first.pid
     assert f"process {first.pid}" in ended(tmp_path, "--dry-run")[1]
@@ -232,7 +194,7 @@ def test_snakemake_never_takes_over_the_lock_of_another_host(tmp_path):
     pytest.importorskip("snakemake")
     (tmp_path / "Snakefile").write_text(SNAKEFILE)
     (tmp_path / "go").touch()
-    take(tmp_path / ".snakemake/locks", replace(GONE, host="elsewhere"), KEYS)
+    leave(tmp_path / ".snakemake/locks", replace(GONE, host="elsewhere"))
     before = json.loads((tmp_path / ".snakemake/locks/0.owner.json").read_text())
     status, text = ended(tmp_path)
     assert status != 0 and "host elsewhere" in text and "--unlock" in text

@@ -34,6 +34,7 @@ GIVEN = {
     "content": ({"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
     "reduced_chunk": ({"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
     "fidelity": ({"fidelity": "a"}, ["--fidelity", "a"]),
+    "samples": ({"views": ["a", "b"]}, ["--views", "a", "b"]),
 }
 
 
@@ -50,13 +51,6 @@ def test_every_value_in_a_command_of_a_rule_is_quoted_and_rules_run_nothing_but_
     fields = re.findall(r"(?<!\{)\{([^{}]+)\}(?!\})", commands)
     assert len(fields) > 100 and {field for field in fields if not field.endswith(":q")} == {"threads"}
     assert not re.findall(r"^    (?:script|run|notebook|wrapper|cwl):", text, re.MULTILINE)
-
-
-def test_samples_are_named_by_their_kind():
-    every = {"dataset": "d", "views": "v", "index": "i"}
-    for kind in ("dataset", "views", "index"):
-        assert options.samples(None, Inputs(every)) == [f"--{kind}", every[kind]]
-        del every[kind]
 
 
 def test_a_stage_loads_an_effect_s_module_only_in_its_scene():

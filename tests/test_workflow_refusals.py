@@ -1,10 +1,13 @@
 """Refusals: each contradiction is refused by its words, and the same configuration without it is taken."""
 
+import os
 import re
+from pathlib import Path
 
 import pytest
 import yaml
 
+import snakemake_runs
 from configured import run_of
 from lowalt.common.config import load_yaml
 from lowalt.common.errors import InputError
@@ -111,3 +114,25 @@ def test_paths_with_braces_are_refused_by_their_key_and_other_odd_names_are_not(
 def test_a_wrong_configuration_makes_no_run(overlay, words):
     with pytest.raises(InputError, match=re.escape(words)):
         run_of(overlay)
+
+
+@pytest.mark.workflow
+@pytest.mark.parametrize(("overlay", "target", "sentence"), [
+    ({"seed": -1}, "data", r"error: configuration refused: seed: value -1, expected at least 0.*"),
+    ({}, "accuracy_cost", r"error: no results/fidelity-exact/transfer\.csv: .* `make accuracy-cost` makes it first"),
+    ({"run": "mine", "recognition": {"transfer": ["missing"]}}, "results/mine/transfer.csv",
+     r"error: recognition\.transfer: no results/missing/config\.yaml, expected a finished run 'missing' .*"),
+])  # fmt: skip
+def test_a_refusal_is_one_sentence_and_status_2_wherever_it_is_found(overlay, target, sentence, tmp_path):
+    """Whether the configuration is read or a rule asks for its files."""
+    pytest.importorskip("snakemake")
+    root = Path(__file__).parent.parent
+    (tmp_path / "overlay.yaml").write_text(yaml.safe_dump(overlay))
+    line = ["-n", "--snakefile", str(root / "Snakefile"), "--workflow-profile", "none", "--configfile"]
+    environment = os.environ | {"PYTHONPATH": str(root / "src")}
+    status, text = snakemake_runs.run(
+        tmp_path, [*line, str(root / "config/default.yaml"), "overlay.yaml", "--", target], environment
+    )
+    *before, found = text.strip().splitlines()
+    assert status == 2 and re.fullmatch(sentence, found) and "Traceback" not in text
+    assert not [line for line in before if "rror" in line]

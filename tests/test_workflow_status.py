@@ -5,8 +5,7 @@ import logging
 import os
 import time
 
-import pytest
-
+from lowalt.__main__ import main
 from lowalt.workflow import status
 from test_workflow_board import board_of
 from test_workflow_display import handler_of, record
@@ -90,15 +89,13 @@ def test_the_command_shows_runs_that_live_or_else_the_one_that_ended_last(tmp_pa
     lives = json.loads((folder / f"{os.getpid()}.json").read_text())
     status_of = []
     monkeypatch.setattr(status, "read", lambda: status_of)
-    with pytest.raises(SystemExit) as stopped:
-        status.main()
-    assert stopped.value.code == 1 and "no run has started here" in capsys.readouterr().err
+    assert main(["status"]) == 2 and "no run has started here" in capsys.readouterr().err
     for number in (1, 2, 3):
         status_of.append(lives | {"pid": 2**22 + number, "state": "ended"})
-    status.main()
+    assert main(["status"]) == 0
     assert [line for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
         f"process {2**22 + 3}: ended, 0:00 ago"]  # fmt: skip
     status_of.insert(1, lives)
-    status.main()
+    assert main(["status"]) == 0
     assert [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if line.startswith("process")] == [
         f"process {os.getpid()}"]  # fmt: skip

@@ -6,13 +6,10 @@ Exit status: 0 done, 1 something was found wrong or a run failed, 2 bad input. S
 
 import argparse
 import sys
-from pathlib import Path
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
 from lowalt.common.command import refusal
 from lowalt.common.errors import InputError
-
-CONFIG, SCHEMA = Path("config/default.yaml"), Path("workflow/schemas/config.schema.yaml")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -21,29 +18,13 @@ def main(arguments: list[str] | None = None) -> int:
         prog="lowalt", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = line.add_subparsers(dest="command", required=True)
-    explain.add_to(commands, CONFIG, SCHEMA)
-    workflow.add_to(commands)
-    sample.add_to(commands, CONFIG, SCHEMA)
-    data.add_to(commands, CONFIG, SCHEMA)
-    compare.add_to(commands)
-    report.add_to(commands)
-    target.add_to(commands)
-    spectra.add_to(commands, CONFIG, SCHEMA)
-    completion.add_to(commands)
+    for part in (explain, workflow, sample, data, compare, report, target, spectra, completion):
+        part.add_to(commands)
     given = line.parse_args(arguments)
-    actions = {
-        "run": workflow.run, "status": workflow.states, "sample": sample.run, "verify": data.verify,
-        "remake": data.remake, "predict": data.predict, "compare": compare.run, "target": target.run,
-        "spectra": spectra.run, "report": report.run, "explain": explain.run,
-        "completion": lambda given: completion.script(line),
-    }  # fmt: skip
     try:
-        text = actions[given.command](given)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"error: {refusal(error)}", file=sys.stderr)
+        text = completion.script(line) if given.command == "completion" else given.act(given)
+    except (InputError, OSError) as error:
+        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
         return 2
     if text:
         print(text)

@@ -4,11 +4,11 @@
 from functools import partial
 from pathlib import Path
 
-from lowalt.common.command import refusing
+from lowalt.common.command import Refusing, refusing
 from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
 from lowalt.scene.catalogue import dotted
-from lowalt.workflow import interrupts, locks, options, polling, scheduling, space_check
+from lowalt.workflow import mends, options, space
 from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
@@ -16,19 +16,16 @@ from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
-interrupts.install()
-locks.install()
-scheduling.install()
-polling.install()
+mends.install()
 SCHEMA = workflow.source_path("../schemas/config.schema.yaml")
 config.update(located(config))
 with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
-    space_check.writable(Path.cwd(), RUN.name)
+    space.writable(Path.cwd(), RUN.name)
 
-calls = EffectCalls(RUN)
-products = Products(RUN, calls)
-settings = Settings(RUN, calls)
+calls = Refusing(EffectCalls(RUN))
+products = Refusing(Products(RUN, calls))
+settings = Refusing(Settings(RUN, calls))
 code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.

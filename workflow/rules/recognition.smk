@@ -81,7 +81,7 @@ rule train:
     benchmark:
         "results/{run}/benchmarks/train/{protocol}/{scheme}/{train_seed}.jsonl"
     # Trainings of more images take longer. The longest start first, so that no core waits for one at the end.
-    priority: scheduling.by_job(RUN.images_of_job)
+    priority: RUN.images_of_job
     conda:
         "../../envs/environment.yaml"
     threads: config["recognition"]["training"]["threads"] * RUN.launch.per_node
@@ -205,7 +205,7 @@ rule transfer:
             other=config["recognition"]["transfer"],
             training=RUN.trainings,
         ),
-        configs=expand("results/{name}/config.yaml", name=[RUN.name, *config["recognition"]["transfer"]]),
+        configs=products.transferred,
         schemes=config["recognition"]["table"],
     output:
         report("results/{run}/transfer.csv", caption="../report/transfer.rst", category="Recognition"),

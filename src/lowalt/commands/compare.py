@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.commands.for_programs import as_json, json_option
+from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.common.files import text_of
@@ -19,7 +19,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         epilog="example: lowalt compare results/default results/tiny",
     )  # fmt: skip
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
-    json_option(line)
+    acts(line, run)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:

@@ -3,16 +3,16 @@
 import argparse
 from pathlib import Path
 
-from lowalt.commands.for_programs import as_json, json_option
+from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.command import name_backbone
-from lowalt.common.config import load
+from lowalt.common.config import overlaid
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing
 from lowalt.shards.verify import faults, frozen
 
 
-def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
-    """Add the three commands to a parser's; base: the configuration by default; schema: its schema."""
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add the three commands to a parser's."""
     verify = commands.add_parser(
         "verify",
         help="check every byte of a data set",
@@ -26,8 +26,8 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     )  # fmt: skip
     remake.add_argument("index", type=_index, help="index.json of the data set")
     remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
-    for line in (verify, remake):
-        json_option(line)
+    for line, act in ((verify, verified), (remake, remade)):
+        acts(line, act)
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
@@ -38,9 +38,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     predict.add_argument("input", type=Path, help="tile (.png), or signals (stations, symbols) complex (.npy)")
     name_backbone(predict)
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
-    predict.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
-    predict.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
-    json_option(predict)
+    acts(predict, predicted)
 
 
 def _ended(lines: list[str], good: str, machine: bool) -> str:
@@ -57,7 +55,7 @@ def _index(text: str) -> Path:
     return Path(text).resolve() if Path(text).is_symlink() else Path(text)
 
 
-def verify(given: argparse.Namespace) -> str:
+def verified(given: argparse.Namespace) -> str:
     """Check a data set and return one line; print every fault and end with status 1 where there is one.
 
     Raises: InputError where there is no index.
@@ -76,7 +74,7 @@ def verify(given: argparse.Namespace) -> str:
     return _ended(lines, f"{given.index}: every byte is as it was written, {clouds}{again}", given.json)
 
 
-def remake(given: argparse.Namespace) -> str:
+def remade(given: argparse.Namespace) -> str:
     """Make samples again and return one line; print what differs and end with status 1 where anything does.
 
     Raises: InputError for a key that the data set lacks.
@@ -88,24 +86,24 @@ def remake(given: argparse.Namespace) -> str:
     return _ended(lines, f"{len(given.sample)} samples made again, equal in every byte", given.json)
 
 
-def predict(given: argparse.Namespace) -> str:
+def predicted(given: argparse.Namespace) -> str:
     """Return the probability of each class, the most probable first.
 
     A model file that knows how its images were made of signals is asked with that, unless overlays are given.
     Raises: InputError for a file that is no model, tile or signal.
     """
-    from lowalt.recognition.one_sample import predict as probabilities
+    from lowalt.recognition.one_sample import predict
     from lowalt.recognition.zoo import opened
 
     if given.input.suffix not in (".png", ".npy"):
         raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
-    config = load([given.base, *given.overlay], given.schema) if given.overlay else {}
+    config = overlaid(given.overlay) if given.overlay else {}
     own = given.backbone or (config["recognition"]["network"]["backbone"] if config else "")
     model, settings = opened(given.model, own=own)
     if config or not settings:
-        config = config or load([given.base], given.schema)
+        config = config or overlaid([])
         settings = {key: config[key] for key in ("network", "spectra", "images")}
-    found = probabilities(model, existing(given.input, "input"), settings)
+    found = predict(model, existing(given.input, "input"), settings)
     if given.json:
         return as_json(found)
     return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import as_json, json_option
-from lowalt.common.config import load, merge
+from lowalt.commands.for_programs import acts, as_json
+from lowalt.common.config import merge, overlaid
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.yaml_files import load_yaml
@@ -23,15 +23,13 @@ def _sample(text: str) -> tuple[str, int]:
     return name, int(model)
 
 
-def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
-    """Add `explain` to a parser's commands; base: the configuration by default; schema: its schema."""
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add `explain` to a parser's commands."""
     line = commands.add_parser(
         "explain", help="say whether a scene's receiver finds its targets, and what each effect changes",
         epilog="example: lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml",
     )  # fmt: skip
-    line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the base; more may follow it")
-    line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
-    line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
+    line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     line.add_argument("--station", help="the station of the table of effects (default: the first)")
     line.add_argument("--model", type=Path, help="a trained model: how many of its answers each effect changes")
@@ -40,7 +38,7 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     line.add_argument("--sources", action="store_true", help="list where the model of each effect comes from")
     line.add_argument("--suggest", type=float, metavar="LEAST", help="write the effects that change a signal by more")
     line.add_argument("--out", type=Path, help="the scene to write with --suggest (.yaml)")
-    json_option(line)
+    acts(line, run)
 
 
 def run(given: argparse.Namespace) -> str:
@@ -55,7 +53,7 @@ def run(given: argparse.Namespace) -> str:
     from lowalt.scene import explain, explain_text
 
     inputs = os.environ.get("LOWALT_INPUTS")
-    config = load([given.base, *given.scene], given.schema)
+    config = overlaid(given.scene)
     scene = explain.scene_of(config)
     stations = scene.network.stations
     first = given.station or stations[0].name

@@ -1,17 +1,19 @@
-"""Answers of commands for programs: the option `--json`, and any answer as one JSON text."""
+"""What commands do, and their answers for programs: the option `--json`, and any answer as one JSON text."""
 
 import argparse
 import dataclasses
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 
-def json_option(line: argparse.ArgumentParser) -> None:
-    """Add `--json` to a command's line."""
+def acts(line: argparse.ArgumentParser, act: Callable[[argparse.Namespace], str]) -> None:
+    """Add `--json` to a command's line, and what the command does: the function that returns what it prints."""
     line.add_argument("--json", action="store_true", help="print JSON for a program")
+    line.set_defaults(act=act)
 
 
 def _plain(value: object) -> object:

@@ -8,7 +8,7 @@ import yaml
 
 from lowalt.commands import workflow
 from lowalt.commands.compare import facts
-from lowalt.commands.for_programs import as_json, json_option
+from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.common.shipped import as_named, shipped
@@ -28,7 +28,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
     line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
     line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
-    json_option(line)
+    acts(line, run)
 
 
 def run(given: argparse.Namespace) -> str:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import as_json, json_option
-from lowalt.common.config import load
+from lowalt.commands.for_programs import acts, as_json
+from lowalt.common.config import overlaid
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
 from lowalt.shards.dataset import Dataset, Place
@@ -17,8 +17,8 @@ from lowalt.shards.record import sample_key
 from lowalt.tiles.png import encode
 
 
-def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
-    """Add `sample` to a parser's commands; base: the configuration by default; schema: its schema."""
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add `sample` to a parser's commands."""
     line = commands.add_parser(
         "sample", help="one sample: tile, signals, record, and a picture with axes",
         epilog="example: lowalt sample Crow 3 --snr 13 --out samples",
@@ -26,10 +26,8 @@ def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> No
     line.add_argument("subtype", help="name of the subtype, as in the table of targets")
     line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
     line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
-    line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the base configuration")
-    line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
-    line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
-    json_option(line)
+    line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the default")
+    acts(line, run)
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 
@@ -40,7 +38,7 @@ def run(given: argparse.Namespace) -> str:
     """
     from lowalt.report.figures.sample import figure
 
-    config = load([given.base, *given.overlay], given.schema)
+    config = overlaid(given.overlay)
     everything = config["targets"]["select"]
     # Only the target's own cloud is made.
     config["targets"]["select"] = [given.subtype]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import as_json, json_option
-from lowalt.common.config import load
+from lowalt.commands.for_programs import acts, as_json
+from lowalt.common.config import overlaid
 from lowalt.common.hardware import describe
 from lowalt.common.timing import median_s
 from lowalt.spectra import spectrum, windows, zero_index
@@ -17,16 +17,14 @@ from lowalt.tiles.render import Renderer, normalised
 REPEATS = 5
 
 
-def add_to(commands: argparse._SubParsersAction, base: Path, schema: Path) -> None:
-    """Add the action to the command `lowalt`; base: the configuration by default; schema: its schema."""
+def add_to(commands: argparse._SubParsersAction) -> None:
+    """Add `spectra` to a parser's commands."""
     line = commands.add_parser(
         "spectra", help="the spectra of a configuration, and the time an image of each takes",
         epilog="example: lowalt spectra config/tiny.yaml",
     )  # fmt: skip
-    line.add_argument("overlay", type=Path, nargs="*", help="overlays on the base configuration")
-    line.add_argument("--base", type=Path, default=base, help=f"base configuration (default: {base})")
-    line.add_argument("--schema", type=Path, default=schema, help=f"its schema (default: {schema})")
-    json_option(line)
+    line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default")
+    acts(line, run)
 
 
 def facts(config: dict) -> list[dict]:
@@ -69,7 +67,7 @@ def described(found: list[dict], hardware: str) -> str:
 
 def run(given: argparse.Namespace) -> str:
     """Return the facts as text, or as JSON. Raises: InputError where the configuration is wrong."""
-    found = facts(load([given.base, *given.overlay], given.schema))
+    found = facts(overlaid(given.overlay))
     if given.json:
         return as_json({"spectra": found, "repeats": REPEATS, "hardware": describe()})
     return described(found, describe())

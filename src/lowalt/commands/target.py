@@ -6,7 +6,7 @@ from pathlib import Path
 
 import yaml
 
-from lowalt.commands.for_programs import as_json, json_option
+from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing, slug
 from lowalt.common.shipped import SHIPPED
@@ -70,8 +70,8 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     )  # fmt: skip
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
-    for parser in (inspect, new, make, show):
-        json_option(parser)
+    for parser, act in ((inspect, _inspect), (new, _new), (make, _make), (show, _show)):
+        acts(parser, act)
     for parser in (new, make):
         parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
         parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
@@ -169,16 +169,7 @@ def _picture(cloud: Path, out: Path) -> str:
     return str(out)
 
 
-def run(given: argparse.Namespace) -> str:
-    """Run the command that the parsed arguments name and return what it says.
-
-    Raises: InputError naming the file, key or value that is wrong.
-    """
-    if given.action == "inspect":
-        return _inspect(given)
-    if given.action == "new":
-        return _new(given)
-    if given.action == "make":
-        return _make(given)
+def _show(given: argparse.Namespace) -> str:
+    """Draw a cloud's file."""
     picture = _picture(given.cloud, given.out or given.cloud.with_suffix(".png"))
     return as_json({"picture": picture}) if given.json else picture

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lowalt.commands.for_programs import as_json, json_option
+from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.command import exit_status
 from lowalt.common.errors import InputError
 from lowalt.common.shipped import SHIPPED, shipped
@@ -34,11 +34,11 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
-    json_option(line)
+    acts(line, run)
     state = commands.add_parser(
         "status", help="the state of a run in another terminal", epilog="example: lowalt status"
     )
-    json_option(state)
+    acts(state, states)
 
 
 def command(given: argparse.Namespace) -> list[str]:

@@ -7,12 +7,14 @@ The workflow passes the object itself, so that Snakemake sees every change in it
 import argparse
 import contextlib
 import errno
+import functools
 import json
 import resource
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import text_of
@@ -108,6 +110,28 @@ def refusing() -> Iterator[None]:
     except (InputError, OSError) as error:
         print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
         raise SystemExit(2) from None
+
+
+class Refusing:
+    """An object whose methods answer as `refusing` says: Snakemake would show what a rule's function raises as a
+    traceback."""
+
+    def __init__(self, held: object) -> None:
+        """Take the object."""
+        self._held = held
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._held, name)
+        if not callable(found):
+            return found
+
+        @functools.wraps(found)
+        def asked(*given: Any, **named: Any) -> Any:
+            """Answer, or end the process after one line."""
+            with refusing():
+                return found(*given, **named)
+
+        return asked
 
 
 def run(main: Callable[[list[str]], None]) -> None:

@@ -18,6 +18,8 @@ from lowalt.common.schema import faults, plain
 from lowalt.common.shipped import located, shipped
 from lowalt.common.yaml_files import load_yaml
 
+DEFAULT, SCHEMA = "config/default.yaml", "workflow/schemas/config.schema.yaml"
+
 
 def merge(base: dict, overlay: dict) -> dict:
     """Return `base` with `overlay` laid over it: mappings merge key by key, anything else is replaced."""
@@ -101,6 +103,11 @@ def load(paths: Iterable[str | Path], schema_path: str | Path) -> dict:
     for path in paths:
         result = merge(result, load_yaml(shipped(path)))
     return located(check(result, shipped(schema_path)))
+
+
+def overlaid(overlays: Iterable[str | Path]) -> dict:
+    """Return the embedded default with overlays laid over it, in order, as `load` does."""
+    return load([DEFAULT, *overlays], SCHEMA)
 
 
 def main(arguments: list[str]) -> None:

@@ -15,7 +15,7 @@ from lowalt.common.yaml_files import load_yaml
 HEAD = """\
 # Keys of the configuration
 
-Written from `workflow/schemas/config.schema.yaml` by `make docs-pages`; do not edit it by hand. The values of the
+Written from `workflow/schemas/config.schema.yaml` by `make docs`; do not edit it by hand. The values of the
 embedded default stand in [`config/default.yaml`](../../config/default.yaml). An unknown key, a wrong type and a value
 out of its range are refused before any job starts. In an overlay, null takes out what a lower layer has, such as a
 station, a spectrum or an effect, wherever the key may be left out.

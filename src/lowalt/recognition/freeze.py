@@ -41,7 +41,8 @@ def verify(sums: str | Path) -> int:
         digest, gap, name = line[:64], line[64:66], line[66:]
         if gap != "  " or not name:
             raise InputError(f"{sums} line {number}: {line!r}, expected a SHA-256, two spaces and a path")
-        if not (folder / name).resolve().is_relative_to(folder):
+        # No file has a null byte in its name, and `resolve` does not answer for one.
+        if "\0" in name or not (folder / name).resolve().is_relative_to(folder):
             raise InputError(f"{sums} line {number}: {name!r}, expected a file below {folder}")
         if sha256(existing(folder / name, "frozen file")) != digest:
             raise InputError(f"{folder / name}: has changed since it was frozen in {sums}")

@@ -14,10 +14,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.common.classes import classes_of, label
+from lowalt.common.config import SCHEMA, check
 from lowalt.common.errors import InputError
 from lowalt.common.network import masts_m
 from lowalt.common.plan import GROUPS, Plan
-from lowalt.common.shipped import located
+from lowalt.common.shipped import located, shipped
 from lowalt.common.splits import FOLDS, fold
 from lowalt.common.streams import stream
 from lowalt.common.yaml_files import load_yaml
@@ -88,7 +89,7 @@ class Dataset:
         the table of targets by subtype, by default from the records; the classes follow from it.
         Raises: InputError naming the key, value or file that is wrong.
         """
-        config = load_yaml(config) if isinstance(config, (str, Path)) else config
+        config = check(load_yaml(config), shipped(SCHEMA)) if isinstance(config, (str, Path)) else config
         self.config, self.folds = config, tuple(folds)
         records = {}
         if published is None or clouds is None:

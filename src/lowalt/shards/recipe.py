@@ -17,9 +17,10 @@ from pathlib import Path
 
 from lowalt import __version__
 from lowalt.common.command import run
-from lowalt.common.config import check, plain
+from lowalt.common.config import SCHEMA, check, plain
 from lowalt.common.errors import InputError
 from lowalt.common.files import existing, replacing, sha256, text_of
+from lowalt.common.schema import check_brought
 from lowalt.common.shipped import shipped
 from lowalt.common.yaml_files import load_yaml
 from lowalt.shards import manifest
@@ -28,7 +29,6 @@ from lowalt.shards.dataset import Dataset
 from lowalt.shards.remake import CloudFolder
 
 FORMAT = "lowalt-recipe-1"
-SCHEMA = "workflow/schemas/config.schema.yaml"
 COVERED = ("clouds", "motion", "shards")
 """Stages whose files are unpacked; echoes and noisy signals stay in memory."""
 MEMBER = re.compile(r"recipe\.json|manifest\.sha256|clouds/[^/]+\.npz")
@@ -74,13 +74,14 @@ def _extracted(path: Path, folder: Path) -> dict:
             archive.extractall(folder, filter="data")
         head = json.loads(text_of(folder / "recipe.json", "recipe"))
         found, version = head["format"], head["lowalt"]
-        head["config"] = check(dict(head["config"]), shipped(SCHEMA))
     except (tarfile.TarError, OSError, ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not a recipe ({error})") from error
     if found != FORMAT:
         raise InputError(f"{path}: format {found!r}, expected {FORMAT!r}")
     if version != __version__:
         raise InputError(f"{path}: written by lowalt {version}, expected {__version__}: install that version")
+    check_brought("recipe", head, path)
+    check(head["config"], shipped(SCHEMA))
     return head
 
 

@@ -1,53 +1,93 @@
-"""Locks that end with their run: Snakemake's own lock, and a record of its owner in the same folder.
+"""Locks that end with their run: next to each pair of Snakemake's lock files, a record that the run holds locked.
 
-Snakemake locks a working directory by files that stay when it is killed. Here each pair of lock files has a third with
-the owner (`owner.py`), so the next run takes the files of a dead owner away and refuses with the name of a living one.
-`install` puts this in the place of Snakemake's lock; the Snakefile calls it, so every run profits.
+Snakemake locks a working directory by files that stay when it is killed. The system gives a lock on a file back when
+its holder ends, however it ends. So the next run takes the lock files of a dead run away and ends the jobs that it left
+behind, and it refuses with the name of a living one. `mends.py` puts this in the place of Snakemake's lock.
 """
 
 import contextlib
 import fcntl
+import json
 import os
 import signal
+import socket
 import time
+import uuid
 from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass, field
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 from lowalt.common.errors import InputError
-from lowalt.workflow.owner import TOKEN, Owner
+from lowalt.common.processes import state
 
 KINDS = ("input", "output")
+TOKEN = "LOWALT_RUN"
+"""Environment variable that every job of a run inherits: the token of the run."""
 GRACE_S = 10.0
 """Time that jobs of a dead run have to end after SIGTERM before they are killed."""
 
 
-@contextlib.contextmanager
-def guarded(folder: Path) -> Iterator[None]:
-    """Let one process at a time look at the locks and change them; the system frees the guard of a process that dies.
+@dataclass(frozen=True)
+class Owner:
+    """The run that holds a lock: its process id, its host, and a token that no other run has."""
 
-    Raises: InputError where the file system of the folder cannot lock files, since two runs could then both win.
+    pid: int = field(default_factory=os.getpid)
+    host: str = field(default_factory=socket.gethostname)
+    token: str = field(default_factory=lambda: uuid.uuid4().hex)
+
+    @classmethod
+    def read(cls, path: Path) -> "Owner | None":
+        """Return the owner that a file records, or None where the file is damaged, as after a power loss."""
+        try:
+            kept = json.loads(path.read_text())
+            return cls(kept["pid"], kept["host"], kept["token"])
+        except (OSError, ValueError, TypeError, KeyError):
+            return None
+
+    @property
+    def here(self) -> bool:
+        """Whether it runs, or ran, on this host, whose system knows the locks on files."""
+        return self.host == socket.gethostname()
+
+    def left_behind(self) -> list[int]:
+        """Process ids on this machine that carry the owner's token: where it is dead, jobs that outlived it."""
+        mark, found = f"{TOKEN}={self.token}".encode(), []
+        for folder in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):
+                marked = mark in (folder / "environ").read_bytes().split(b"\0")
+                if marked and int(folder.name) != os.getpid() and state(int(folder.name)) != "Z":
+                    found.append(int(folder.name))
+        return found
+
+
+@contextlib.contextmanager
+def locked_file(path: Path, how: int = fcntl.LOCK_EX) -> Iterator[int]:
+    """Hold a file locked for the length of a block, and give its descriptor; the system frees it for a dead process.
+
+    Raises: InputError where the file system cannot lock files, since two runs could then both win.
     """
-    descriptor = os.open(folder / "lowalt.guard", os.O_CREAT | os.O_RDWR, 0o666)
+    descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
     try:
         try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+            fcntl.flock(descriptor, how)
+        except BlockingIOError:
+            raise
         except OSError as error:
-            raise InputError(f"{folder}: its file system cannot lock files ({error.strerror})") from error
-        yield
+            raise InputError(f"{path.parent}: its file system cannot lock files ({error.strerror})") from error
+        yield descriptor
     finally:
         os.close(descriptor)
 
 
-def _owner_path(locks: Path, number: int) -> Path:
-    """File of a lock's owner."""
+def guarded(folder: Path) -> contextlib.AbstractContextManager:
+    """Let one process at a time look at the locks and change them, for the length of a block."""
+    return locked_file(folder / "lowalt.guard")
+
+
+def record(locks: Path, number: int) -> Path:
+    """File of a lock's owner, which the owner holds locked as long as it lives."""
     return locks / f"{number}.owner.json"
-
-
-def _lock_path(locks: Path, number: int, kind: str) -> Path:
-    """File of a lock's files of one kind, as Snakemake names it."""
-    return locks / f"{number}.{kind}.lock"
 
 
 def numbers(locks: Path) -> list[int]:
@@ -56,11 +96,20 @@ def numbers(locks: Path) -> list[int]:
     return sorted(int(name) for name in names if name.isdigit())
 
 
+def held(path: Path) -> bool:
+    """Return whether a process of this machine holds a record locked."""
+    try:
+        with locked_file(path, fcntl.LOCK_EX | fcntl.LOCK_NB):
+            return False
+    except BlockingIOError:
+        return True
+
+
 def drop(locks: Path, number: int) -> None:
     """Remove one lock; its owner's record goes last, so that a crash in between leaves no lock without owner."""
     for kind in KINDS:
-        _lock_path(locks, number, kind).unlink(missing_ok=True)
-    _owner_path(locks, number).unlink(missing_ok=True)
+        (locks / f"{number}.{kind}.lock").unlink(missing_ok=True)
+    record(locks, number).unlink(missing_ok=True)
 
 
 def take_over(locks: Path, say: Callable[[str], None]) -> None:
@@ -69,8 +118,8 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
     say: called with one sentence for every lock taken over. Locks of other hosts stay, as do those without a record.
     """
     for number in numbers(locks):
-        owner = Owner.read(_owner_path(locks, number))
-        if owner is None or not owner.here or owner.alive:
+        owner = Owner.read(record(locks, number))
+        if owner is None or not owner.here or held(record(locks, number)):
             continue
         ended = end(owner)
         drop(locks, number)
@@ -81,107 +130,56 @@ def take_over(locks: Path, say: Callable[[str], None]) -> None:
 def end(owner: Owner) -> list[int]:
     """End the processes that a dead run left behind, since they would write the next run's files; return their ids."""
     ended = owner.left_behind()
-    for number, wait_s in ((signal.SIGTERM, GRACE_S), (signal.SIGKILL, GRACE_S)):
+    for number in (signal.SIGTERM, signal.SIGKILL):
         for pid in owner.left_behind():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(pid, number)
-        stop = time.monotonic() + wait_s
+        stop = time.monotonic() + GRACE_S
         while owner.left_behind() and time.monotonic() < stop:
             time.sleep(0.05)
     return ended
 
 
-def living(locks: Path) -> list[str]:
-    """Return who holds the locks of a folder and is seen to live, a sentence each."""
-    owners = [Owner.read(_owner_path(locks, number)) for number in numbers(locks)]
-    return [
-        f"process {owner.pid} of {owner.host} is running; wait for it or end it"
-        for owner in owners
-        if owner and owner.here and owner.alive
-    ]
-
-
-def holders(locks: Path) -> str:
-    """Return who holds the locks of a folder, and what a person can do about it, in one line."""
+def holders(locks: Path, living: bool = False) -> list[str]:
+    """Return who holds the locks of a folder, a sentence each; living: only owners that are seen to live."""
     lines = []
     for number in numbers(locks):
-        path, owner = _owner_path(locks, number), Owner.read(_owner_path(locks, number))
-        if owner is None:
-            lines.append(f"{_lock_path(locks, number, 'output')}: no record of its owner in {path.name}")
-        elif not owner.here:
-            lines.append(f"process {owner.pid} of host {owner.host}, which cannot be seen from here")
-        elif owner.alive:
+        path = record(locks, number)
+        owner = Owner.read(path)
+        if owner and owner.here and held(path):
             lines.append(f"process {owner.pid} of {owner.host} is running; wait for it or end it")
-        else:
+        elif not living and owner is None:
+            lines.append(f"{locks / f'{number}.output.lock'}: no record of its owner in {path.name}")
+        elif not living and not owner.here:
+            lines.append(f"process {owner.pid} of host {owner.host}, which cannot be seen from here")
+        elif not living:
             lines.append(f"process {owner.pid} of {owner.host} has died; the next run takes its lock over")
+    return lines
+
+
+def refusal(locks: Path) -> str:
+    """Return who holds the locks of a folder, and what a person can do about it, in one line."""
     away = "if nothing of this runs any more: snakemake --unlock"
-    return f"the working directory is locked: {'; '.join([*lines, away])}"
+    return f"the working directory is locked: {'; '.join([*holders(locks), away])}"
 
 
-def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> int:
-    """Write a lock with its owner, the owner first, and return its number; call within `guarded`.
+def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, contextlib.ExitStack]:
+    """Write a lock with its owner, the owner first; call within `guarded`.
 
-    keys: the files read ("input") and written ("output") by the run.
+    keys: the files read ("input") and written ("output") by the run. Returns the lock's number, and what holds its
+    record locked until it is closed.
     """
     locks.mkdir(parents=True, exist_ok=True)
-    taken = set(numbers(locks))
+    taken, holding = set(numbers(locks)), contextlib.ExitStack()
     number = next(number for number in count() if number not in taken)
-    owner.write(_owner_path(locks, number))
-    for kind in KINDS:
-        _lock_path(locks, number, kind).write_text("".join(f"{key}\n" for key in keys[kind]))
-    return number
-
-
-def cleanup_locks(self: Any) -> None:
-    """Remove all locks of a persistence of Snakemake's, as `--unlock` asks.
-
-    Raises: SystemExit after one line that names a holder which is seen to live.
-    """
-    from lowalt.common.command import refusing
-
-    with refusing(), guarded(Path(self.path)):
-        alive = living(Path(self._lockdir))
-        if alive:
-            raise InputError("not unlocked: " + "; ".join(alive))
-        self.unlock()
-
-
-def install() -> None:
-    """Put locks with owners in the place of those of Snakemake's file backend."""
-    from snakemake.logging import logger
-    from snakemake.persistence.file import FilePersistence
-
-    from lowalt.common.command import refusing
-
-    @contextlib.contextmanager
-    def lock(self: FilePersistence) -> Iterator[None]:
-        """Hold the lock of a working directory for the length of a block.
-
-        Raises: SystemExit after one line that names the holders, or the folder that no lock can be written into.
-        """
-        folder, locks, owner = Path(self.path), Path(self._lockdir), Owner.current()
-        with refusing():
-            try:
-                with guarded(folder):
-                    take_over(locks, logger.warning)
-                    if self.locked:
-                        raise InputError(holders(locks))
-                    keys = {"input": self.all_inputfiles(), "output": self.all_outputfiles()}
-                    number = take(locks, owner, {kind: [str(key) for key in found] for kind, found in keys.items()})
-            except OSError as error:
-                raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
-        os.environ[TOKEN] = owner.token
-        try:
-            yield
-        finally:
-            drop(locks, number)
-
-    @contextlib.contextmanager
-    def lock_warn_only(self: FilePersistence) -> Iterator[None]:
-        """Say who holds the lock and go on, as Snakemake does for runs that write nothing."""
-        if self.locked:
-            logger.info(holders(Path(self._lockdir)))
-        yield
-
-    FilePersistence.lock, FilePersistence.lock_warn_only = lock, lock_warn_only
-    FilePersistence.cleanup_locks = cleanup_locks
+    try:
+        descriptor = holding.enter_context(locked_file(record(locks, number)))
+        os.write(descriptor, json.dumps(asdict(owner)).encode())
+        os.fsync(descriptor)
+        for kind in KINDS:
+            (locks / f"{number}.{kind}.lock").write_text("".join(f"{key}\n" for key in keys[kind]))
+    except OSError:
+        holding.close()
+        drop(locks, number)
+        raise
+    return number, holding

@@ -4,6 +4,7 @@ Each function takes the wildcards and the inputs of a job and can stand in a rul
 quotes every word of a list for the shell.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,40 +18,23 @@ def _option(name: str, files: str | list[str] | None) -> list[str]:
     return [f"--{name}", *([files] if isinstance(files, str) else files)] if files else []
 
 
-def occluders(wildcards: Any, input: Any) -> list[str]:
-    """The surfaces of a group, where points are hidden behind them."""
-    return _option("occluders", input.occluders)
+def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
+    """Return the function of the options that name these inputs of a job, as far as the job has them."""
+
+    def words(wildcards: Any, input: Any) -> list[str]:
+        """The options of one job."""
+        return [word for name in names for word in _option(name, input.get(name))]
+
+    return words
 
 
-def powers(wildcards: Any, input: Any) -> list[str]:
-    """The powers to which set SNRs refer, in a scene with effects."""
-    return _option("powers", input.powers)
-
-
-def motion(wildcards: Any, input: Any) -> list[str]:
-    """The motion table of a chunk, where the job has it."""
-    return _option("motion", input.motion)
-
-
-def noise_modules(config: dict) -> list[str]:
-    """The modules that the noise stage loads in a scene with a canceller."""
-    return ["lowalt.scene.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
-
-
-def clouds(wildcards: Any, input: Any) -> list[str]:
-    """The clouds of a chunk, where the job has them."""
-    return _option("clouds", input.clouds)
-
-
-def tile_modules(config: dict) -> list[str]:
-    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range profiles."""
-    late = ["lowalt.scene.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
-    return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late
-
-
-def content(wildcards: Any, input: Any) -> list[str]:
-    """Options that name the files that a shard is packed from, by its kind."""
-    return [word for name in ("signals", "tiles", "echoes", "powers") for word in _option(name, input.get(name))]
+clouds, fidelity, motion, occluders, powers = map(of_inputs, ("clouds", "fidelity", "motion", "occluders", "powers"))
+content = of_inputs("signals", "tiles", "echoes", "powers")
+"""The files that a shard is packed from, by its kind."""
+reduced_chunk = of_inputs("reduced", "motion")
+"""The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
+samples = of_inputs("dataset", "views", "index")
+"""The configuration to make samples from, the shrunk images, or the index of the shards: a job has one of them."""
 
 
 def reduced(wildcards: Any, output: Any) -> list[str]:
@@ -58,17 +42,12 @@ def reduced(wildcards: Any, output: Any) -> list[str]:
     return _option("reduced", [f"{Path(path).parent.name}={path}" for path in output.reduced])
 
 
-def reduced_chunk(wildcards: Any, input: Any) -> list[str]:
-    """The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
-    return [*_option("reduced", input.reduced), *_option("motion", input.motion)] if input.get("reduced") else []
+def noise_modules(config: dict) -> list[str]:
+    """The modules that the noise stage loads in a scene with a canceller."""
+    return ["lowalt.scene.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
-def fidelity(wildcards: Any, input: Any) -> list[str]:
-    """The table of models trained on echoes at a tolerance, where there is one."""
-    return _option("fidelity", input.fidelity)
-
-
-def samples(wildcards: Any, input: Any) -> list[str]:
-    """Options that name the shrunk images, the index of the shards, or the configuration to make samples from."""
-    kind = next(name for name in ("dataset", "views", "index") if input.get(name))
-    return _option(kind, input.get(kind))
+def tile_modules(config: dict) -> list[str]:
+    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range profiles."""
+    late = ["lowalt.scene.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
+    return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late

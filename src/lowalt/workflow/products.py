@@ -90,6 +90,22 @@ class Products(DataProducts):
             raise InputError(f"no {FIDELITY}: it comes from runs of their own, `make accuracy-cost` makes it first")
         return FIDELITY
 
+    def transferred(self, wildcards: Any) -> list[str]:
+        """Configurations of this run and of those whose models are tried on its test samples.
+
+        Raises: InputError naming a run that is missing, or has not trained what this one trains.
+        """
+        others = self._config["recognition"]["transfer"]
+        for other in others:
+            names = ["config.yaml", *(f"models/{training}/model.pt" for training in self._run.trainings)]
+            missing = [name for name in names if not Path(f"results/{other}/{name}").is_file()]
+            if missing:
+                raise InputError(
+                    f"recognition.transfer: no results/{other}/{missing[0]}, expected a finished run {other!r} with "
+                    "the schemes, protocols and seeds of this one"
+                )
+        return [f"results/{name}/config.yaml" for name in [wildcards.run, *others]]
+
     def report(self, wildcards: Any) -> dict[str, str | list[str]]:
         """The files of the report by the names of its manifest (`lowalt.report.inputs`)."""
         base, data, block = f"results/{wildcards.run}", f"results/{self._run.data}", self._config["report"]
@@ -110,7 +126,7 @@ class Products(DataProducts):
             for name, file in KEPT.items()
             if shipped(f"{REFERENCE}/{file}").is_file()
         }
-        # No rule makes this file, so that no run needs the package mpmath: `make hard-cases` makes it.
+        # No rule makes this file, so that no run needs the package mpmath: `python -m lowalt.measure.hard_cases` does.
         if Path(f"{base}/hard_cases.csv").is_file():
             files["hard_cases"] = f"{base}/hard_cases.csv"
         if self._run.trainings:

@@ -1,4 +1,5 @@
-"""Refusals of configurations whose values contradict each other, other runs or the files that are there.
+"""Refusals of configurations whose values contradict each other, their stations and signal, other runs or the files
+that are there.
 
 Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
 """
@@ -9,8 +10,12 @@ from pathlib import Path
 from lowalt.common.classes import AIRBORNE, CATEGORIES
 from lowalt.common.config import plain
 from lowalt.common.errors import InputError
+from lowalt.common.files import slug
+from lowalt.common.network import SPEED_OF_LIGHT, masts_m, station_names
 from lowalt.common.shipped import SHIPPED, as_named
 from lowalt.common.yaml_files import load_yaml
+from lowalt.recognition.schemes import Scheme, columns_in, names
+from lowalt.recognition.schemes import named as scheme_named
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, profiled
 from lowalt.targets.records import missing_inputs, records_of
@@ -36,14 +41,19 @@ def refuse_companions(config: dict, subtypes: Collection[str]) -> None:
         raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
 
 
+def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
+    """Refuse ranges (m) of names that are not known, and reversed ones."""
+    if unknown := sorted(set(ranges) - set(names)):
+        raise InputError(f"{key}: {unknown}, expected {expected}")
+    for name, (low, high) in ranges.items():
+        if low > high:
+            raise InputError(f"{key}: {name} from {low} to {high} m, expected the smaller value first")
+
+
 def refuse_sizes(config: dict, classes: tuple[str, ...] = tuple(CATEGORIES)) -> None:
     """Refuse sizes of unknown classes or whose range is reversed, and sizes together with effects."""
     sizes = config["motion"].get("sizes_m", {})
-    if set(sizes) - set(classes):
-        raise InputError(f"motion.sizes_m: {sorted(sizes)}, expected some of the classes {list(classes)}")
-    for category, (low, high) in sizes.items():
-        if low > high:
-            raise InputError(f"motion.sizes_m: {category} from {low} to {high} m, expected the smaller size first")
+    _refuse_ranges("motion.sizes_m", sizes, classes, f"some of the classes {list(classes)}")
     if sizes and config["effects"]:
         raise InputError(
             f"motion.sizes_m: given together with effects {sorted(config['effects'])}, expected one or the other"
@@ -87,12 +97,8 @@ def refuse_no_files(targets: dict, inputs: str | None) -> None:
 
 def refuse_heights(heights: dict, published: dict, classes: tuple[str, ...]) -> None:
     """Refuse flight heights for names that are neither subtypes nor classes, and a range that is reversed."""
-    unknown = sorted(set(heights) - {*published, *classes, *CATEGORIES})
-    if unknown:
-        raise InputError(f"motion.height_m: {unknown}, expected subtypes, classes {list(classes)} or {list(AIRBORNE)}")
-    for name, (low, high) in heights.items():
-        if low > high:
-            raise InputError(f"motion.height_m: {name} from {low} to {high} m, expected the lower height first")
+    known = {*published, *classes, *CATEGORIES}
+    _refuse_ranges("motion.height_m", heights, known, f"subtypes, classes {list(classes)} or {list(AIRBORNE)}")
 
 
 def refuse_data(config: dict) -> None:
@@ -125,3 +131,77 @@ def refuse_missing(config: dict) -> None:
         missing = [path for path in paths if path is not None and not Path(path).exists()]
         if missing:
             raise InputError(f"{key}: {missing[0]!r} is not there, expected the path of a file or folder that is")
+
+
+def refuse_region(config: dict) -> None:
+    """Refuse a region without an area, be it given or that between the stations."""
+    given = config["motion"]["region"]["polygon_m"]
+    corners = masts_m(config["network"]) if given is None else given
+    sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
+    if all(a * d == b * c for a, b in sides for c, d in sides):
+        stations = f", the area between the stations, and there is none between {corners}" if given is None else ""
+        raise InputError(
+            f"motion.region.polygon_m: {given}{stations}; expected corners (m) such as [[0, 0], [500, 0], [250, 433]]"
+        )
+
+
+def refuse_speeds(config: dict) -> None:
+    """Refuse matched speeds of the VT spectrum that repeat themselves: beyond c / (4 f T_r) speeds fold."""
+    network, vt = config["network"], config["spectra"].get("vt")
+    fold = SPEED_OF_LIGHT / (4 * network["carrier_hz"] * network["symbol_interval_s"])
+    # Symbols at uneven instants tell speeds beyond it apart, where their instants are known.
+    if vt is None or config["spectra"].get("times") == "known":
+        return
+    low, high = vt["speed_min_mps"], vt["speed_max_mps"]
+    if high - low > 2 * fold + vt["speed_step_mps"]:
+        raise InputError(
+            f"spectra.vt: speed_min_mps {low:g} to speed_max_mps {high:g}, expected at most {-fold:.3g} to {fold:.3g}: "
+            f"speeds fold there with network.carrier_hz {network['carrier_hz']:g} and symbol_interval_s "
+            f"{network['symbol_interval_s']:g}"
+        )
+
+
+def _suited(config: dict, name: str) -> Scheme:
+    """The scheme of the table, whose stations and spectra this configuration has."""
+    table, stations = config["recognition"]["table"], station_names(config["network"])
+    scheme = scheme_named(table, name, stations)
+    columns_in(scheme.columns, named(config["spectra"]), len(stations), table)
+    return scheme
+
+
+def _able(config: dict) -> list[str]:
+    """Names of the table's schemes whose stations and spectra this configuration has."""
+    found = []
+    for name in names(config["recognition"]["table"]):
+        try:
+            found.append(_suited(config, name).name)
+        except InputError:
+            continue
+    return found
+
+
+def schemes_of(config: dict) -> dict[str, Scheme]:
+    """Return the schemes that a run trains or times, by the name that the configuration gives them.
+
+    Raises: InputError for a scheme that stations and spectra do not suit, with those that they suit; for one named
+    twice; and where none trains in a protocol of the run.
+    """
+    block = config["recognition"]
+    known, found = set(map(slug, names(block["table"]))), {}
+    for key in ("schemes", "timed"):
+        for name in block[key]:
+            try:
+                found[name] = _suited(config, name)
+            except InputError as error:
+                able = _able(config) or "none: name a table of your own in recognition.table"
+                rest = f"; for this network and its spectra {block['table']} has {able}" * (slug(name) in known)
+                raise InputError(f"recognition.{key}: {name!r}: {error}{rest}") from None
+    trained = [found[name] for name in block["schemes"]]
+    if len({scheme.name for scheme in trained}) < len(trained):
+        raise InputError(f"recognition.schemes: {block['schemes']}, expected every scheme once")
+    if not any(set(scheme.protocols) & set(block["protocols"]) for scheme in trained):
+        raise InputError(
+            f"recognition.protocols: {block['protocols']}, expected a protocol of one of {block['schemes']}, which "
+            f"{block['table']} gives {sorted({name for scheme in trained for name in scheme.protocols})}"
+        )
+    return found

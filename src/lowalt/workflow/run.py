@@ -30,9 +30,11 @@ from lowalt.workflow.refusals import (
     refuse_missing,
     refuse_no_files,
     refuse_profiles,
+    refuse_region,
     refuse_sizes,
+    refuse_speeds,
+    schemes_of,
 )
-from lowalt.workflow.suited import refuse_region, refuse_speeds, schemes_of
 
 
 @dataclass(frozen=True)

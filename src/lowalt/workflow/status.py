@@ -1,4 +1,4 @@
-"""The state of a run in a file, for another terminal: `python -m lowalt.workflow.status`, or `make status`.
+"""The state of a run in a file, for another terminal: `lowalt status`.
 
 Each run writes .snakemake/status/{process id}.json in its working directory. Files of runs that have ended stay until
 the next run starts there; the command shows runs that live, else the one that ended last.
@@ -7,7 +7,6 @@ the next run starts there; the command shows runs that live, else the one that e
 import json
 import os
 import socket
-import sys
 import time
 from pathlib import Path
 
@@ -80,17 +79,3 @@ def describe(kept: dict, now: float) -> str:
     moment = now if living else kept["written"]
     lines = [board.line(name, moment, progress.last) for name in board.stages]
     return "\n".join([head, *lines, board.total(moment)])
-
-
-def main() -> None:
-    """Print the runs of the working directory."""
-    runs, now = read(), time.time()
-    living = [kept for kept in runs if alive(kept)]
-    if not runs:
-        print(f"no run has started here: {FOLDER} is empty", file=sys.stderr)
-        raise SystemExit(1)
-    print("\n".join(describe(kept, now) for kept in living or runs[-1:]))
-
-
-if __name__ == "__main__":
-    main()
