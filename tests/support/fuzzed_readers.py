@@ -15,6 +15,7 @@ from chain import IMAGES, SPECTRA, WAVE
 from craft import craft, row
 from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG, RECIPE, tar
 from fuzzing import Reader
+from shown_meshes import dae, ply, prism, skinned
 
 
 def _bytes(write: Callable[[Path], object], name: str) -> bytes:
@@ -66,6 +67,10 @@ def _meshes() -> list[Reader]:
         data = box.export(file_type=kind)
         data = data.encode() if isinstance(data, str) else bytes(data)
         readers.append(Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m")))
+    more = {"skinned .glb": _bytes(skinned, "a.glb"), "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
+            "polygons .dae": dae(*prism()).encode()}  # fmt: skip
+    readers += [Reader(f"mesh {kind}", f"a{kind[-4:]}", data, lambda path: read_mesh(path, "m"))
+                for kind, data in more.items()]  # fmt: skip
     return readers
 
 

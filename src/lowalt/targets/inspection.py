@@ -69,15 +69,10 @@ def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
     return sorted(result, key=lambda part: -float(part.extent.max()))
 
 
-def _named(path: Path) -> list[Piece]:
-    """Return the pieces of a file: an OBJ's by the names of its objects and groups, others by the scene's names."""
-    return pieces(path, groups=path.suffix.lower() == ".obj")
-
-
 def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
     """Return for each component the name of the smallest piece whose box holds it, or an empty text where none does."""
     boxes = [
-        (piece.instance, piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres) for piece in found
+        (piece.names[0], piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres) for piece in found
     ]
     names = []
     for number in range(len(mesh.closed)):
@@ -97,7 +92,7 @@ def inspect_mesh(path: str | Path, category: str, unit: str | float | None = Non
     Raises: InputError naming the file and the reason where it cannot be read.
     """
     path = existing(path, "mesh")
-    found = _named(path)
+    found = pieces(path)
     corners = [piece.vertices for piece in found] or [np.zeros((1, 3))]
     size = float(np.ptp(np.concatenate(corners), axis=0).max())
     stated = stated_unit_m(path)
@@ -115,7 +110,7 @@ def inspect_mesh(path: str | Path, category: str, unit: str | float | None = Non
     parts = components_of(mesh, _piece_names(mesh, found, metres))
     guesses = candidates(parts, "xyz".index(up), high - low, category)
     parts = [Component(**{**vars(part), "guess": guesses.get(part.number, "")}) for part in parts]
-    named = [(piece.instance, len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
+    named = [(piece.names[0], len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
     some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
     points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     return Inspection(
