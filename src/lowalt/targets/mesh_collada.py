@@ -52,8 +52,9 @@ def stated_metres(path: Path) -> float | None:
     return None
 
 
-def for_trimesh(path: Path) -> bytes:
-    """Return a COLLADA file whose polygons are triangles, cut as viewers cut them.
+def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
+    """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of its geometries by
+    their ids: those of the nodes that show them, and their own.
 
     Raises: InputError naming the file where it is no XML or has skins; other exceptions for a damaged file.
     """
@@ -67,7 +68,14 @@ def for_trimesh(path: Path) -> bytes:
             for element in parent:
                 if _name(element) in ("polylist", "polygons"):
                     _cut(element, elements)
-    return ElementTree.tostring(root)
+    names: dict[str, list[str]] = {}
+    for node in root.iter():
+        for shown in node if _name(node) == "node" else ():
+            if _name(shown) == "instance_geometry":
+                key = shown.get("url", "")[1:]
+                own = elements[key].get("name") if key in elements else None
+                names.setdefault(key, []).extend(name for name in (node.get("name"), node.get("id"), own) if name)
+    return ElementTree.tostring(root), names
 
 
 def _cut(element: ElementTree.Element, elements: dict) -> None:

@@ -7,6 +7,7 @@ no target.
 
 import io
 import logging
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -39,9 +40,10 @@ def _scene(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
 
     # trimesh logs a traceback of every optional reader that it cannot import; failures are raised below.
     logging.getLogger("trimesh").setLevel(logging.CRITICAL)
-    source = {"file_obj": path}
+    source, names = {"file_obj": path}, {}
     if path.suffix.lower() == ".dae":
-        source = {"file_obj": io.BytesIO(for_trimesh(path)), "file_type": "dae"}
+        data, names = for_trimesh(path)
+        source = {"file_obj": io.BytesIO(data), "file_type": "dae"}
     scene, result = trimesh.load_scene(**source, process=False), []
     for node in sorted(scene.graph.nodes_geometry):
         place, name = scene.graph[node]
@@ -53,7 +55,8 @@ def _scene(path: Path) -> list[tuple[tuple[str, ...], np.ndarray, np.ndarray]]:
         with np.errstate(invalid="ignore"):
             vertices = portable.applied(place[:3, :3], mesh.vertices) + place[:3, 3]
         faces = np.asarray(mesh.faces)[:, :: -1 if np.linalg.det(place[:3, :3]) < 0 else 1]
-        result.append(((str(node), name), vertices, faces))
+        more = next((found for key, found in names.items() if re.fullmatch(re.escape(key) + r"(_\d+)?", name)), [])
+        result.append((tuple(dict.fromkeys((str(node), name, *more))), vertices, faces))
     return result
 
 
