@@ -74,6 +74,17 @@ def _meshes() -> list[Reader]:
     return readers
 
 
+def _robots() -> list[Reader]:
+    """Readers of robots' descriptions, each with a good file."""
+    from lowalt.targets.robot_files import read_robot
+    from test_robots import MJCF, SDF, urdf
+
+    files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
+             ".sdf": SDF, ".xml": MJCF}  # fmt: skip
+    return [Reader(f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent))
+            for kind, text in files.items()]  # fmt: skip
+
+
 def _texts() -> list[Reader]:
     """Readers of configurations, tables and other texts, each with a good file."""
     from lowalt.common.command import settings
@@ -233,4 +244,4 @@ def _recipe() -> bytes:
 
 def readers() -> list[Reader]:
     """Return every reader with a good file of its kind."""
-    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes()]
+    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes(), *_robots()]

@@ -73,6 +73,7 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         new.add_argument(
             f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
         )
+    new.add_argument("--rotors", type=int, help="number of rotors of a target with a row of its own")
     new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
                      "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
@@ -161,11 +162,13 @@ def _draft(
     given: argparse.Namespace, path: Path, file: str, name: str, row: dict, category: str, table: dict
 ) -> str:  # fmt: skip
     """The record of a mesh file."""
-    found = inspect_mesh(path, category, given.unit, row, given.size_m, (given.up, given.front))
+    known = row or {"n_rotors_or_wings": given.rotors}
+    found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
     groups = chosen(found, given.moving) if given.moving else found.groups
+    count = known["n_rotors_or_wings"] or (len(groups) if given.moving else None)
     picture = Path(f"{(given.out or given.file).stem}-pieces.png")
     try:
-        refuse_miscount(found, groups, row, str(picture))
+        refuse_miscount(found, groups, count, str(picture))
     except InputError:
         from lowalt.report.figures.inspection import inspection_picture
 

@@ -9,7 +9,7 @@ import yaml
 from lowalt.common import portable
 from lowalt.common.classes import AIRBORNE
 from lowalt.common.errors import InputError
-from lowalt.targets.guesses import Component, box_of
+from lowalt.targets.guesses import TURNING, Component, box_of
 from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
 
@@ -44,6 +44,18 @@ def _place(group: list[Component], found: Inspection) -> str:
     return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ np.cross(front, up) >= 0 else 'left'}"
 
 
+def _diagonal(hubs: np.ndarray) -> float:
+    """The largest distance (m) between two of the hubs (R, 2)."""
+    return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max()) if len(hubs) else 0.0
+
+
+def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
+    """Return what the size of a target measures, as a record's `size_is` says it: a plane with motors has its span."""
+    if category == "UAV":
+        return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
+    return ALL_AXES if category == "Vehicle" else "length"
+
+
 def row_lines(
     category: str, extent: np.ndarray, hubs: np.ndarray, wheel_m: float | None, table: dict[str, dict]
 ) -> list[str]:
@@ -58,8 +70,7 @@ def row_lines(
     elif category == "Bird":
         sizes = {"size_m": extent[1]}
     else:
-        pairs = np.linalg.norm(hubs[:, None] - hubs[None], axis=2) if len(hubs) >= 2 else extent
-        sizes = {"size_m": pairs.max()}
+        sizes = {"size_m": extent.max() if size_word(category, extent, hubs) == "largest extent" else _diagonal(hubs)}
     key = "len_m" if category == "Vehicle" else "size_m"
     near = min((row for row in table.values() if row["category"] == category),
                key=lambda row: abs(np.log(row[key] / sizes[key])))  # fmt: skip
@@ -102,18 +113,18 @@ def alternating(hubs: np.ndarray) -> list[str]:
     return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
 
 
-def refuse_miscount(found: Inspection, groups: list[list[Component]], row: dict, picture: str) -> None:
-    """Refuse a craft whose rotors are not as many as its row has, or none where there is no row.
+def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int | None, picture: str) -> None:
+    """Refuse a craft whose rotors are not as many as they should be; where that is not known, names must tell them.
 
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
-    count = row.get("n_rotors_or_wings")
-    if found.category != "UAV" or (len(groups) == count if count else groups):
+    named = bool(groups) and all(TURNING["rotor"].search(part.piece) for group in groups for part in group)
+    if found.category != "UAV" or (len(groups) == count if count else named):
         return
-    wanted = f"the {count} of {row['name']}" if count else "at least one"
+    wanted = f"{count}" if count else "their number, --rotors N,"
     raise InputError(
-        f"{found.path}: {len(groups)} rotors found, expected {wanted}; {picture} numbers the pieces: give each "
-        "rotor's, joined by + where it has several, such as --moving 3 5+6 7 9, or choose a target with as many rotors"
+        f"{found.path}: {len(groups)} rotors found, expected {wanted} or their pieces, numbered in {picture}: --moving "
+        "and each rotor's, joined by + where it has several, such as --moving 3 5+6 7 9"
     )
 
 
@@ -143,7 +154,9 @@ def drafted(
     category = found.category
     kind = MOVING_KIND[category]
     unit = "" if found.unit_from != "guessed from the size" else CONFIRM
-    size_is = {"UAV": "motor diagonal" if len(groups) >= 2 else "largest extent", "Vehicle": ALL_AXES}
+    groups = sorted(groups, key=lambda group: group[0].centre.tolist())
+    frame = np.stack([np.cross(axis_vector(found.front), axis_vector(found.up)), axis_vector(found.front)])
+    hubs = np.array([frame @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
     marks = {name: "" if name in given else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
              for name, axis in (("up", found.up), ("front", found.front))}  # fmt: skip
     lines = [
@@ -155,7 +168,7 @@ def drafted(
         f"  unit: {found.unit}{unit}",
         f"  up: {found.up}{marks['up']}",
         f"  front: {found.front}{marks['front']}",
-        f"  size_is: {size_is.get(category, 'length')}",
+        f"  size_is: {size_word(category, found.high - found.low, hubs)}",
         "  licence: unknown  # the licence of the mesh",
         "  parts:",
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
@@ -165,9 +178,6 @@ def drafted(
     elif not groups:
         lines.append(f"    # No {kind} was found: give --moving, or add parts of kind {kind} (design/targets.md).")
     names: dict[str, int] = {}
-    groups = sorted(groups, key=lambda group: group[0].centre.tolist())
-    frame = np.stack([np.cross(axis_vector(found.front), axis_vector(found.up)), axis_vector(found.front)])
-    hubs = np.array([frame @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
     for group, sense in zip(groups, alternating(hubs), strict=True):
         place = f"{_place(group, found)} {kind}"
         names[place] = names.get(place, 0) + 1

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
 
 from lowalt.targets.mesh_files import UNITS_M
 
@@ -108,18 +109,20 @@ def _size(group: Sequence[Component]) -> np.ndarray:
 
 
 def _alike(one: Sequence[Component], other: Sequence[Component]) -> bool:
-    """Return whether two groups have the same three sizes in any order, to within ALIKE."""
+    """Return whether two groups have the same three sizes in any order, to within ALIKE, or as many triangles and as
+    large a surface: propellers at other angles have other boxes."""
     a, b = np.sort(_size(one)), np.sort(_size(other))
-    return bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
+    counts, areas = ([sum(getattr(part, name) for part in group) for group in (one, other)]
+                     for name in ("triangles", "area"))  # fmt: skip
+    copies = counts[0] == counts[1] and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
+    return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
 
 
 def _one_hub(one: Component, other: Component, up: int, touching: bool) -> bool:
     """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
     they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
     away, radius = np.abs(one.centre - other.centre), max(one.extent.max(), other.extent.max()) / 2
-    # Blades at other angles have other boxes, but as many triangles and as large a surface.
-    copies = one.triangles == other.triangles and abs(one.area - other.area) < ALIKE * one.area
-    same = copies or _alike([one], [other])
+    same = _alike([one], [other])
     if same and away[up] > 2 * max(one.extent[up], other.extent[up]):
         return False
     slack = TOUCH * 2 * radius
@@ -162,19 +165,37 @@ def rotors(
     point up, the likeliest first; without `count` at least two alike groups are needed where no name tells.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
-    for touching in (False, True):
-        groups = clusters(named, ups[0], touching)
+    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
+    alone = [clusters(named, ups[0], touching=False), *(_bladed(named, ups[0], count) if count else [])]
+    for groups in alone if count else [clusters(named, ups[0])]:
         good = [group for group in groups if _is_rotor(group, range(3), whole)]
         if good and (count is None or len(good) == count):
             return ups[0], good
     for up in ups:
         flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
-        for touching in (False, True):
-            good = [group for group in clusters(flat, up, touching) if _is_rotor(group, [up], whole)]
+        sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
+        for groups in sets:
+            good = [group for group in groups if _is_rotor(group, [up], whole)]
             if found := _alike_set(good, up, whole, count):
                 return up, found
     return ups[0], []
+
+
+def _bladed(parts: Sequence[Component], up: int, count: int) -> list[list[list[Component]]]:
+    """Sets of `count` groups of as many alike blades each, those whose middles are nearest to one another."""
+    sets = []
+    for index, part in enumerate(parts):
+        same = [other for other in parts if _alike([part], [other])]
+        blades, rest = divmod(len(same), count)
+        if rest or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
+            continue
+        places = np.delete(np.array([other.centre for other in same]), up, axis=1)
+        label = fcluster(linkage(places, "average"), count, "maxclust")
+        groups = [[other for other, its in zip(same, label, strict=True) if its == one] for one in np.unique(label)]
+        if [len(group) for group in groups] == [blades] * count:
+            sets.append(groups)
+    return sets
 
 
 def _alike_set(groups: list[list[Component]], up: int, whole: np.ndarray, count: int | None) -> list[list[Component]]:

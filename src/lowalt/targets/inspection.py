@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.files import existing
-from lowalt.targets.guesses import Component, guessed_axes, guessed_unit, rotors, wheels
+from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces
 
@@ -132,6 +132,11 @@ def inspect_mesh(
     elif category == "Vehicle":
         groups = wheels(parts, high - low)
     guessed = guessed_axes(high - low, category, ups[0] if up is None else up)
+    if category == "UAV" and groups and axes[0] is None:
+        axis = "xyz".index(guessed[0])
+        hubs = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0)
+        # Rotors stand in the upper half; some files have their down axis first.
+        guessed = ("-" * bool(hubs[axis] < (low + high)[axis] / 2 - 1e-9) + guessed[0], guessed[1])
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
     moving = {part.number for group in groups for part in group}
     parts = [replace(part, guess=kind if part.number in moving else "") for part in parts]

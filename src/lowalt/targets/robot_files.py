@@ -230,13 +230,15 @@ class _Sdf:
         for child in model:
             name = scope + child.get("name", "")
             if child.tag == "link":
-                self.frames[name] = (above(child, inner), self.pose(child))
+                self.frames[name] = (above(child, inner), self.pose(child))  # over a joint of that name
                 self.links.append((name, child, base))
             elif child.tag == "frame":
                 attached = child.get("attached_to")
                 self.frames[name] = (above(child, scope + attached if attached else inner), self.pose(child))
             elif child.tag == "joint":
-                self.frames[name] = (above(child, scope + (child.findtext("child") or "").strip()), self.pose(child))
+                frame = f"{name} joint"  # links and joints of one name are told apart
+                self.frames[frame] = (above(child, scope + (child.findtext("child") or "").strip()), self.pose(child))
+                self.frames.setdefault(name, (frame, np.eye(4)))
                 self.jointed.append((name, scope, child, inner, old))
             elif child.tag == "plugin" and child.findtext("jointName") and child.findtext("turningDirection"):
                 joint, turn = (child.findtext(word, "").strip() for word in ("jointName", "turningDirection"))
@@ -283,10 +285,10 @@ class _Sdf:
             along = _numbers(told.text if told is not None else None, 3, (0, 0, 1))
             outer = old or (axis is not None and axis.findtext("use_parent_model_frame") in ("1", "true"))
             within = told.get("expressed_in") if told is not None else None
-            frame = inner if outer or within == "__model__" else scope + within if within else name
+            frame = inner if outer or within == "__model__" else scope + within if within else f"{name} joint"
             turned = _unit(portable.applied(self.place(frame)[:3, :3], along))
             low, high = (joint.findtext(f"axis/limit/{end}") for end in ("lower", "upper"))
-            here = self.place(name)[:3, 3]
+            here = self.place(f"{name} joint")[:3, 3]
             self.robot.joints.append(Joint(name, parent, child, here, turned, _endless(joint.get("type"), low, high)))
         return self.robot
 

@@ -13,10 +13,10 @@ import yaml
 
 from lowalt.common.errors import InputError
 from lowalt.common.files import replacing
-from lowalt.targets.draft import alternating, row_lines
+from lowalt.targets.draft import alternating, row_lines, size_word
 from lowalt.targets.guesses import TURNING
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES
-from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
+from lowalt.targets.mesh_record import MOVING_KIND
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,6 @@ def drafted_robot(
     extent = np.ptp(corners, axis=0)[[1, 0, 2]]
     hubs = np.array([joint.hinge[:2] for joint in joints.values()]).reshape(-1, 2)
     across = [float(np.ptp(triangles[name].reshape(-1, 3), axis=0).max()) for name in joints]
-    size_is = {"UAV": "motor diagonal" if len(hubs) >= 2 else "largest extent", "Vehicle": ALL_AXES}
     lines = [
         f"# Drafted from {source}, whose surfaces {file} holds in metres: x front, y left, z up.",
         f"{yaml.safe_dump(subtype).splitlines()[0]}:",
@@ -147,7 +146,7 @@ def drafted_robot(
         "  unit: m",
         "  up: z",
         "  front: x",
-        f"  size_is: {size_is.get(category, 'length')}",
+        f"  size_is: {size_word(category, extent, hubs)}",
         "  licence: unknown  # the licence of the description",
         "  parts:",
         *part_lines(robot, joints, kind, file),

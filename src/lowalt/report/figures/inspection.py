@@ -37,7 +37,8 @@ def inspection_picture(found: Inspection, numbered: bool = False) -> bytes:
         panel.scatter(found.points[:, across], found.points[:, high], s=4, c=colours, linewidths=0)
         for number, part in enumerate(found.components, 1):
             word = str(number) * (numbered and number <= MOST_NUMBERS) or part.guess
-            panel.text(part.centre[across], part.centre[high], word, fontsize=8, ha="center")
+            if word:
+                panel.text(part.centre[across], part.centre[high], word, fontsize=8, ha="center")
         for side in (-1, 1) if found.category == "Bird" and right in (across, high) else ():
             line = panel.axvline if across == right else panel.axhline
             line(middle[right] + side * found.shoulder_m, color="tab:red", linewidth=0.8, linestyle="--")
