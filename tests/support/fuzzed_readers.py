@@ -77,10 +77,10 @@ def _meshes() -> list[Reader]:
 def _robots() -> list[Reader]:
     """Readers of robots' descriptions, each with a good file."""
     from lowalt.targets.robot_files import read_robot
-    from test_robots import MJCF, SDF, urdf
+    from made_robots import MJCF, SDF, urdf
 
     files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
-             ".sdf": SDF, ".xml": MJCF}  # fmt: skip
+             ".sdf": SDF, ".xml": MJCF.replace('type="mesh"', 'type="sphere" size="1"')}  # fmt: skip
     return [Reader(f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent))
             for kind, text in files.items()]  # fmt: skip
 
