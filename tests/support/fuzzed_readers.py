@@ -137,17 +137,21 @@ def _texts() -> list[Reader]:
 def _captures() -> list[Reader]:
     """Readers of motion capture, each with a good file."""
     from lowalt.targets.mocap_files import read_motion, read_skeleton
+    from lowalt.targets.mocap_joints import read_bvh, read_joints
     from lowalt.targets.skeleton import NODES
-    from walkers import asf, walk
+    from walkers import BVH, asf, walk
 
     text = asf({name: np.array([0.3, 1.0, 0.1]) for name in NODES})
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.asf"
         path.write_text(text)
         skeleton = read_skeleton(path)
+    joints = _bytes(lambda path: np.savez(path, joints=np.ones((4, 22, 3)), fps=30.0), "a.npz")
     return [
         Reader("skeleton .asf", "a.asf", text.encode(), read_skeleton),
         Reader("motion .amc", "a.amc", walk(40).encode(), lambda path: read_motion(path, skeleton)),
+        Reader("motion .bvh", "a.bvh", BVH.encode(), read_bvh),
+        Reader("motion .npz", "a.npz", joints, read_joints, seal=ARCHIVE),
     ]
 
 
