@@ -13,8 +13,7 @@ from lowalt.__main__ import main
 from lowalt.common.errors import InputWarning
 from lowalt.report.figures.target import target_animation
 from lowalt.targets.cloud import read
-from lowalt.targets.draft import clusters
-from lowalt.targets.guesses import guessed_axes, guessed_unit
+from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
@@ -73,7 +72,8 @@ def test_blades_that_touch_are_one_rotor_and_separate_ones_are_not(tmp_path):
     found = inspect_mesh(tmp_path / "craft.stl", "UAV")
     rotors = [part for part in found.components if part.guess == "rotor"]
     assert len(rotors) == 8
-    assert sorted(len(group) for group in clusters(rotors)) == [2, 2, 2, 2]
+    assert sorted(len(group) for group in clusters(rotors, 2)) == [2, 2, 2, 2]
+    assert len(clusters(rotors, 2, touching=False)) == 8
 
 
 def test_an_alike_plate_at_another_height_is_no_rotor(tmp_path):

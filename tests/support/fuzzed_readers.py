@@ -14,6 +14,7 @@ from chain import IMAGES, SPECTRA, WAVE
 from craft import craft, row
 from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG, RECIPE, tar
 from fuzzing import Reader
+from shown_meshes import dae, ply, prism, skinned
 
 
 def _bytes(write: Callable[[Path], object], name: str) -> bytes:
@@ -65,7 +66,22 @@ def _meshes() -> list[Reader]:
         data = box.export(file_type=kind)
         data = data.encode() if isinstance(data, str) else bytes(data)
         readers.append(Reader(f"mesh .{kind}", f"a.{kind}", data, lambda path: read_mesh(path, "m")))
+    more = {"skinned .glb": _bytes(skinned, "a.glb"), "mixed .ply": ply(*prism(), "little", [[0, 1, 2, 3]]),
+            "polygons .dae": dae(*prism()).encode()}  # fmt: skip
+    readers += [Reader(f"mesh {kind}", f"a{kind[-4:]}", data, lambda path: read_mesh(path, "m"))
+                for kind, data in more.items()]  # fmt: skip
     return readers
+
+
+def _robots() -> list[Reader]:
+    """Readers of robots' descriptions, each with a good file."""
+    from lowalt.targets.robot_files import read_robot
+    from made_robots import MJCF, SDF, urdf
+
+    files = {".urdf": urdf(blade="").replace('<mesh filename="" scale="0.001 0.001 0.001"/>', '<sphere radius="1"/>'),
+             ".sdf": SDF, ".xml": MJCF.replace('type="mesh"', 'type="sphere" size="1"')}  # fmt: skip
+    return [Reader(f"robot {kind}", f"a{kind}", text.encode(), lambda path: read_robot(path, path.parent))
+            for kind, text in files.items()]  # fmt: skip
 
 
 def _texts() -> list[Reader]:
@@ -119,17 +135,21 @@ def _texts() -> list[Reader]:
 def _captures() -> list[Reader]:
     """Readers of motion capture, each with a good file."""
     from lowalt.targets.mocap_files import read_motion, read_skeleton
+    from lowalt.targets.mocap_joints import read_bvh, read_joints
     from lowalt.targets.skeleton import NODES
-    from walkers import asf, walk
+    from walkers import BVH, asf, walk
 
     text = asf({name: np.array([0.3, 1.0, 0.1]) for name in NODES})
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.asf"
         path.write_text(text)
         skeleton = read_skeleton(path)
+    joints = _bytes(lambda path: np.savez(path, joints=np.ones((4, 22, 3)), fps=30.0), "a.npz")
     return [
         Reader("skeleton .asf", "a.asf", text.encode(), read_skeleton),
         Reader("motion .amc", "a.amc", walk(40).encode(), lambda path: read_motion(path, skeleton)),
+        Reader("motion .bvh", "a.bvh", BVH.encode(), read_bvh),
+        Reader("motion .npz", "a.npz", joints, read_joints, seal=ARCHIVE),
     ]
 
 
@@ -222,4 +242,4 @@ def _recipe() -> bytes:
 
 def readers() -> list[Reader]:
     """Return every reader with a good file of its kind."""
-    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes()]
+    return [*_texts(), *_arrays(), *_captures(), *_recordings(), *_meshes(), *_robots()]

@@ -11,6 +11,15 @@ from lowalt.targets.skeleton import LIMBS, NODES
 
 CHANNELS = {"lfemur": "rx ry rz", "ltibia": "rx", "rfemur": "rx ry rz", "rtibia": "rx", "lhumerus": "rx ry rz"}
 PUBLISHED = {"hgt_m": 1.75}
+BVH = """HIERARCHY
+ROOT Hips { OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+JOINT Spine { OFFSET 0 2 0 CHANNELS 3 Zrotation Xrotation Yrotation End Site { OFFSET 0 3 0 } } }
+MOTION
+Frames: 2
+Frame Time: 0.02
+1 2 3 90 0 0 0 90 0
+0 0 0 0 0 0 90 0 0
+"""
 
 
 def asf(bones: dict[str, np.ndarray], extra: str = "") -> str:
@@ -61,6 +70,9 @@ def cloud_of(folder: Path, **changes) -> Cloud:
         "subtype": "Walking Pedestrian 1", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap",
         "rcs_m2_per_point": 1.0, "points": 30,
     }  # fmt: skip
-    extra = {"skeleton": "s.asf", "motion": "m.amc"} | changes
+    # The walk is made up: its steps are too quick for their length, so the rate is said.
+    extra = {"skeleton": "s.asf", "motion": "m.amc", "rate_hz": 120} | changes
+    extra = {key: value for key, value in extra.items() if value is not None}
+    record |= {"published": extra.pop("published", PUBLISHED)}
     record = mocap.check_record(record | extra, extra, "record")
     return check(mocap.mocap_cloud(record, folder, 3), "cloud")

@@ -2,21 +2,29 @@
 
 import argparse
 import os
+import re
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import numpy as np
 import yaml
 
 from lowalt.commands.for_programs import acts, as_json
 from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, slug
+from lowalt.common.files import existing, replacing, slug
 from lowalt.common.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
-from lowalt.targets.draft import drafted
+from lowalt.targets.draft import axis_vector, chosen, drafted, refuse_miscount, row_lines
+from lowalt.targets.guesses import box_of
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_record import MOVING_KIND
 from lowalt.targets.records import load_table, merge, read_records, with_row
+from lowalt.targets.robot_files import is_description, read_robot
+from lowalt.targets.robots import drafted_robot, parts_of, turning, write_parts
 
+AXES = ("x", "-x", "y", "-y", "z", "-z")
 TABLE = SHIPPED / "config/targets.csv"
 
 
@@ -47,14 +55,27 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     inspect.add_argument("file", type=Path)
     inspect.add_argument("--category", default="UAV", choices=("UAV", "Bird", "Vehicle"))
     inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
+    inspect.add_argument(
+        "--size", type=float, dest="size_m", help="largest extent of the target (m), instead of --unit"
+    )
     inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
     new = actions.add_parser(
-        "new", help="draft a record of a mesh file; figures to confirm are marked",
+        "new", help="draft a record of a mesh or a robot's description; figures to confirm are marked",
         epilog='example: lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml',
     )  # fmt: skip
-    new.add_argument("file", type=Path)
-    new.add_argument("--subtype", required=True, help="the published target whose place the mesh takes")
+    new.add_argument("file", type=Path, help="mesh, or a robot's description: URDF, SDF or MJCF")
+    new.add_argument("--subtype", help="the published target whose place it takes; another name (default: the file's) "
+                     "makes a row of its own")  # fmt: skip
+    new.add_argument("--category", choices=("UAV", "Bird", "Vehicle"), help="of a target with a row of its own")
     new.add_argument("--unit", type=_unit)
+    new.add_argument("--size", type=float, dest="size_m", help="largest extent of the target (m), instead of --unit")
+    for axis in ("up", "front"):
+        new.add_argument(
+            f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
+        )
+    new.add_argument("--rotors", type=int, help="number of rotors of a target with a row of its own")
+    new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
+                     "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
     make = actions.add_parser(
         "make", help="one record to one cloud and a picture",
@@ -78,56 +99,128 @@ def add_to(commands: argparse._SubParsersAction) -> None:
                             help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
 
 
-def _row(table: Path, subtype: str) -> dict:
-    """The row of a subtype in a table of targets. Raises: InputError for an unknown subtype."""
-    rows = load_table(table)
-    if subtype not in rows:
-        raise InputError(f"--subtype is {subtype!r}, expected one of {list(rows)}")
-    return rows[subtype]
-
-
 def _inspect(given: argparse.Namespace) -> str:
     """Inspect a mesh and draw it."""
     from lowalt.report.figures.inspection import inspection_picture
 
-    found = inspect_mesh(given.file, given.category, given.unit)
+    found = inspect_mesh(given.file, given.category, given.unit, size_m=given.size_m)
     out = given.out or Path(f"{given.file.stem}-inspect.png")
     with replacing(out) as temporary:
         temporary.write_bytes(inspection_picture(found))
     if given.json:
         parts = [vars(part) | {"extent": part.extent, "centre": part.centre} for part in found.components]
         pieces = [{"name": name, "triangles": count, "extent": extent} for name, count, extent in found.pieces]
-        told = {name: value for name, value in vars(found).items() if name not in ("points", "owner")}
+        told = {name: value for name, value in vars(found).items() if name not in ("points", "owner", "groups")}
         wings = {"wings_from_m": found.shoulder_m} if found.category == "Bird" else {}
         return as_json({**told, "components": parts, "pieces": pieces, **wings, "picture": out})
     return f"{described(found)}\n\npicture  {out}"
 
 
-def _new(given: argparse.Namespace) -> str:
-    """Draft a record of a mesh file."""
-    row = _row(given.table, given.subtype)
-    if row["category"] == "Pedestrian":
-        raise InputError(f"--subtype is {given.subtype!r}, a pedestrian, expected a UAV, a bird or a vehicle")
+def _target(given: argparse.Namespace, table: dict[str, dict]) -> tuple[str, dict]:
+    """The name and the published row of a target to draft, an empty row for one of its own.
+
+    Raises: InputError for a pedestrian, and for a name that is not published where no category is given.
+    """
+    stem = given.file.stem if given.file.stem != "model" else given.file.resolve().parent.name
+    name = given.subtype or stem
+    row = table.get(name, {})
+    if row.get("category") == "Pedestrian":
+        raise InputError(f"--subtype is {name!r}, a pedestrian, expected a UAV, a bird or a vehicle")
+    if not (row or given.category or is_description(given.file)):
+        raise InputError(f"--subtype is {given.subtype!r}, expected one of {list(table)}, or --category for a row of "
+                         "its own")  # fmt: skip
+    return name, row
+
+
+def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tuple[str, bytes]:
+    """The record of a robot's description and the bytes of the GLB of its parts."""
+    file = f"{(given.out or given.file).stem}.glb"
+    robot = read_robot(given.file, given.inputs)
+    category = row.get("category") or given.category
+    if category is None:
+        category = "Vehicle" if turning(robot, "wheel") and not turning(robot, "rotor") else "UAV"
     try:
-        name = given.file.resolve().relative_to(given.inputs.resolve()).as_posix()
+        joints, triangles = parts_of(robot, MOVING_KIND[category])
+    except InputError as error:
+        raise InputError(f"{given.file}: {error}") from None
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / file
+        write_parts(path, triangles)
+        if joints:
+            count = row.get("n_rotors_or_wings", len(joints))
+            if category == "UAV" and count != len(joints):
+                raise InputError(f"{given.file}: {len(joints)} rotors turn, {name} has {count}: leave --subtype out "
+                                 "for a row of its own, or choose a target with as many")  # fmt: skip
+            names = (name, given.file.name, file)
+            return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
+        # No joint turns, as where a drone is one mesh: its pieces are looked at.
+        given.up, given.front, given.unit = given.up or "z", given.front or "x", "m"
+        return _draft(given, path, file, name, row, category, table), path.read_bytes()
+
+
+def _draft(
+    given: argparse.Namespace, path: Path, file: str, name: str, row: dict, category: str, table: dict
+) -> str:  # fmt: skip
+    """The record of a mesh file."""
+    known = row or {"n_rotors_or_wings": given.rotors}
+    found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
+    groups = chosen(found, given.moving) if given.moving else found.groups
+    count = known["n_rotors_or_wings"] or (len(groups) if given.moving else None)
+    picture = Path(f"{(given.out or given.file).stem}-pieces.png")
+    try:
+        refuse_miscount(found, groups, count, str(picture))
+    except InputError:
+        from lowalt.report.figures.inspection import inspection_picture
+
+        with replacing(picture) as temporary:
+            temporary.write_bytes(inspection_picture(found, numbered=True))
+        raise
+    front, up = axis_vector(found.front), axis_vector(found.up)
+    frame = np.stack([np.cross(front, up), front, up])
+    extent = np.abs(frame @ (found.high - found.low))
+    hubs = np.array([frame[:2] @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
+    wheel = max((float(np.subtract(*box_of(group)[::-1]).max()) for group in groups), default=None)
+    lines = [] if row else row_lines(category, extent, hubs, wheel, table)
+    given_axes = " ".join(axis for axis in ("up", "front") if getattr(given, axis))
+    return drafted(found, name, file, lines, groups, given_axes)
+
+
+def _new(given: argparse.Namespace) -> str:
+    """Draft a record of a mesh file or a robot's description."""
+    table, data = load_table(given.table), None
+    name, row = _target(given, table)
+    if given.size_m is not None and not 0 < given.size_m < 1e6:
+        raise InputError(f"--size is {given.size_m}, expected metres")
+    try:
+        file = existing(given.file, "mesh or description").resolve().relative_to(given.inputs.resolve()).as_posix()
     except ValueError:
         raise InputError(
             f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it"
         ) from None
-    text = drafted(inspect_mesh(given.file, row["category"], given.unit), given.subtype, row, name)
-    record = yaml.safe_load(text)[given.subtype]
-    merge(row, record, f"draft: {given.subtype}")
+    if is_description(given.file):
+        text, data = _robot(given, name, row, table)
+    else:
+        text = _draft(given, given.file, file, name, row, row.get("category") or given.category, table)
+    record = yaml.safe_load(text)[name]
+    cells = record.pop("row", None)
+    merge(with_row(None, name, cells, "draft") if cells else row, record, f"draft: {name}")
     moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
+    glb = given.inputs / f"{(given.out or given.file).stem}.glb"
+    for path in [given.out] * (given.out is not None) + [glb] * (data is not None):
+        if path.exists():
+            raise InputError(f"{path}: is there already, expected a new file")
+    if data is not None:
+        with replacing(glb) as temporary:
+            temporary.write_bytes(data)
     if given.out is not None:
-        if given.out.exists():
-            raise InputError(f"{given.out}: is there already, expected a new file")
         with replacing(given.out) as temporary:
             temporary.write_text(text)
     if given.json:
         return as_json({"file": given.out, "text": text, "moving_parts": moving, "marked_lines": marks})
     if given.out is None:
         return text
-    return f"{given.out}: {moving} moving parts drafted; confirm the {marks} marked lines"
+    ask = re.search(r"  front: .*GUESSED", text) and "; which way is front cannot be seen: confirm it or give --front"
+    return f"{given.out}: {moving} moving parts drafted; confirm the {marks} marked lines{ask or ''}"
 
 
 def _make(given: argparse.Namespace) -> str:

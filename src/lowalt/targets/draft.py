@@ -4,37 +4,24 @@ The draft is a YAML text with one record; it passes the checks of `mesh_record`,
 """
 
 import numpy as np
+import yaml
 
-from lowalt.common.classes import like
-from lowalt.targets.guesses import Component
+from lowalt.common import portable
+from lowalt.common.classes import AIRBORNE
+from lowalt.common.errors import InputError
+from lowalt.targets.guesses import TURNING, Component, box_of
 from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
 
 MARGIN = 0.02
 """A region reaches this share of its largest extent beyond the components that it shall take."""
 
-TOUCH = 0.1
-"""Boxes nearer than twice this share of the larger one's length belong together: the hub lies between two blades."""
-
 CONFIRM = "  # GUESSED, please confirm"
 
 
-def clusters(parts: list[Component]) -> list[list[Component]]:
-    """Return components whose boxes touch as one group each, such as the two blades of one propeller.
-
-    Boxes touch that are nearer than 2 TOUCH of the larger one's largest extent.
-    """
-    groups: list[list[Component]] = []
-    for part in parts:
-        near = [group for group in groups if any(_touch(part, other) for other in group)]
-        groups = [group for group in groups if group not in near] + [[part, *(one for group in near for one in group)]]
-    return groups
-
-
-def _touch(one: Component, other: Component) -> bool:
-    """Whether the boxes of two components, widened by TOUCH of the larger extent, overlap."""
-    slack = TOUCH * max(one.extent.max(), other.extent.max())
-    return bool((one.low - slack <= other.high + slack).all() and (other.low - slack <= one.high + slack).all())
+def axis_vector(axis: str) -> np.ndarray:
+    """Return the unit vector (3,) of an axis name such as "-y"."""
+    return np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1)
 
 
 def _numbers(values: np.ndarray) -> str:
@@ -44,26 +31,63 @@ def _numbers(values: np.ndarray) -> str:
 
 def _region(group: list[Component]) -> str:
     """YAML text of a box around components, wider by MARGIN."""
-    low = np.min([part.low for part in group], axis=0)
-    high = np.max([part.high for part in group], axis=0)
+    low, high = box_of(group)
     slack = MARGIN * float((high - low).max())
     return f"{{box: [{_numbers(low - slack)}, {_numbers(high + slack)}], whole: true}}"
 
 
 def _place(group: list[Component], found: Inspection) -> str:
     """Return the place of a group on the target in words: front or rear, left or right."""
-    up, front = "xyz".index(found.up), "xyz".index(found.front)
     middle = (found.low + found.high) / 2
-    centre = np.mean([part.centre for part in group], axis=0) - middle
-    right = np.cross(np.eye(3)[front], np.eye(3)[up])
-    return f"{'front' if centre[front] >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
+    centre = np.mean(box_of(group), axis=0) - middle
+    front, up = axis_vector(found.front), axis_vector(found.up)
+    return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ np.cross(front, up) >= 0 else 'left'}"
+
+
+def _diagonal(hubs: np.ndarray) -> float:
+    """The largest distance (m) between two of the hubs (R, 2)."""
+    return float(np.linalg.norm(hubs[:, None] - hubs[None], axis=2).max()) if len(hubs) else 0.0
+
+
+def size_word(category: str, extent: np.ndarray, hubs: np.ndarray) -> str:
+    """Return what the size of a target measures, as a record's `size_is` says it: a plane with motors has its span."""
+    if category == "UAV":
+        return "motor diagonal" if 2 * _diagonal(hubs) > extent.max() else "largest extent"
+    return ALL_AXES if category == "Vehicle" else "length"
+
+
+def row_lines(
+    category: str, extent: np.ndarray, hubs: np.ndarray, wheel_m: float | None, table: dict[str, dict]
+) -> list[str]:
+    """Return the lines of a row for a target that the table lacks: its size is the file's, its rates and speeds are
+    those of the target of its category that is nearest in size.
+
+    extent: (3,) m along right, front and up; hubs: (R, 2) m, the rotors' in plan, or the places of its wheels; wheel_m:
+    diameter of a wheel.
+    """
+    if category == "Vehicle":
+        sizes = dict(zip(("wid_m", "len_m", "hgt_m"), extent, strict=True)) | {"wheel_diam_m": wheel_m}
+    elif category == "Bird":
+        sizes = {"size_m": extent[1]}
+    else:
+        sizes = {"size_m": extent.max() if size_word(category, extent, hubs) == "largest extent" else _diagonal(hubs)}
+    key = "len_m" if category == "Vehicle" else "size_m"
+    near = min((row for row in table.values() if row["category"] == category),
+               key=lambda row: abs(np.log(row[key] / sizes[key])))  # fmt: skip
+    cells = {"category": category} | {name: float(f"{value:.4g}") for name, value in sizes.items() if value}
+    cells["n_rotors_or_wings"] = max(1, len(hubs)) if category != "Bird" else 2
+    speeds = ("vx_abs_max", "vy_abs_max", "vz_abs_max") if category in AIRBORNE else ("speed_lo", "speed_hi")
+    cells |= {name: near[name] for name in ("wheel_diam_m", "freq_lo_hz", "freq_hi_hz", *speeds)
+              if near[name] is not None and name not in cells}  # fmt: skip
+    listed = ", ".join(f"{name}: {value}" for name, value in cells.items())
+    return [f"  row: {{{listed}}}{CONFIRM}: sizes are the file's, rates and speeds those of {near['name']}"]
 
 
 def _wings(found: Inspection) -> list[str]:
     """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle."""
-    front, up = "xyz".index(found.front), "xyz".index(found.up)
+    front, up = "xyz".index(found.front[-1]), "xyz".index(found.up[-1])
     right = 3 - front - up
-    sign = np.sign(np.cross(np.eye(3)[front], np.eye(3)[up])[right])
+    sign = np.sign(np.cross(axis_vector(found.front), axis_vector(found.up))[right])
     middle, lines = (found.low + found.high)[right] / 2, []
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (found.points[:, right] - middle)
@@ -81,27 +105,70 @@ def _wings(found: Inspection) -> list[str]:
     return lines
 
 
-def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
-    """Return a record file's text for a subtype of the published table (`row`), from an inspected mesh.
+def alternating(hubs: np.ndarray) -> list[str]:
+    """Return senses ccw and cw in turn for rotors in their order around their middle, hubs (R, 2)."""
+    if not len(hubs):
+        return []
+    order = np.argsort(np.arctan2(*(hubs - portable.mean(hubs, 0)).T), kind="stable")
+    return [("ccw", "cw")[int(place) % 2] for place in np.argsort(order, kind="stable")]
 
-    `file` is the mesh's path inside the folder of inputs. Lines that end in CONFIRM hold guesses. Moving parts are the
-    components that may be rotors or wheels; boxes take them out of the body. A bird's wings are the surface farther
-    out than `shoulder_m`.
+
+def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int | None, picture: str) -> None:
+    """Refuse a craft whose rotors are not as many as they should be; where that is not known, names must tell them.
+
+    Raises: InputError naming what was found, the numbered picture and the option to write.
     """
-    category = like(row)
+    named = bool(groups) and all(TURNING["rotor"].search(part.piece) for group in groups for part in group)
+    if found.category != "UAV" or (len(groups) == count if count else named):
+        return
+    wanted = f"{count}" if count else "their number, --rotors N,"
+    raise InputError(
+        f"{found.path}: {len(groups)} rotors found, expected {wanted} or their pieces, numbered in {picture}: --moving "
+        "and each rotor's, joined by + where it has several, such as --moving 3 5+6 7 9"
+    )
+
+
+def chosen(found: Inspection, words: list[str]) -> list[list[Component]]:
+    """Return the groups of components that words such as 5+6 number, from 1 in the order of an inspection.
+
+    Raises: InputError naming the word that is no such number.
+    """
+    groups = []
+    for word in words:
+        numbers = word.split("+")
+        if not all(one.isdecimal() and 1 <= int(one) <= len(found.components) for one in numbers):
+            raise InputError(f"--moving is {word!r}, expected numbers from 1 to {len(found.components)} joined by +")
+        groups.append([found.components[int(one) - 1] for one in numbers])
+    return groups
+
+
+def drafted(
+    found: Inspection, subtype: str, file: str, row: list[str], groups: list[list[Component]], given: str = ""
+) -> str:
+    """Return a record file's text for a subtype, from an inspected mesh.
+
+    `file` is the mesh's path inside the folder of inputs, `row` the lines of a row of its own, `groups` the components
+    that move, `given` says which of "up" and "front" the user gave. Lines that end in CONFIRM hold guesses. Boxes take
+    moving parts out of the body; a bird's wings are the surface farther out than `shoulder_m`.
+    """
+    category = found.category
     kind = MOVING_KIND[category]
-    groups = clusters([part for part in found.components if part.guess == kind])
     unit = "" if found.unit_from != "guessed from the size" else CONFIRM
-    size_is = {"UAV": "motor diagonal" if len(groups) >= 2 else "largest extent", "Vehicle": ALL_AXES}
+    groups = sorted(groups, key=lambda group: group[0].centre.tolist())
+    frame = np.stack([np.cross(axis_vector(found.front), axis_vector(found.up)), axis_vector(found.front)])
+    hubs = np.array([frame @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
+    marks = {name: "" if name in given else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
+             for name, axis in (("up", found.up), ("front", found.front))}  # fmt: skip
     lines = [
         f"# Drafted from {file}. Lengths are in metres along the file's axes.",
         "# Confirm each line that is marked, then remove the mark.",
-        f"{subtype}:",
+        f"{yaml.safe_dump(subtype).splitlines()[0]}:",
         "  source: mesh",
+        *row,
         f"  unit: {found.unit}{unit}",
-        f"  up: {found.up}{CONFIRM}: {found.up} or -{found.up}",
-        f"  front: {found.front}{CONFIRM}: {found.front} or -{found.front}",
-        f"  size_is: {size_is.get(category, 'length')}",
+        f"  up: {found.up}{marks['up']}",
+        f"  front: {found.front}{marks['front']}",
+        f"  size_is: {size_word(category, found.high - found.low, hubs)}",
         "  licence: unknown  # the licence of the mesh",
         "  parts:",
         f"    body: {{kind: body, meshes: [{{file: {file!r}}}]}}",
@@ -109,13 +176,12 @@ def drafted(found: Inspection, subtype: str, row: dict, file: str) -> str:
     if category == "Bird":
         lines += _wings(found)
     elif not groups:
-        lines.append(
-            f"    # No {kind} was found. Add each as a part of kind {kind}: see design/targets.md for its keys."
-        )
+        lines.append(f"    # No {kind} was found: give --moving, or add parts of kind {kind} (design/targets.md).")
     names: dict[str, int] = {}
-    for group in sorted(groups, key=lambda group: group[0].centre.tolist()):
+    for group, sense in zip(groups, alternating(hubs), strict=True):
         place = f"{_place(group, found)} {kind}"
         names[place] = names.get(place, 0) + 1
         name = place if names[place] == 1 else f"{place} {names[place]}"
-        lines.append(f"    {name}: {{kind: {kind}, region: {_region(group)}}}{CONFIRM}")
+        turn = f", sense: {sense}" * (kind == "rotor")
+        lines.append(f"    {name}: {{kind: {kind}, region: {_region(group)}{turn}}}{CONFIRM}")
     return "\n".join(lines) + "\n"

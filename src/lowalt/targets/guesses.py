@@ -1,8 +1,11 @@
 """Guesses on a mesh that the file does not state: its unit, its axes, and what its connected components may be."""
 
-from dataclasses import dataclass
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.cluster.hierarchy import fcluster, linkage
 
 from lowalt.targets.mesh_files import UNITS_M
 
@@ -17,15 +20,38 @@ ALIKE = 0.1
 FLAT = 0.35
 """Largest thickness of a propeller divided by its length."""
 
+SMALLEST_ROTOR = 0.15
+"""A rotor is at least so wide across, in parts of the craft's largest extent: screws and motor caps are not."""
+
+OFF_CENTRE = 0.3
+"""A rotor's surface lies about its hub: its middle is at most this share of its radius from that of its box; three
+blades have a quarter."""
+
+LONG = 0.75
+"""Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
+
+TOUCH = 0.1
+"""Boxes nearer than twice this share of the larger one's length belong together: the hub lies between two blades."""
+
 
 ROUND = 0.12
 """The two extents of a wheel across its axis differ by at most this share."""
 
 
+_ROTOR = r"(?:(?<![a-z])|main|tail)(?:rotor(?!craft)|prop(?!ul|ert)|blade|fan(?![a-z])|puller|pusher)"
+TURNING = {
+    "rotor": re.compile(_ROTOR + r"(?!.*(?:guard|duct|mount|shroud))", re.I),
+    "wheel": re.compile(r"wheel|tyre|tire(?!d)", re.I),
+    "wing": re.compile(r"wing", re.I),
+}
+"""Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
+
+
 @dataclass(frozen=True)
 class Component:
     """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
-    named piece it belongs to, and the kind of part that it may be (rotor, wheel, or an empty text)."""
+    names of the piece it belongs to, the kind of part that it may be (rotor, wheel, or an empty text), the `middle`
+    (3,) of its surface and its `area` (m2)."""
 
     number: int
     low: np.ndarray
@@ -34,6 +60,8 @@ class Component:
     closed: bool
     piece: str
     guess: str = ""
+    middle: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    area: float = 1.0
 
     @property
     def extent(self) -> np.ndarray:
@@ -46,66 +74,162 @@ class Component:
         return (self.low + self.high) / 2
 
 
-def guessed_unit(size: float, category: str) -> str:
-    """Return the unit of UNITS_M in which a largest extent of `size` (file units) is most usual for the category.
+def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> str:
+    """Return the unit of UNITS_M in which a largest extent of `size` (file units) is nearest to the target's.
 
-    This is the unit u with the least |log(size u / m)|, where m is the geometric mean of the category's USUAL_M.
+    wanted_m: the target's largest extent where it is known; by default the geometric mean of the category's USUAL_M.
+    The nearest unit u has the least |log(size u / m)|.
     """
-    usual = float(np.sqrt(np.prod(USUAL_M[category])))
+    usual = wanted_m or float(np.sqrt(np.prod(USUAL_M[category])))
     return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
 
 
-def guessed_axes(extent: np.ndarray, category: str) -> tuple[str, str]:
+def guessed_axes(extent: np.ndarray, category: str, up: int | None = None) -> tuple[str, str]:
     """Return the axes of the file that may point up and to the front. Only the extents (3,) are known, so no signs are.
 
     A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across.
+    across. `up` is the number of the axis upwards where something else tells it.
     """
-    order = np.argsort(extent, kind="stable")
-    up = int(order[0])
+    order = [axis for axis in np.argsort(extent, kind="stable") if axis != up]
+    order = [up, *order] if up is not None else order
     front = int(order[2] if category == "Vehicle" else order[1])
     if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
-        front = next(axis for axis in range(3) if axis != up)
-    return "xyz"[up], "xyz"[front]
+        front = next(axis for axis in range(3) if axis != order[0])
+    return "xyz"[order[0]], "xyz"[front]
 
 
-def _alike(one: Component, other: Component) -> bool:
-    """Return whether two components have the same three sizes in any order, to within ALIKE."""
-    a, b = np.sort(one.extent), np.sort(other.extent)
-    return bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
+def box_of(group: Sequence[Component]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest corners (3,) of a group of components."""
+    return np.min([part.low for part in group], axis=0), np.max([part.high for part in group], axis=0)
 
 
-def _may_be(component: Component, up: int, whole: np.ndarray, category: str) -> str:
-    """Return the kind of part that one component may be, by its shape and size."""
-    extent = component.extent
-    if category == "UAV":
-        across = np.delete(extent, up).max()
-        if extent[up] < FLAT * across and 0.04 * whole.max() < across < 0.7 * whole.max():
-            return "rotor"
-    if category == "Vehicle":
-        small, *large = np.sort(extent)
-        if large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3:
-            return "wheel"
-    return ""
+def _size(group: Sequence[Component]) -> np.ndarray:
+    """Extents (3,) of a group."""
+    return np.subtract(*box_of(group)[::-1])
 
 
-def candidates(components: list[Component], up: int, whole: np.ndarray, category: str) -> dict[int, str]:
-    """Return the kinds of parts that components may be, by number of the component.
+def _alike(one: Sequence[Component], other: Sequence[Component]) -> bool:
+    """Return whether two groups have the same three sizes in any order, to within ALIKE, or as many triangles and as
+    large a surface: propellers at other angles have other boxes."""
+    a, b = np.sort(_size(one)), np.sort(_size(other))
+    counts, areas = ([sum(getattr(part, name) for part in group) for group in (one, other)]
+                     for name in ("triangles", "area"))  # fmt: skip
+    copies = counts[0] == counts[1] and abs(areas[0] - areas[1]) <= ALIKE * max(areas)
+    return copies or bool((abs(a - b) <= ALIKE * max(a[2], b[2])).all())
 
-    Only the largest set of at least two alike components at one height is taken to be moving parts.
 
-    `up` the index of the axis that points up, `whole` (3,) the extents of the target in metres.
+def _one_hub(one: Component, other: Component, up: int, touching: bool) -> bool:
+    """Return whether two components turn about one hub: one lies about the middle of the other, as a spinner does, and
+    they are no pair of coaxial rotors. `touching`: whether long blades that touch, not discs, are of one rotor too."""
+    away, radius = np.abs(one.centre - other.centre), max(one.extent.max(), other.extent.max()) / 2
+    same = _alike([one], [other])
+    if same and away[up] > 2 * max(one.extent[up], other.extent[up]):
+        return False
+    slack = TOUCH * 2 * radius
+    near = bool((one.low - slack <= other.high + slack).all() and (other.low - slack <= one.high + slack).all())
+    long = all(np.sort(part.extent)[1] < LONG * part.extent.max() for part in (one, other))
+    away[up] = 0
+    return near and (float(np.linalg.norm(away)) <= radius / 2 or (touching and same and long))
+
+
+def clusters(parts: Sequence[Component], up: int, touching: bool = True) -> list[list[Component]]:
+    """Return components about one hub as one group each, such as the two blades of a propeller (`_one_hub`)."""
+    groups: list[list[Component]] = []
+    for part in parts:
+        near = [group for group in groups if any(_one_hub(part, other, up, touching) for other in group)]
+        groups = [group for group in groups if group not in near] + [[part, *(one for group in near for one in group)]]
+    return groups
+
+
+def _is_rotor(group: Sequence[Component], axes: Sequence[int], whole: np.ndarray) -> bool:
+    """Whether a group is flat along one of the axes, wide enough, and lies about one hub."""
+    extent, (low, high) = _size(group), box_of(group)
+    area = np.array([part.area for part in group])
+    middle = (np.array([part.middle for part in group]) * area[:, None]).sum(axis=0) / area.sum()
+    for axis in axes:
+        across = np.delete(extent, axis).max()
+        off = np.linalg.norm(np.delete(middle - (low + high) / 2, axis))
+        flat, wide = extent[axis] < FLAT * across, SMALLEST_ROTOR * whole.max() <= across < 0.7 * whole.max()
+        if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
+            return True
+    return False
+
+
+def rotors(
+    parts: Sequence[Component], ups: Sequence[int], whole: np.ndarray, count: int | None
+) -> tuple[int, list[list[Component]]]:
+    """Return the axis upwards and the groups of components that may be rotors: `count` of them, or none.
+
+    Pieces that their names call rotors come first, whatever their axes, then sets of alike flat groups that lie about
+    a hub each, of which the set farthest out is taken: motors stand at the ends of arms. `ups` are the axes that may
+    point up, the likeliest first; without `count` at least two alike groups are needed where no name tells.
     """
-    able = [(part, _may_be(part, up, whole, category)) for part in components]
-    able = [(part, kind) for part, kind in able if kind]
-    best: list[tuple[Component, str]] = []
-    for part, kind in able:
-        same = [
-            (other, kind)
-            for other, its in able
-            if its == kind and _alike(part, other) and abs(other.centre[up] - part.centre[up]) < 0.1 * whole.max()
-        ]
-        larger = len(same) > len(best) or (len(same) == len(best) and part.extent.max() > best[0][0].extent.max())
-        if len(same) >= 2 and larger:
-            best = same
-    return {part.number: kind for part, kind in best}
+    named = [part for part in parts if TURNING["rotor"].search(part.piece)]
+    # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
+    alone = [clusters(named, ups[0], touching=False), *(_bladed(named, ups[0], count) if count else [])]
+    for groups in alone if count else [clusters(named, ups[0])]:
+        good = [group for group in groups if _is_rotor(group, range(3), whole)]
+        if good and (count is None or len(good) == count):
+            return ups[0], good
+    for up in ups:
+        flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
+        flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
+        sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
+        for groups in sets:
+            good = [group for group in groups if _is_rotor(group, [up], whole)]
+            if found := _alike_set(good, up, whole, count):
+                return up, found
+    return ups[0], []
+
+
+def _bladed(parts: Sequence[Component], up: int, count: int) -> list[list[list[Component]]]:
+    """Sets of `count` groups of as many alike blades each, those whose middles are nearest to one another."""
+    sets = []
+    for index, part in enumerate(parts):
+        same = [other for other in parts if _alike([part], [other])]
+        blades, rest = divmod(len(same), count)
+        if rest or not 2 <= blades <= 6 or any(other is same[0] for other in parts[:index]):
+            continue
+        places = np.delete(np.array([other.centre for other in same]), up, axis=1)
+        label = fcluster(linkage(places, "average"), count, "maxclust")
+        groups = [[other for other, its in zip(same, label, strict=True) if its == one] for one in np.unique(label)]
+        if [len(group) for group in groups] == [blades] * count:
+            sets.append(groups)
+    return sets
+
+
+def _alike_set(groups: list[list[Component]], up: int, whole: np.ndarray, count: int | None) -> list[list[Component]]:
+    """The set of alike groups at one height that is farthest out, of `count` groups or of at least two."""
+    sets = []
+    for group in groups:
+        height = np.mean(box_of(group), axis=0)[up]
+        same = [other for other in groups if _alike(group, other)]
+        level = [other for other in same if abs(np.mean(box_of(other), axis=0)[up] - height) < 0.1 * whole.max()]
+        sets += [one for one in (level, same) if (len(one) == count if count else one is level and len(one) >= 2)]
+    middle = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0) if groups else np.zeros(3)
+
+    def reach(chosen: list[list[Component]]) -> float:
+        """How far out the hubs of a set lie."""
+        hubs = np.array([np.mean(box_of(group), axis=0) for group in chosen]) - middle
+        return float(np.linalg.norm(np.delete(hubs, up, axis=1), axis=1).mean())
+
+    return max(sets, key=reach, default=[])
+
+
+def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[list[Component]]:
+    """Return the groups of components that may be wheels: those that their names call so, else the largest set of at
+    least two alike round ones."""
+    named = [part for part in parts if TURNING["wheel"].search(part.piece) and not re.search("steer", part.piece, re.I)]
+    groups = [group for group in clusters(named, int(whole.argmin()), False) if _round(_size(group), whole)]
+    if len(groups) >= 2:
+        return groups
+    able = [[part] for part in parts if _round(part.extent, whole)]
+    sets = [[other for other in able if _alike(one, other)] for one in able]
+    best = max(sets, key=len, default=[])
+    return best if len(best) >= 2 else []
+
+
+def _round(extent: np.ndarray, whole: np.ndarray) -> bool:
+    """Whether extents (3,) are those of a wheel."""
+    small, *large = np.sort(extent)
+    return bool(large[0] > (1 - ROUND) * large[1] and small < 0.8 * large[0] and 0.08 < large[1] / whole.max() < 0.3)

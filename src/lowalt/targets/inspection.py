@@ -3,13 +3,13 @@
 The text calls everything a guess that the file does not state (`guesses`); nothing here changes a record.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common.files import existing
-from lowalt.targets.guesses import Component, candidates, guessed_axes, guessed_unit
+from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces
 
@@ -25,7 +25,8 @@ class Inspection:
 
     `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
     `pieces` the names with triangles and extents (3,), `components` from the largest down; `points` (K, 3) m the
-    middles of some of the triangles, `owner` (K,) the number of each one's component.
+    middles of some of the triangles, `owner` (K,) the number of each one's component; `groups` of components that may
+    be one moving part each.
     """
 
     path: Path
@@ -41,11 +42,12 @@ class Inspection:
     category: str = "UAV"
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    groups: list[list[Component]] = field(default_factory=list)
 
     @property
     def shoulder_m(self) -> float:
         """Distance (m) from the middle to the wing: farther out, no slice is more than half as high as the highest."""
-        right, up = 3 - "xyz".index(self.up) - "xyz".index(self.front), "xyz".index(self.up)
+        right, up = 3 - "xyz".index(self.up[-1]) - "xyz".index(self.front[-1]), "xyz".index(self.up[-1])
         across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)
         edges = np.linspace(0, across.max() * (1 + 1e-9), SLICES + 1)
         high = np.zeros(SLICES)
@@ -65,19 +67,19 @@ def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
         mask = mesh.component == number
         points = mesh.vertices[mesh.faces[mask]].reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
-        result.append(Component(number, low, high, int(mask.sum()), bool(mesh.closed[number]), names[number]))
+        a, b, c = np.moveaxis(points.reshape(-1, 3, 3), 1, 0)
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        middle = (areas[:, None] * (a + b + c)).sum(axis=0) / (3 * max(areas.sum(), 1e-300))
+        closed, area = bool(mesh.closed[number]), float(areas.sum()) / 2
+        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", middle, area))
     return sorted(result, key=lambda part: -float(part.extent.max()))
-
-
-def _named(path: Path) -> list[Piece]:
-    """Return the pieces of a file: an OBJ's by the names of its objects and groups, others by the scene's names."""
-    return pieces(path, groups=path.suffix.lower() == ".obj")
 
 
 def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
     """Return for each component the name of the smallest piece whose box holds it, or an empty text where none does."""
     boxes = [
-        (piece.instance, piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres) for piece in found
+        (", ".join(piece.names), piece.vertices.min(axis=0) * metres, piece.vertices.max(axis=0) * metres)
+        for piece in found
     ]
     names = []
     for number in range(len(mesh.closed)):
@@ -90,37 +92,61 @@ def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
     return names
 
 
-def inspect_mesh(path: str | Path, category: str, unit: str | float | None = None) -> Inspection:
+def inspect_mesh(
+    path: str | Path, category: str, unit: str | float | None = None, row: dict | None = None,
+    size_m: float | None = None, axes: tuple[str | None, str | None] = (None, None),
+) -> Inspection:  # fmt: skip
     """Return the facts and guesses on a mesh file for a target of the category UAV, Bird or Vehicle.
 
-    `unit` is given where the user knows it; otherwise it is the file's own statement or a guess from the size.
+    `unit`, `size_m` (the largest extent) and `axes` (up, front) are given where the user knows them; otherwise the unit
+    is the file's own statement or a guess from the size, which of the published `row` is known, and the axes are
+    guessed from rotors and extents.
     Raises: InputError naming the file and the reason where it cannot be read.
     """
     path = existing(path, "mesh")
-    found = _named(path)
+    found = pieces(path)
     corners = [piece.vertices for piece in found] or [np.zeros((1, 3))]
-    size = float(np.ptp(np.concatenate(corners), axis=0).max())
-    stated = stated_unit_m(path)
+    size = max(float(np.ptp(np.concatenate(corners), axis=0).max()), 1e-12)
+    stated, row = stated_unit_m(path), row or {}
     known = {metres: name for name, metres in UNITS_M.items()}
     if unit is not None:
         source = "given"
+    elif size_m is not None:
+        unit, source = float(f"{size_m / size:.6g}"), "given by the size"
     elif stated is not None:
         unit, source = known.get(stated, stated), "stated by the file"
     else:
-        unit, source = guessed_unit(max(size, 1e-12), category), "guessed from the size"
+        wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
+        unit, source = guessed_unit(size, category, wanted), "guessed from the size"
     metres = UNITS_M[unit] if isinstance(unit, str) else unit
     mesh = read_mesh(path, unit)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    up, front = guessed_axes(high - low, category)
     parts = components_of(mesh, _piece_names(mesh, found, metres))
-    guesses = candidates(parts, "xyz".index(up), high - low, category)
-    parts = [Component(**{**vars(part), "guess": guesses.get(part.number, "")}) for part in parts]
-    named = [(piece.instance, len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
+    up, front = (name and "xyz".index(name[-1]) for name in axes)
+    ups = [up] if up is not None else [int(axis) for axis in np.argsort(high - low, kind="stable") if axis != front]
+    groups: list[list[Component]] = []
+    if category == "UAV":
+        count = row.get("n_rotors_or_wings")
+        best, groups = rotors(parts, ups, high - low, count)
+        up = best if up is None and groups else up
+    elif category == "Vehicle":
+        groups = wheels(parts, high - low)
+    guessed = guessed_axes(high - low, category, ups[0] if up is None else up)
+    if category == "UAV" and groups and axes[0] is None:
+        axis = "xyz".index(guessed[0])
+        hubs = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0)
+        # Rotors stand in the upper half; some files have their down axis first.
+        guessed = ("-" * bool(hubs[axis] < (low + high)[axis] / 2 - 1e-9) + guessed[0], guessed[1])
+    kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
+    moving = {part.number for group in groups for part in group}
+    parts = [replace(part, guess=kind if part.number in moving else "") for part in parts]
+    groups = [[next(one for one in parts if one.number == part.number) for part in group] for group in groups]
+    named = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
     some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
     points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     return Inspection(
-        path, unit, source, low, high, len(mesh.faces), up, front, named, parts, category, points,
-        mesh.component[some],
+        path, unit, source, low, high, len(mesh.faces), axes[0] or guessed[0], axes[1] or guessed[1], named, parts,
+        category, points, mesh.component[some], groups,
     )  # fmt: skip
 
 
@@ -136,8 +162,8 @@ def described(found: Inspection, most: int = 30) -> str:
         f"unit     {found.unit} ({found.unit_from})",
         f"extent   {_size(found.high - found.low)} m along x, y, z, from {np.round(found.low, 4).tolist()} to "
         f"{np.round(found.high, 4).tolist()}",
-        f"up       {found.up} (guessed: the smallest extent; the sign is unknown)",
-        f"front    {found.front} (guessed; the sign is unknown)",
+        f"up       {found.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
+        f"front    {found.front} (unless given, guessed; the sign is unknown)",
         *(
             [f"wings    may begin {found.shoulder_m:.4g} m right and left of the middle"]
             if found.category == "Bird"
@@ -152,8 +178,9 @@ def described(found: Inspection, most: int = 30) -> str:
     ranked = sorted(found.components, key=lambda part: (not part.guess, -float(part.extent.max())))
     for part in ranked[:most]:
         guess = f"  may be a {part.guess}" if part.guess else ""
+        number = found.components.index(part) + 1
         lines.append(
-            f"  {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
+            f"  {number} {part.piece!r}: {part.triangles} triangles, {_size(part.extent)} m at "
             f"{np.round(part.centre, 4).tolist()}, {'closed' if part.closed else 'open'}{guess}"
         )
     if len(ranked) > most:

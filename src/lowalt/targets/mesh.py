@@ -153,7 +153,8 @@ def mesh_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
         warnings.simplefilter("always", InputWarning)
         raw, closed = pools(record, Path(inputs_dir), rng)
         hung = {name: part["parent"] for name, part in record["parts"].items() if "parent" in part}
-        refuse_implausible(raw, kinds, hung, like(record), record["subtype"])
+        count = record["published"].get("n_rotors_or_wings")
+        refuse_implausible(raw, kinds, hung, like(record), record["subtype"], count)
     parts, facts = sized(record, raw, kinds)
     for warning in caught:
         warnings.warn(warning.message, warning.category, stacklevel=2)

@@ -4,8 +4,6 @@ Files are read in `mesh_scene`; pymeshlab repairs, since its filters keep two mi
 gigabyte; sampling is `sampling`, which is seeded (pymeshlab's sampling takes no seed and misses the count).
 """
 
-import math
-import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +15,9 @@ from scipy.sparse.csgraph import connected_components
 from lowalt.common import portable
 from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import existing
-from lowalt.targets.mesh_scene import HEADER_BYTES, selected
+from lowalt.targets.mesh_collada import stated_metres
+from lowalt.targets.mesh_obj import stated_unit
+from lowalt.targets.mesh_scene import selected
 
 SUFFIXES = (".stl", ".obj", ".ply", ".dae", ".glb")
 UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -64,20 +64,14 @@ def metres(unit: str | float) -> float:
 def stated_unit_m(path: Path) -> float | None:
     """Return the metres that a mesh file says its unit has, None where it says nothing.
 
-    Only COLLADA has a statement of its own (`<unit meter="...">`); a GLB is in metres by its standard; STL, OBJ and
-    PLY have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    COLLADA states it (`<unit meter="...">`), an OBJ may in a comment; a GLB is in metres by its standard; STL and PLY
+    have no unit. Source: COLLADA 1.4.1, element unit; glTF 2.0, section 3.4.
+    Raises: InputError where a COLLADA file is no XML.
     """
-    if path.suffix.lower() == ".glb":
-        return 1.0
-    if path.suffix.lower() != ".dae":
-        return None
-    with path.open("rb") as file:
-        found = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([^\"']+)[\"']", file.read(HEADER_BYTES))
-    try:
-        value = float(found[1]) if found else math.nan
-    except ValueError:
-        value = math.nan
-    return value if 0 < value < math.inf else None
+    kind = path.suffix.lower()
+    if kind == ".obj":
+        return UNITS_M.get(stated_unit(path))
+    return stated_metres(path) if kind == ".dae" else 1.0 if kind == ".glb" else None
 
 
 def _triangles(path: Path, geometry: list[str] | None) -> tuple[np.ndarray, np.ndarray]:

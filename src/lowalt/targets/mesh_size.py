@@ -11,6 +11,7 @@ from lowalt.common import portable
 from lowalt.common.classes import like
 from lowalt.common.errors import InputError
 from lowalt.targets import bird
+from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_parts import Pool
 from lowalt.targets.mesh_record import ALL_AXES
 
@@ -23,13 +24,27 @@ SMALLEST_ROTOR_M = 0.01
 
 
 def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, low: float, high: float) -> None:
-    """Raise InputError if the size of `what` is below wanted_m / high or above wanted_m / low; all sizes in metres."""
-    if not low <= wanted_m / max(size_m, 1e-12) <= high:
-        raise InputError(
-            f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
-            f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit "
-            f"{record['unit']!r} right?"
+    """Raise InputError if the size of `what` is below wanted_m / high or above wanted_m / low; all sizes in metres.
+
+    The error has the line to write: the unit with which the size fits best, or the size of a row of its own.
+    """
+    if low <= wanted_m / max(size_m, 1e-12) <= high:
+        return
+    unit = record["unit"]
+    own = UNITS_M[unit] if isinstance(unit, str) else unit
+    fits = {name: abs(np.log(size_m / own * metres / wanted_m)) for name, metres in UNITS_M.items()} if size_m else {}
+    best = min(fits, key=fits.get, default="")
+    if best and fits[best] <= np.log(high):
+        way = f"write `unit: {best}`, with which it measures {size_m / own * UNITS_M[best]:.4g} m"
+    else:
+        key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
+        way = (
+            f"no unit fits: give the target a row with its own size, `row: {{{key}: {size_m:.4g}}}`, or the right file"
         )
+    raise InputError(
+        f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
+        f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
+    )
 
 
 def _published_m(record: dict) -> np.ndarray:

@@ -5,22 +5,30 @@ module checks records and makes a cloud of the published height from the cycle. 
 z up, metres.
 """
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.common import portable
 from lowalt.common.classes import like
-from lowalt.common.errors import InputError
+from lowalt.common.errors import InputError, InputWarning
 from lowalt.common.files import sha256
 from lowalt.targets import record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
 from lowalt.targets.input_files import check_file_name
-from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short
-from lowalt.targets.mocap_files import read_motion, read_skeleton
-from lowalt.targets.mocap_motion import front, nodes_m, posed, refuse_glitches
+from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
+from lowalt.targets.mocap_files import first_frame, read_motion, read_skeleton
+from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
+from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
+
+CMU_HZ = 120
+"""Rate of CMU's recordings, which their files do not say."""
+
+LONG = 20
+"""A recording that is more times longer than the cycle used is told so: it may hold other motions."""
 
 KEYS = record_schema.keys("mocap")
 """Keys of a recording's record in addition to those of every record; the key `where` says where to get the files."""
@@ -29,14 +37,15 @@ KEYS = record_schema.keys("mocap")
 def check_record(merged: dict, extra: dict, where: str) -> dict:
     """Return the merged record of a recording after checking it and filling in defaults.
 
-    Defaults: 120 Hz; scaled to the published height; nodes accelerate by at most 1500 m/s2; the ends of the cycle
-    differ by at most 0.15 m. `first_frame` and `last_frame` count from 1 and are both used; None means the last frame
-    of the file.
+    Defaults: the rate that the file says, or CMU's 120 Hz; scaled to the published height; nodes accelerate by at most
+    1500 m/s2; the ends of the cycle differ by at most 0.15 m. `first_frame` and `last_frame` count from 1 and are both
+    used; None means the last frame of the file.
 
     `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    unknown, missing = sorted(set(extra) - set(KEYS)), sorted({"skeleton", "motion"} - set(extra))
+    needed = {"motion"} | ({"skeleton"} if str(extra.get("motion")).lower().endswith(".amc") else set())
+    unknown, missing = sorted(set(extra) - set(KEYS)), sorted(needed - set(extra))
     if unknown or missing:
         raise InputError(f"{where}: unknown keys {unknown}, missing keys {missing}, expected some of {sorted(KEYS)}")
     if like(merged) != "Pedestrian":
@@ -44,21 +53,23 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     defaults = {
         "first_frame": 1,
         "last_frame": None,
-        "rate_hz": 120,
         "scale": "published",
         "max_acceleration_mps2": 1500,
         "max_mismatch_m": 0.15,
     }
     result = defaults | merged | {"points": len(NODES)}
     for key in ("skeleton", "motion"):
-        check_file_name(result[key], f"{where}: {key}")
+        if key in result:
+            check_file_name(result[key], f"{where}: {key}")
     first, last = result["first_frame"], result["last_frame"]
     if not (isinstance(first, int) and first >= 1 and (last is None or (isinstance(last, int) and last > first))):
         raise InputError(
             f"{where}: first_frame {first!r}, last_frame {last!r}, expected frame numbers from 1, in order"
         )
     for key in ("rate_hz", "max_acceleration_mps2"):
-        if isinstance(result[key], bool) or not isinstance(result[key], (int, float)) or not 1 <= result[key] <= 1e5:
+        if key in result and (
+            isinstance(result[key], bool) or not isinstance(result[key], (int, float)) or not 1 <= result[key] <= 1e5
+        ):
             raise InputError(f"{where}: {key} is {result[key]!r}, expected a number from 1 to 100000")
     mismatch = result["max_mismatch_m"]
     if isinstance(mismatch, bool) or not isinstance(mismatch, (int, float)) or not 0 < mismatch <= 10:
@@ -70,7 +81,29 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
 
 def record_files(record: dict) -> list[str]:
     """Return the user's files that a recording's record names, relative to the folder of inputs."""
-    return [record["skeleton"], record["motion"]]
+    return [record[key] for key in ("skeleton", "motion") if key in record]
+
+
+def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
+    """Return the motion of a record's files, and the number of its first frame.
+
+    Raises: InputError naming the file: another format, a rate that neither it nor the record says.
+    """
+    path, first, last = paths[-1], record["first_frame"], record["last_frame"]
+    kind = path.suffix.lower()
+    if kind == ".amc":
+        skeleton = read_skeleton(paths[0])
+        channels = read_motion(path, skeleton, first, last)
+        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), max(first, first_frame(path))
+    if kind not in (".bvh", ".npz"):
+        raise InputError(f"{path}: format {kind!r}, expected .amc with its skeleton, .bvh or .npz")
+    joints, rate = read_bvh(path) if kind == ".bvh" else read_joints(path)
+    nodes = to_nodes(joints, str(path))[first - 1 : last]
+    if "rate_hz" not in record and rate is None:
+        raise InputError(f"{path}: says no rate, expected rate_hz in the record")
+    # A BVH has no unit: its person gets the published height.
+    height = record["published"]["hgt_m"] if kind == ".bvh" else None
+    return moved(nodes, record.get("rate_hz", rate), height, str(path)), first
 
 
 def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
@@ -83,30 +116,34 @@ def mocap_cloud(record: dict, inputs_dir: str | Path, seed: int) -> Cloud:
     Raises: InputError naming file and frame for a faulty recording, and where it does not move.
     """
     paths = [Path(inputs_dir) / name for name in record_files(record)]
-    skeleton = read_skeleton(paths[0])
-    first = record["first_frame"]
-    motion = posed(skeleton, read_motion(paths[1], skeleton, first, record["last_frame"]), record["rate_hz"])
-    refuse_glitches(nodes_m(motion), motion.rate_hz, record["max_acceleration_mps2"], str(paths[1]), first)
-    refuse_short(len(motion.root_m), motion.rate_hz, str(paths[1]))
+    where, first = str(paths[-1]), record["first_frame"]
+    motion, first = _read(paths, record)
+    refuse_glitches(nodes_m(motion), motion.rate_hz, record["max_acceleration_mps2"], where, first)
+    refuse_short(len(motion.root_m), motion.rate_hz, where)
     start, end, fade, mismatch = find_cycle(motion)
     if mismatch > record["max_mismatch_m"]:
         raise InputError(
-            f"{paths[1]}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
+            f"{where}: the best cycle, frames {first + start} to {first + end - 1}, closes to {mismatch:.3f} m "
             f"(root mean square over the nodes), expected at most max_mismatch_m = {record['max_mismatch_m']} m: "
             "choose first_frame and last_frame around a steady gait"
         )
     cycle, drift = closed(motion, start, end, fade)
     looped = nodes_m(cycle)
     seam = np.concatenate([looped, looped[:2]])
-    refuse_glitches(
-        seam, motion.rate_hz, record["max_acceleration_mps2"], f"{paths[1]} (its closed cycle)", first + start
-    )
+    refuse_glitches(seam, motion.rate_hz, record["max_acceleration_mps2"], f"{where} (its closed cycle)", first + start)
     speed = float(portable.norm(drift))
     if speed < 0.05:
-        raise InputError(f"{paths[1]}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")
+        raise InputError(f"{where}: moves {speed:.3f} m/s, expected a walk or run to turn to the front")
     stature = stature_m(motion.bones_m)
     scale = record["published"]["hgt_m"] / stature if record["scale"] == "published" else 1.0
     track = nodes_m(front(cycle, drift)) * scale
+    if "rate_hz" not in record and where.lower().endswith(".amc"):  # whose rate neither file nor record says
+        refuse_strange_rate(track, motion.rate_hz, speed * scale, stature * scale, where)
+    if len(motion.root_m) > LONG * (end - start):
+        text = (
+            f"{where}: of {len(motion.root_m)} frames {first + start} to {first + end - 1} are used, which close best"
+        )
+        warnings.warn(f"{text}; first_frame and last_frame choose others", InputWarning, stacklevel=2)
     sums = {name: sha256(path) for name, path in zip(record_files(record), paths, strict=True)}
     facts = {
         "track_rate_hz": float(motion.rate_hz), "cycle_s": len(track) / motion.rate_hz,

@@ -23,6 +23,12 @@ SHORTEST_GAIT_S = 0.3
 """Shortest cycle that is accepted in a short recording: half of the shortest stride."""
 
 
+WALK_RATIO_S = (0.29, 0.62)
+"""Step length (m) times the time of a step (s), of a person of USUAL_M: adults have 0.38 at every speed of walking and
+runners 0.4 to 0.55; a rate that is wrong by two doubles or halves it. Source: Sekiya and Nagasaki, Gait and Posture 7
+(1998); our own limits around CMU's walks and runs, which have 0.34 to 0.52."""
+USUAL_M = 1.75
+
 BLOCK = 256
 """Number of starts of a cycle that are compared with all ends in one matrix product."""
 
@@ -37,6 +43,26 @@ def refuse_short(frames: int, rate_hz: float, where: str) -> None:
         raise InputError(
             f"{where}: {frames} frames, {frames / rate_hz:.3g} s, expected at least {needed} "
             f"({2 * SHORTEST_GAIT_S:g} s at {rate_hz:g} Hz) for a cycle of a walk or run"
+        )
+
+
+def refuse_strange_rate(track: np.ndarray, rate_hz: float, speed_mps: float, stature: float, where: str) -> None:
+    """Raise InputError naming `where` if the steps of a closed cycle are too quick or too slow for their length.
+
+    track: (F, 31, 3) m, front +y; stature: of the person, in m. Nothing is said of a cycle whose feet do not swing.
+    """
+    apart = track[:, NODES.index("ltibia"), 1] - track[:, NODES.index("rtibia"), 1]
+    swing = np.abs(np.fft.rfft(apart - apart.mean()))
+    if np.ptp(apart) < 0.05 * stature or len(swing) < 2:
+        return
+    step_s = len(track) / rate_hz / int(swing[1:].argmax() + 1) / 2
+    ratio = speed_mps * step_s**2 * USUAL_M / stature
+    if not WALK_RATIO_S[0] <= ratio <= WALK_RATIO_S[1]:
+        other = rate_hz / 2 if ratio < WALK_RATIO_S[0] else rate_hz * 2
+        raise InputError(
+            f"{where}: at {rate_hz:g} frames a second it moves {speed_mps:.2f} m/s in {1 / step_s:.2g} steps a second, "
+            f"unlike a person; is it of {other:g}? Write the right rate, `rate_hz: {other:g}`, or to insist "
+            f"`rate_hz: {rate_hz:g}`"
         )
 
 

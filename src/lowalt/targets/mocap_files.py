@@ -67,7 +67,7 @@ def read_skeleton(path: str | Path) -> Skeleton:
     nodes, or angles are not in degrees.
     """
     path = existing(path, "skeleton file")
-    sections = _sections(path.read_text(errors="replace"))
+    sections = _sections(path.read_text(encoding="utf-8-sig", errors="replace"))
     for name in (":units", ":root", ":bonedata", ":hierarchy"):
         if name not in sections:
             raise InputError(f"{path}: no section {name}, expected an ASF skeleton")
@@ -109,28 +109,42 @@ def read_skeleton(path: str | Path) -> Skeleton:
 
 
 def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
-    """Return (frame number, words) of every line of data up to frame `last`; later lines are not read."""
-    result, frame = [], 0
-    for line in path.read_text(errors="replace").splitlines():
-        words = line.split()
-        if not words or words[0].startswith(("#", ":")):
+    """Return (frame number, words) of every line of data up to frame `last`; later lines are not read.
+
+    A clip cut out of a longer one may begin at any frame.
+    """
+    result, frame = [], None
+    for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
+        words = line.split("#", 1)[0].split()
+        if not words or words[0].startswith(":"):
             continue
         if len(words) == 1 and words[0].isdecimal():
-            if last is not None and int(words[0]) > last:
+            number = int(words[0])
+            if last is not None and number > last:
                 break
-            if int(words[0]) != frame + 1:
-                raise InputError(f"{path}: frame {words[0]} follows frame {frame}, expected {frame + 1}")
-            frame += 1
-        elif not frame:
+            if frame is not None and number != frame + 1:
+                raise InputError(f"{path}: frame {number} follows frame {frame}, expected {frame + 1}")
+            frame = number
+        elif frame is None:
             raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
         else:
             result.append((frame, words))
     return result
 
 
+def first_frame(path: Path) -> int:
+    """Return the number of the first frame of a motion file, 1 where it has none."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        for line in file:
+            words = line.split("#", 1)[0].split()
+            if len(words) == 1 and words[0].isdecimal():
+                return int(words[0])
+    return 1
+
+
 def in_radians(path: Path) -> bool:
     """Return whether a motion file says before its first frame that its angles are in radians."""
-    with path.open(errors="replace") as file:
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
         for line in file:
             word = line.split()[:1]
             if word and word[0].upper() == ":RADIANS":
@@ -155,18 +169,23 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
 
 
 def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None) -> dict[str, np.ndarray]:
-    """Return the channels (F, channels) of each node that has any, frames `first` to `last` (1-based, inclusive).
+    """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the file's own numbers,
+    both inclusive; a file that begins later is read from its first frame.
 
     Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside first..last are not
     checked, so that a record can leave out frames with known faults.
     Raises: InputError naming file and frame: a frame that lacks a node or comes out of order, a value that is no
-    finite number, an all-zero root, a frame equal to the one before it, fewer than two frames left.
+    finite number, a node twice, an all-zero root, a frame equal to the one before it, fewer than two frames left.
     """
     path = existing(path, "motion file")
     frames: dict[int, dict[str, list[float]]] = {}
     for frame, words in _lines(path, last):
         if frame >= first:
-            frames.setdefault(frame, {})[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+            values = frames.setdefault(frame, {})
+            if words[0] in values:
+                raise InputError(f"{path}: frame {frame} has {words[0]} twice, expected each node once")
+            values[words[0]] = _values(f"{path}: frame {frame}", words, skeleton)
+    first = max(first, min(frames, default=first))
     count = (max(frames) if frames else 0) - first + 1
     if count < 2 or (last is not None and max(frames) < last):
         found = f"frames up to {max(frames)}" if frames else "no frame in that range"

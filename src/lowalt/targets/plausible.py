@@ -83,12 +83,17 @@ def _wing_faults(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[st
     return found
 
 
-def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str) -> list[str]:
+def _doubts(
+    parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, count: int | None
+) -> list[str]:
     """One sentence for each thing that is unusual but possible."""
     found = []
     wheels = [pool for name, pool in parts.items() if kinds[name] == "wheel"]
     if category == "Vehicle" and len(wheels) < FEWEST_WHEELS:
         found.append(f"{len(wheels)} wheels, expected at least {FEWEST_WHEELS}")
+    rotors = sum(kind == "rotor" for kind in kinds.values())
+    if category == "UAV" and count and rotors != count:
+        found.append(f"{rotors} rotors, expected the {count} of its row")
     for kind, roots in (
         ("wheel", wheels),
         ("wing", [parts[name] for name in parts if kinds[name] == "wing" and name not in parents]),
@@ -100,16 +105,17 @@ def _doubts(parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, st
 
 
 def refuse_implausible(
-    parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, where: str
-) -> None:
+    parts: dict[str, Pool], kinds: dict[str, str], parents: dict[str, str], category: str, where: str,
+    count: int | None = None,
+) -> None:  # fmt: skip
     """Refuse parts whose shape contradicts their kind, and warn of unusual ones.
 
     `parts` are pools in body axes by name, `kinds` their kinds, `parents` the parent of each part that has one,
-    `category` the published class that the target is like.
+    `category` the published class that the target is like, `count` the rotors of its row.
     Raises: InputError naming `where`, the part, the measures and what was expected. Warns: InputWarning.
     """
     faults = _wheel_faults(parts, kinds) + _rotor_faults(parts, kinds) + _wing_faults(parts, kinds, parents)
     if faults:
         raise InputError(f"{where}: " + "; ".join(faults))
-    for doubt in _doubts(parts, kinds, parents, category):
+    for doubt in _doubts(parts, kinds, parents, category, count):
         warnings.warn(f"{where}: {doubt}", InputWarning, stacklevel=2)

@@ -19,18 +19,26 @@ def _colours(found: Inspection) -> np.ndarray:
     return result
 
 
-def inspection_picture(found: Inspection) -> bytes:
-    """Return a PNG of an inspected mesh, in metres along the file's axes, pieces that may move in colours."""
+MOST_NUMBERS = 60
+"""Most pieces that a picture numbers, the largest first."""
+
+
+def inspection_picture(found: Inspection, numbered: bool = False) -> bytes:
+    """Return a PNG of an inspected mesh, in metres along the file's axes, pieces that may move in colours.
+
+    numbered: whether the largest pieces have their numbers, from 1 in the order of the inspection.
+    """
     figure, panels = plt.subplots(1, 3, figsize=(14, 5))
     colours, middle = _colours(found), (found.low + found.high) / 2
     half = 0.58 * float((found.high - found.low).max())
-    front, up = "xyz".index(found.front), "xyz".index(found.up)
+    front, up = "xyz".index(found.front[-1]), "xyz".index(found.up[-1])
     right = 3 - front - up
     for panel, (across, high) in zip(panels, DIRECTIONS, strict=True):
         panel.scatter(found.points[:, across], found.points[:, high], s=4, c=colours, linewidths=0)
-        for part in found.components:
-            if part.guess:
-                panel.text(part.centre[across], part.centre[high], part.guess, fontsize=8, ha="center")
+        for number, part in enumerate(found.components, 1):
+            word = str(number) * (numbered and number <= MOST_NUMBERS) or part.guess
+            if word:
+                panel.text(part.centre[across], part.centre[high], word, fontsize=8, ha="center")
         for side in (-1, 1) if found.category == "Bird" and right in (across, high) else ():
             line = panel.axvline if across == right else panel.axhline
             line(middle[right] + side * found.shoulder_m, color="tab:red", linewidth=0.8, linestyle="--")

@@ -1,0 +1,102 @@
+"""What trimesh's reader of COLLADA leaves out: the stated unit, polygons with a dent, and skins, which are refused.
+
+Source: Khronos, COLLADA 1.4.1, elements unit, polylist, polygons and instance_controller.
+"""
+
+import math
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.targets.mesh_polygons import triangulated
+
+
+class _Plain(ElementTree.TreeBuilder):
+    """A tree of XML without a document type, which could name entities."""
+
+    def doctype(self, *_: object) -> None:
+        """Refuse a document type."""
+        raise ValueError("it declares a document type, expected none")
+
+
+def parsed(path: Path) -> ElementTree.Element:
+    """Return the root of an XML file; nothing that it names is opened, and entities of its own are refused.
+
+    Raises: InputError naming the file where it is no XML or declares a document type.
+    """
+    try:
+        return ElementTree.fromstring(path.read_bytes(), ElementTree.XMLParser(target=_Plain()))
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise InputError(f"{path}: not a readable XML file ({error})") from None
+
+
+def _name(element: ElementTree.Element) -> str:
+    """An element's tag without its namespace."""
+    return element.tag.rsplit("}", 1)[-1]
+
+
+def stated_metres(path: Path) -> float | None:
+    """Return the metres of the unit that a COLLADA file states, None where it says nothing or no positive number.
+
+    Raises: InputError where the file is no XML.
+    """
+    for element in parsed(path).iter():
+        if _name(element) == "unit":
+            try:
+                value = float(element.get("meter", "nan"))
+            except ValueError:
+                return None
+            return value if 0 < value < math.inf else None
+    return None
+
+
+def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
+    """Return a COLLADA file whose polygons are triangles, cut as viewers cut them, and the names of its geometries by
+    their ids: those of the nodes that show them, and their own.
+
+    Raises: InputError naming the file where it is no XML or has skins; other exceptions for a damaged file.
+    """
+    root = parsed(path)
+    elements = {element.get("id"): element for element in root.iter() if element.get("id")}
+    for parent in root.iter():
+        if _name(parent) == "instance_controller":
+            raise InputError(f"{path}: has a skin or morph (instance_controller), expected plain surfaces: apply it "
+                             "before exporting, or export GLB")  # fmt: skip
+        if _name(parent) == "mesh":
+            for element in parent:
+                if _name(element) in ("polylist", "polygons"):
+                    _cut(element, elements)
+    names: dict[str, list[str]] = {}
+    for node in root.iter():
+        for shown in node if _name(node) == "node" else ():
+            if _name(shown) == "instance_geometry":
+                key = shown.get("url", "")[1:]
+                own = elements[key].get("name") if key in elements else None
+                names.setdefault(key, []).extend(name for name in (node.get("name"), node.get("id"), own) if name)
+    return ElementTree.tostring(root), names
+
+
+def _cut(element: ElementTree.Element, elements: dict) -> None:
+    """Turn an element of polygons into one of triangles."""
+    inputs = [child for child in element if _name(child) == "input"]
+    width = 1 + max(int(child.get("offset", 0)) for child in inputs)
+    vertex = next(child for child in inputs if child.get("semantic") == "VERTEX")
+    source = next(child for child in elements[vertex.get("source")[1:]] if child.get("semantic") == "POSITION")
+    source = elements[source.get("source")[1:]]
+    numbers = next(child for child in source.iter() if _name(child) == "float_array")
+    stride = int(next((child.get("stride", 3) for child in source.iter() if _name(child) == "accessor"), 3))
+    vertices = np.array((numbers.text or "").split(), float).reshape(-1, stride)[:, :3]
+    lists = [np.array((child.text or "").split(), int).reshape(-1, width) for child in element if _name(child) == "p"]
+    rows = np.concatenate(lists)
+    count = next((child for child in element if _name(child) == "vcount"), None)
+    counts = np.array([len(one) for one in lists] if count is None else (count.text or "").split(), int)
+    # Corners, not vertices, so that their other numbers (normals, colours) go along.
+    faces, _ = triangulated(vertices[rows[:, int(vertex.get("offset", 0))]], counts, np.arange(len(rows)))
+    for child in [child for child in element if _name(child) in ("vcount", "p", "ph")]:
+        element.remove(child)
+    element.tag = element.tag.replace("polylist", "triangles").replace("polygons", "triangles")
+    element.set("count", str(len(faces)))
+    listed = ElementTree.SubElement(element, element.tag.replace("triangles", "p"))
+    listed.text = " ".join(map(str, rows[faces.ravel()].ravel()))

@@ -1,0 +1,200 @@
+"""Recordings as people have them, BVH and arrays of joint positions (AMASS, SMPL): to a motion of the 31 nodes.
+
+Joints are known by their names; nodes between joints lie on the line between them, and those beyond the wrists and the
+head go on straight. Sources: Biovision's BVH as Meredith and Maddock describe it (2001); the joint order of SMPL.
+"""
+
+import re
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from lowalt.common import portable
+from lowalt.common.array_files import UNREADABLE, checked_archive
+from lowalt.common.errors import InputError
+from lowalt.common.files import existing
+from lowalt.targets.mocap_motion import Motion
+from lowalt.targets.skeleton import NODES, PARENTS, rotation, stature_m
+
+SMPL = (
+    "pelvis", "lefthip", "righthip", "spine1", "leftknee", "rightknee", "spine2", "leftankle", "rightankle", "spine3",
+    "lefttoe", "righttoe", "neck", "leftcollar", "rightcollar", "head", "leftshoulder", "rightshoulder", "leftelbow",
+    "rightelbow", "leftwrist", "rightwrist",
+)  # fmt: skip
+NAMES = {
+    "root": "hips pelvis hip root", "hip": "hip upleg thigh femur upperleg",
+    "knee": "knee leg shin tibia lowleg lowerleg calf",
+    "ankle": "ankle foot", "toe": "toe toebase ball foot", "shoulder": "shoulder arm uparm upperarm humerus",
+    "elbow": "elbow forearm lowarm lowerarm radius", "wrist": "wrist hand", "neck": "neck neck1 lowerneck spine3",
+    "head": "head",
+}  # fmt: skip
+"""Names of a joint by what it joins, the surest first, without the side and in small letters."""
+BEYOND = {"wrist": 0.1, "hand": 0.35, "fingers": 0.6, "thumb": 0.35}
+"""Nodes beyond the wrist, in parts of the forearm."""
+MOST_NUMBERS = 100_000_000
+
+
+def _plain(name: str) -> tuple[str, str]:
+    """A joint's side ("l", "r" or "") and its name without it, in small letters."""
+    word = re.sub(r"[^a-z0-9]", "", re.sub(r"^.*[:|]", "", name).lower())
+    side = re.match(f"left|right|[lr](?={'|'.join(dict.fromkeys(' '.join(NAMES.values()).split()))})", word)
+    return (side[0][0], word[side.end() :]) if side else ("", word)
+
+
+def to_nodes(joints: dict[str, np.ndarray], where: str) -> np.ndarray:
+    """Return the positions (F, 31, 3) of the nodes, in the joints' unit and axes, from positions (F, 3) by joint.
+
+    A joint `NAME/end` is the end of a chain. Raises: InputError naming the joint that no name tells.
+    """
+    known = {_plain(name): name for name in reversed(list(joints)) if not name.endswith("/end")}
+
+    def joint(what: str, side: str = "", but: str = "") -> str:
+        """The name of a joint."""
+        for word in NAMES[what].split():
+            if (side, word) in known and known[side, word] != but:
+                return known[side, word]
+        side = {"l": "left ", "r": "right "}.get(side, "")
+        raise InputError(
+            f"{where}: no joint is called a {side}{what}, expected {NAMES[what].split()} among {sorted(joints)[:40]}"
+        )
+
+    found = {"root": joints[joint("root")]}
+    for side in "lr":
+        ankle = joint("ankle", side)
+        toe = joint("toe", side, but=ankle)
+        found |= {f"{side}hipjoint": joints[joint("hip", side)], f"{side}femur": joints[joint("knee", side)],
+                  f"{side}tibia": joints[ankle], f"{side}foot": joints[toe]}  # fmt: skip
+        end = joints.get(f"{toe}/end")
+        found[f"{side}toes"] = joints[toe] + 0.3 * (joints[toe] - joints[ankle]) if end is None else end
+        elbow, wrist = joints[joint("elbow", side)], joints[joint("wrist", side)]
+        found |= {f"{side}clavicle": joints[joint("shoulder", side)], f"{side}humerus": elbow, f"{side}radius": wrist}
+        found |= {side + name: wrist + share * (wrist - elbow) for name, share in BEYOND.items()}
+    head = joint("head")
+    neck, skull = joints[joint("neck")], joints[head]
+    top = joints.get(f"{head}/end", skull + 0.8 * (skull - neck))
+    for name, share in (("lowerback", 1 / 3), ("upperback", 2 / 3), ("thorax", 1.0)):
+        found[name] = found["root"] + share * (neck - found["root"])
+    found |= {"lowerneck": (neck + skull) / 2, "upperneck": skull, "head": top}
+    return np.stack([found[name] for name in NODES], axis=1)
+
+
+def moved(nodes: np.ndarray, rate_hz: float, height_m: float | None, where: str) -> Motion:
+    """Return the motion of nodes (F, 31, 3) whose unit and vertical axis are their own.
+
+    height_m: the stature of whom they show, which gives the unit; None where they are in metres. Bones have their mean
+    lengths; each turns from its mean direction to that of the frame on the shortest way. The vertical axis is the one
+    along which the head is farthest from the feet.
+    Raises: InputError naming `where` for places that are not finite or a body without height.
+    """
+    if not np.isfinite(nodes).all() or len(nodes) < 2 or np.abs(nodes).max() > 1e6:
+        raise InputError(
+            f"{where}: {len(nodes)} frames with places that are not finite, expected at least two good ones"
+        )
+    reach = np.mean(nodes[:, NODES.index("head")] - nodes[:, NODES.index("ltibia")], axis=0)
+    axis = int(np.abs(reach).argmax())
+    order = [(axis + 1) % 3, (axis + 2) % 3, axis]  # a proper rotation: z becomes the vertical
+    nodes = nodes[..., order] * ([1, 1, 1] if reach[axis] > 0 else [1, -1, -1])
+    bones = nodes - nodes[:, PARENTS]
+    bones[:, 0] = 0
+    length = portable.norm(bones).mean(axis=0)
+    mean = bones.mean(axis=0)
+    size = portable.norm(mean)
+    rest = np.where((size > 0)[:, None], mean / np.where(size > 0, size, 1)[:, None] * length[:, None], 0.0)
+    unit = height_m / stature_m(rest) if height_m else 1.0
+    if not 0 < unit < np.inf:
+        raise InputError(f"{where}: a body of no height, expected joints of a person")
+    return Motion(nodes[:, 0] * unit, _shortest(rest, bones), rest * unit, rate_hz)
+
+
+def _shortest(rest: np.ndarray, bones: np.ndarray) -> np.ndarray:
+    """Return the rotations (F, N, 3, 3) that turn bones (N, 3) to the directions of bones (F, N, 3)."""
+    a = rest / np.maximum(portable.norm(rest), 1e-12)[:, None]
+    b = bones / np.maximum(portable.norm(bones), 1e-12)[..., None]
+    cross, cosine = np.cross(a, b), portable.dot(a, b)
+    x, y, z = np.moveaxis(cross, -1, 0)
+    zero = np.zeros_like(x)
+    skew = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
+    factor = 1 / np.maximum(1 + cosine, 1e-6)
+    return np.eye(3) + skew + factor[..., None, None] * portable.product(skew, skew)
+
+
+def read_bvh(path: str | Path) -> tuple[dict[str, np.ndarray], float]:
+    """Return the positions (F, 3) of each joint of a BVH file in its unit, `NAME/end` the ends of chains, and its rate.
+
+    Raises: InputError naming the file and the joint or frame that is wrong.
+    """
+    path = existing(path, "motion file")
+    head, _, data = path.read_text(encoding="utf-8-sig", errors="replace").partition("MOTION")
+    stack: list[str] = []
+    joints: list[tuple[str, str, np.ndarray, list[str]]] = []
+    words = iter(re.sub(r"#.*", "", head).split())
+    try:
+        for word in words:
+            if word in ("ROOT", "JOINT", "End"):
+                name = next(words) if word != "End" else f"{stack[-1]}/end"
+                name = f"{stack[-1]}/end" if word == "End" else name
+                if word == "End":
+                    next(words)
+                joints.append((name, stack[-1] if stack else "", np.zeros(3), []))
+                stack.append(name)
+            elif word == "OFFSET":
+                joints[-1][2][:] = [float(next(words)) for _ in range(3)]
+            elif word == "CHANNELS":
+                joints[-1][3].extend(next(words) for _ in range(int(next(words))))
+            elif word == "}":
+                stack.pop()
+        told = re.match(r"\s*Frames:\s*(\d+)\s*Frame Time:\s*(\S+)", data)
+        frames, step = int(told[1]), float(told[2])
+        values = np.array(re.sub(r"#.*", "", data[told.end() :]).split(), float)
+        width = sum(len(channels) for *_, channels in joints)
+        if not (frames and 1e-5 <= step <= 1 and len(values) == frames * width and np.isfinite(values).all()):
+            raise ValueError(f"{len(values)} finite numbers, expected {frames} frames of {width}, {step} s apart")
+        places = _followed(joints, values.reshape(frames, width))
+    except (ValueError, TypeError, IndexError, KeyError, StopIteration, OverflowError, RuntimeError) as error:
+        raise InputError(f"{path}: not a readable BVH motion ({type(error).__name__}: {error})") from None
+    return places, 1 / step
+
+
+def _followed(joints: list[tuple[str, str, np.ndarray, list[str]]], values: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the positions (F, 3) of joints, parents first, from their channels (F, C)."""
+    if len({name for name, *_ in joints}) < len(joints) or len(joints) * len(values) * 9 > MOST_NUMBERS:
+        raise ValueError("a joint that stands twice, or too many frames")
+    places, turns, column = {}, {}, 0
+    for name, parent, offset, channels in joints:
+        turn, shift = np.eye(3), np.tile(offset, (len(values), 1))
+        for channel in channels:
+            axis = channel[0].lower()
+            if channel.endswith("position"):
+                # A position takes the place of the offset's, as readers of BVH have it.
+                shift[:, "xyz".index(axis)] = values[:, column]
+            else:
+                turn = portable.product(turn, rotation(axis, np.radians(values[:, column])))
+            column += 1
+        above = turns[parent] if parent else np.eye(3)
+        places[name] = portable.applied(above, shift) + (places[parent] if parent else 0.0)
+        turns[name] = portable.product(above, turn)
+    return places
+
+
+def read_joints(path: str | Path) -> tuple[dict[str, np.ndarray], float | None]:
+    """Return the positions (F, 3) m of joints of an .npz file by name, and its rate where it says one.
+
+    The file has an array `joints` (F, J, 3), J of at least 22 in SMPL's order or named by an array `names` (J,), and
+    maybe `mocap_framerate` or `fps`. AMASS itself keeps angles: its users compute joints by a body model, as SMPL's.
+    Raises: InputError naming the file and what is wrong with it.
+    """
+    checked_archive(path, "motion file")
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            rates = [float(data[key]) for key in ("mocap_framerate", "mocap_frame_rate", "fps") if key in data.files]
+            if "joints" not in data.files:
+                raise ValueError(f"arrays {data.files[:20]}, expected `joints` (F, J, 3) in metres: a body model makes "
+                                 "them of poses")  # fmt: skip
+            places = np.asarray(data["joints"], float)
+            names = [str(name) for name in data["names"]] if "names" in data.files else SMPL
+    except (*UNREADABLE, zipfile.BadZipFile, TypeError, MemoryError) as error:
+        raise InputError(f"{path}: not a readable file of joints ({error})") from None
+    if places.ndim != 3 or places.shape[1] < len(names) or places.shape[2] != 3:
+        raise InputError(f"{path}: joints has shape {places.shape}, expected (frames, at least {len(names)}, 3)")
+    return {name: places[:, index] for index, name in enumerate(names)}, rates[0] if rates else None

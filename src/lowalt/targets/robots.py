@@ -1,0 +1,154 @@
+"""A robot's own description: which surfaces it has and which of them turn about what.
+
+`robot_files` reads URDF, SDF and MJCF; here the parts that turn are chosen, written into one GLB and drafted. All three
+formats have axes x front, y left, z up, metres.
+"""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import replacing
+from lowalt.targets.draft import alternating, row_lines, size_word
+from lowalt.targets.guesses import TURNING
+from lowalt.targets.mesh_files import LARGEST_TRIANGLES
+from lowalt.targets.mesh_record import MOVING_KIND
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint that turns about its `hinge` (3,) m and `axis` (3,), `endless` or not; `parent` and `child` are links."""
+
+    name: str
+    parent: str
+    child: str
+    hinge: np.ndarray
+    axis: np.ndarray
+    endless: bool
+
+
+@dataclass
+class Robot:
+    """A description: `surfaces` by link, each a list of triangles (K, 3, 3) m; `fixed` pairs of links, parent first,
+    that do not turn; `joints` that do; `senses` of rotors by joint, seen against the axis."""
+
+    surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
+    fixed: list[tuple[str, str]] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    senses: dict[str, str] = field(default_factory=dict)
+
+    def below(self, link: str, others: set[str] = frozenset()) -> list[str]:
+        """A link and all that hang on it, but for those in `others` and what hangs on them."""
+        pairs = [*self.fixed, *((joint.parent, joint.child) for joint in self.joints)]
+        found = [link]
+        for name in found:
+            found += [child for parent, child in pairs if parent == name and child not in {*found, *others}]
+        return found
+
+
+def turning(robot: Robot, kind: str) -> list[Joint]:
+    """Return the joints of a robot whose links are parts of a kind: those that its names call so, else all that turn
+    without end and are called nothing else."""
+    others = [pattern for word, pattern in TURNING.items() if word != kind]
+
+    def called(joint: Joint, pattern: re.Pattern) -> bool:
+        """Whether a joint or its link has such a name."""
+        return bool(pattern.search(joint.name) or pattern.search(joint.child.rsplit("::", 1)[-1]))
+
+    able = [joint for joint in robot.joints if joint.endless or kind == "wing"]
+    able = [joint for joint in able if any(robot.surfaces.get(link) for link in robot.below(joint.child))]
+    named = [joint for joint in able if called(joint, TURNING[kind])]
+    return named or [joint for joint in able if joint.endless and not any(called(joint, one) for one in others)]
+
+
+def parts_of(robot: Robot, kind: str) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
+    """Return the joints of the parts of a kind by name, and the triangles (K, 3, 3) m of "body" and of each part.
+
+    Raises: InputError where nothing is left for the body.
+    """
+    joints, taken, triangles = {}, {}, {}
+    chosen = turning(robot, kind)
+    ends = {joint.child for joint in chosen}
+    for joint in chosen:
+        name = joint.child.replace("::", " ")
+        name = name if name not in joints and name != "body" else joint.name.replace("::", " ")
+        joints[name] = joint
+        for link in robot.below(joint.child, ends):
+            taken.setdefault(link, name)
+    for link, found in robot.surfaces.items():
+        triangles.setdefault(taken.get(link, "body"), []).extend(found)
+    if "body" not in triangles:
+        raise InputError("no surface is left for the body, expected links that do not turn")
+    parts = {name: np.concatenate(found) for name, found in triangles.items() if found}
+    return {name: joint for name, joint in joints.items() if name in parts}, parts
+
+
+def write_parts(path: Path, triangles: dict[str, np.ndarray]) -> None:
+    """Write the surfaces of parts into one GLB file, each a node of its name.
+
+    Raises: InputError where they are too many.
+    """
+    import trimesh
+
+    if sum(map(len, triangles.values())) > LARGEST_TRIANGLES:
+        raise InputError(f"{path}: more than {LARGEST_TRIANGLES} triangles, expected fewer")
+    scene = trimesh.Scene()
+    for name, corners in triangles.items():
+        shape = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), process=False)
+        shape.merge_vertices()
+        scene.add_geometry(shape, node_name=name, geom_name=name)
+    with replacing(path) as temporary:
+        temporary.write_bytes(scene.export(file_type="glb"))
+
+
+def part_lines(robot: Robot, joints: dict[str, Joint], kind: str, file: str) -> list[str]:
+    """Return the lines of a record's parts: a body, and each part with its hinge, axis and (of a rotor) sense."""
+    lines = [f"    body: {{kind: body, meshes: [{{file: {file!r}, geometry: [body]}}]}}"]
+    senses = alternating(np.array([joint.hinge[:2] for joint in joints.values()]))
+    for (name, joint), sense in zip(joints.items(), senses, strict=True):
+        hinge, axis = ([float(f"{value:.6g}") for value in vector + 0.0] for vector in (joint.hinge, joint.axis))
+        known = robot.senses.get(joint.name)
+        if known and axis[2] < 0:  # a record's sense is seen from above
+            known = {"ccw": "cw", "cw": "ccw"}.get(known)
+        turn = f", sense: {known or sense}" if kind == "rotor" else ""
+        mark = "  # GUESSED sense: neighbours turn in turn" if turn and not known else ""
+        lines.append(
+            f"    {name!r}: {{kind: {kind}, meshes: [{{file: {file!r}, geometry: [{name!r}]}}], hinge: {hinge}, "
+            f"axis: {axis}{turn}}}{mark}"
+        )
+    held = [joint.name for joint in robot.joints if joint not in joints.values()]
+    return lines + ([f"    # Held as drawn: {', '.join(held)}."] if held else [])
+
+
+def drafted_robot(
+    robot: Robot, joints: dict[str, Joint], triangles: dict[str, np.ndarray], category: str, table: dict[str, dict],
+    names: tuple[str, str, str], own: bool,
+) -> str:  # fmt: skip
+    """Return a record file's text of a robot whose joints tell its moving parts.
+
+    names: the subtype, the file described and the GLB of the parts inside the folder of inputs; `own`: whether the
+    target gets a row of its own.
+    """
+    subtype, source, file = names
+    kind, corners = MOVING_KIND[category], np.concatenate(list(triangles.values())).reshape(-1, 3)
+    extent = np.ptp(corners, axis=0)[[1, 0, 2]]
+    hubs = np.array([joint.hinge[:2] for joint in joints.values()]).reshape(-1, 2)
+    across = [float(np.ptp(triangles[name].reshape(-1, 3), axis=0).max()) for name in joints]
+    lines = [
+        f"# Drafted from {source}, whose surfaces {file} holds in metres: x front, y left, z up.",
+        f"{yaml.safe_dump(subtype).splitlines()[0]}:",
+        "  source: mesh",
+        *(row_lines(category, extent, hubs, max(across, default=None), table) if own else []),
+        "  unit: m",
+        "  up: z",
+        "  front: x",
+        f"  size_is: {size_word(category, extent, hubs)}",
+        "  licence: unknown  # the licence of the description",
+        "  parts:",
+        *part_lines(robot, joints, kind, file),
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,178 @@
+"""Robots' own descriptions: each joint of a rotor or wheel becomes a part that turns about the right line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+
+from lowalt.__main__ import main
+from lowalt.common.errors import InputError
+from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.robot_files import read_robot
+from lowalt.targets.robots import Joint, parts_of
+from made_robots import HUBS, MJCF, SDF, urdf
+
+
+def folder(tmp_path: Path) -> Path:
+    """A folder of inputs with the package `craft` and its propeller."""
+    (tmp_path / "craft" / "meshes").mkdir(parents=True)
+    trimesh.creation.box((240, 20, 4)).export(tmp_path / "craft/meshes/prop.stl")
+    return tmp_path
+
+
+def joints(path: Path, inputs: Path, kind: str = "rotor") -> tuple[dict[str, Joint], dict[str, np.ndarray]]:
+    """Joints and triangles of a description's parts."""
+    return parts_of(read_robot(path, inputs), kind)
+
+
+def made(path: Path, inputs: Path, *words: str) -> tuple[dict, Cloud]:
+    """The record that `target new` drafts of a description, and the cloud of it."""
+    out = inputs / "own.yaml"
+    assert main(["target", "new", str(path), "--inputs", str(inputs), "--out", str(out), *words]) == 0
+    assert main(["target", "make", str(out), "--inputs", str(inputs), "--out", str(inputs / "own.npz")]) == 0
+    return yaml.safe_load(out.read_text()), read(inputs / "own.npz")
+
+
+def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
+    inputs = folder(tmp_path)
+    (inputs / "craft/craft.urdf").write_text(urdf())
+    records, cloud = made(inputs / "craft/craft.urdf", inputs)
+    (record,) = records.values()
+    assert list(records) == ["craft"] and record["row"]["size_m"] == pytest.approx(0.5) and record["front"] == "x"
+    assert cloud.kinds == ("body", *("rotor",) * 4) and cloud.names[1:] == tuple(HUBS)
+    # x is the front and y the left, so right is -y.
+    np.testing.assert_allclose(cloud.hinges[1:, :2], [(-y, x) for x, y in HUBS.values()], atol=1e-6)
+    np.testing.assert_allclose(np.abs(cloud.axes[1:, 2]), 1, atol=1e-9)
+    senses = np.sign(cloud.axes[1:, 2])
+    assert senses[0] == senses[1] != senses[2] == senses[3]  # neighbours turn against each other
+    for part in range(1, 5):
+        blade = cloud.points[cloud.part == part] - cloud.hinges[part]
+        assert np.linalg.norm(blade[:, :2], axis=1).max() == pytest.approx(0.12, rel=0.01)
+        along = blade[np.argmax(np.linalg.norm(blade, axis=1))]
+        turned = np.degrees(np.arctan2(-along[0], along[1]) - (part - 1)) % 180  # its joint's own turn, in radians
+        assert min(turned, 180 - turned) < 6
+
+
+def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
+    (tmp_path / "base").mkdir()
+    (tmp_path / "base/base.sdf").write_text(SDF)
+    (tmp_path / "base/model.config").write_text("<model><sdf version='1.9'>base.sdf</sdf></model>")
+    top = """<sdf version="1.9"><model name="top"><include merge="true"><uri>model://base</uri></include>
+    <link name="lift"><pose relative_to="pusher">0 0 0 0 0 0</pose><visual name="v"><geometry><sphere>
+    <radius>0.05</radius></sphere></geometry></visual></link>
+    <joint name="lift_rotor" type="continuous"><pose relative_to="hull">0.1 0 0.2 0 0 0</pose><parent>hull</parent>
+    <child>lift</child><axis><xyz expressed_in="hull">0 0 -2</xyz></axis></joint>
+    <plugin><jointName>lift_rotor</jointName><turningDirection>ccw</turningDirection></plugin>
+    <include><name>eye</name><uri>base</uri><pose>0 0 5 0 0 0</pose></include></model></sdf>"""
+    (tmp_path / "top.sdf").write_text(top)
+    found, triangles = joints(tmp_path / "top.sdf", tmp_path)
+    assert set(found) == {"pusher", "lift", "eye pusher"}
+    # The link's own turn by a quarter about y takes its z, and the joint's shift along it, to the front.
+    np.testing.assert_allclose(found["pusher"].hinge, [-0.28, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(found["pusher"].axis, [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(found["eye pusher"].hinge, [-0.28, 0, 5], atol=1e-9)
+    np.testing.assert_allclose(found["lift"].hinge, [0.1, 0, 1.2], atol=1e-9)
+    np.testing.assert_allclose(found["lift"].axis, [0, 0, -1], atol=1e-9)
+    np.testing.assert_allclose(triangles["pusher"].mean(axis=(0, 1))[:2], [-0.3, 0], atol=1e-9)
+    np.testing.assert_allclose(np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3)
+    assert triangles["body"].reshape(-1, 3)[:, 1].max() == pytest.approx(0.3)  # the aileron is held
+    words = [str(tmp_path / "top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
+    assert main(["target", "new", *words]) == 0
+    parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
+    assert parts["lift"]["sense"] == "cw"  # anticlockwise about an axis that points down
+
+
+def test_an_old_sdf_s_axes_are_in_the_model_s_frame(tmp_path):
+    (tmp_path / "a.sdf").write_text(SDF.replace('version="1.9"', 'version="1.4"'))
+    found, _ = joints(tmp_path / "a.sdf", tmp_path)
+    np.testing.assert_allclose(found["pusher"].axis, [0, 0, 1], atol=1e-9)
+
+
+def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
+    trimesh.creation.box((24, 2, 0.4)).export(tmp_path / "prop.stl")
+    (tmp_path / "a.xml").write_text(MJCF)
+    found, triangles = joints(tmp_path / "a.xml", tmp_path)
+    assert set(found) == {"rotor_a", "rotor_b"}
+    np.testing.assert_allclose(found["rotor_a"].hinge, [0.4, 0, 0.5], atol=1e-9)
+    np.testing.assert_allclose(found["rotor_a"].axis, [1, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(found["rotor_b"].axis, [0, 0, -1], atol=1e-9)
+    np.testing.assert_allclose(np.ptp(triangles["rotor_a"].reshape(-1, 3), axis=0), [0.004, 0.02, 0.24], atol=1e-9)
+    body = triangles["body"].reshape(-1, 3)
+    assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(0.21, abs=1e-6)
+
+
+def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
+    wheels = "".join(
+        f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.06"/>'
+        f'</geometry></visual></link><joint name="axle_{index}" type="continuous"><origin xyz="{x} {y} 0.1"/>'
+        f'<parent link="base"/><child link="wheel_{index}"/><axis xyz="0 1 0"/></joint>'
+        for index, (x, y) in enumerate([(0.3, 0.2), (0.3, -0.2), (-0.3, 0.2), (-0.3, -0.2)])
+    )
+    text = '<robot name="r"><link name="base"><visual><origin xyz="0 0 0.25"/><geometry><box size="0.8 0.3 0.2"/>'
+    (tmp_path / "rover.urdf").write_text(f"{text}</geometry></visual></link>{wheels}</robot>")
+    records, cloud = made(tmp_path / "rover.urdf", tmp_path)
+    row = records["rover"]["row"]
+    assert row["category"] == "Vehicle" and row["wheel_diam_m"] == pytest.approx(0.2, rel=0.01)
+    assert cloud.kinds == ("body", *("wheel",) * 4)
+    np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [0.46, 0.8, 0.35], rtol=0.02)
+
+
+def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing_is_left(tmp_path, capsys):
+    inputs = folder(tmp_path)
+    (inputs / "craft/craft.urdf").write_text(urdf())
+    before = sorted(inputs.rglob("*"))
+    command = [
+        "target",
+        "new",
+        str(inputs / "craft/craft.urdf"),
+        "--inputs",
+        str(inputs),
+        "--out",
+        str(inputs / "a.yaml"),
+    ]
+    assert main([*command, "--subtype", "DJI Matrice 600 Pro"]) == 2
+    assert "4 rotors turn, DJI Matrice 600 Pro has 6: leave --subtype out" in capsys.readouterr().err
+    assert sorted(inputs.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (urdf(blade="package://craft/meshes/gone.stl"), "'package://craft/meshes/gone.stl' is not there"),
+        (urdf(blade="../../outside.stl"), "lies outside the folder of inputs"),
+        (urdf(blade="/etc/passwd"), "lies outside the folder of inputs"),
+        (urdf(blade="file:///etc/passwd"), "lies outside the folder of inputs"),
+        (urdf(blade="https://example.org/a.stl"), "is no file of the folder of inputs"),
+        (urdf(base='<box size="a b c"/>'), "not a readable description"),
+        (urdf(base="<box/>"), "expected 3 finite numbers"),
+        ('<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>' + urdf(), "it declares a document type"),
+        (urdf('<xacro:a xmlns:xacro="http://x/xacro"/>'), "it holds macros, expected what they expand to: xacro FILE"),
+        ("<html/>", "<html>, expected one of"),
+        ('<robot name="a"><link name="b"/></robot>', "no surface of finite places"),
+        ('<sdf><model name="a"><include><uri>self.urdf</uri></include></model></sdf>', "in a circle|at most 200"),
+        ('<sdf><model name="a"><link name="l"><pose relative_to="l">0 0 0 0 0 0</pose><visual name="v"><geometry>'
+         "<sphere><radius>1</radius></sphere></geometry></visual></link></model></sdf>", "hangs on itself"),
+    ],
+)  # fmt: skip
+def test_a_description_that_is_wrong_or_reaches_outside_is_refused_by_name(text, words, tmp_path):
+    (tmp_path / "outside.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
+    inputs = folder(tmp_path / "inputs")
+    (inputs / "craft/self.urdf").write_text(text)
+    with pytest.raises(InputError, match=rf"self\.urdf: .*({words})"):
+        read_robot(inputs / "craft/self.urdf", inputs)
+
+
+def test_a_link_to_a_file_outside_and_a_template_are_refused(tmp_path):
+    (tmp_path / "outside.stl").write_bytes(trimesh.creation.box().export(file_type="stl"))
+    inputs = folder(tmp_path / "inputs")
+    (inputs / "craft/meshes/link.stl").symlink_to(tmp_path / "outside.stl")
+    (inputs / "craft/a.urdf").write_text(urdf(blade="meshes/link.stl"))
+    with pytest.raises(InputError, match="outside the folder of inputs"):
+        read_robot(inputs / "craft/a.urdf", inputs)
+    (inputs / "b.urdf.xacro").write_text("")
+    with pytest.raises(
+        InputError, match=r"is a template, expected what it expands to: xacro b.urdf.xacro > robot.urdf"
+    ):
+        read_robot(inputs / "b.urdf.xacro", inputs)
