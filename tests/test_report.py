@@ -3,6 +3,7 @@
 import json
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from lowalt.common.config import load
@@ -10,10 +11,11 @@ from lowalt.common.csv_tables import read_csv
 from lowalt.common.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
 from lowalt.measure.scale import main as write_estimates
+from lowalt.recognition.predictions import Predictions
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
-from lowalt.report.sections import accuracy_cost, echo_cost, effects, hard_cases, measured, transfer
-from lowalt.report.tables import by_scheme, cloud_seconds, confusion, spreads, stage_times
+from lowalt.report.sections import accuracy_cost, echo_cost, effects, measured, orderings, overview, subtypes, transfer
+from lowalt.report.tables import by_scheme, confusion, spreads, stage_times
 
 
 def test_accuracy_is_pivoted_in_order(tmp_path):
@@ -51,7 +53,6 @@ def test_stage_times_sum_over_jobs_and_survive_short_ones(tmp_path):
     echo, cloud = stage_times(paths)
     assert echo == {"rule": "echo", "jobs": 2, "wall_s": 5.0, "cpu_s": 1.5, "peak_mib": 100.0}
     assert cloud["jobs"] == 1
-    assert cloud_seconds(paths) == {"crow": 1.0}
     paths[0].write_text("not json\n")
     with pytest.raises(InputError, match=r"0\.jsonl: not an extended benchmark"):
         stage_times(paths)
@@ -141,7 +142,7 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
 
 def test_a_section_that_a_run_may_lack_is_left_out(bare):
     run = SimpleNamespace(inputs=Inputs(bare))
-    for section in (accuracy_cost, echo_cost, effects, hard_cases, measured, transfer):
+    for section in (accuracy_cost, echo_cost, effects, measured, transfer):
         assert section.values(run) is None
     assert rendered("transfer", None) == ""
 
@@ -151,3 +152,34 @@ def test_every_section_has_a_template_and_every_template_a_section():
     assert len(names) == len(SECTIONS)
     assert names == {path.stem for path in (TEMPLATES / "sections").glob("*.html")}
     assert names | {"__init__"} == {path.stem for path in (TEMPLATES / "sections").glob("*.py")}
+
+
+def test_the_first_words_are_the_best_scheme_beside_the_paper_s_and_what_one_seed_says():
+    rows = [{"protocol": "unseen", "scheme": name, "snr_db": "avg", "accuracy_percent": value, "seeds": "1"}
+            for name, value in (("A", "80.0"), ("ABC", "92.5"))]  # fmt: skip
+    published = [{"protocol": "unseen", "scheme": "ABC", "snr_db": "avg", "accuracy_percent": "97.8"}]
+    (told,) = overview.accuracies(rows, published, 4)
+    assert (told["scheme"], told["percent"], told["paper"]) == ("ABC", 92.5, 97.8)
+    seed = "one training seed: another moves this by about a point"
+    assert told["words"] == f"chance is 25 %; the paper prints 97.8 % of its own data, which nobody else has; {seed}"
+    assert overview.verdict(50.0, None, 2, 3) == "chance is 50 %"
+
+
+def test_one_seed_cannot_tell_an_ordering():
+    row = {"scheme": "A", "over": "B", "protocol": "seen", "ordering": "not ranked"}
+    assert orderings.ordering_words([row]).startswith("Whether the paper's orderings hold takes three training seeds")
+
+
+def test_reasons_are_read_from_the_wrong_samples():
+    """Two motion models at two SNRs, seen from the side (wrong) and from the front (right)."""
+    wrong = np.array([True, True, False, False])
+    said = Predictions(
+        np.array(list("abcd")), np.full(4, "Crow"), np.full(4, "unseen"), np.full(4, "test"), np.array([0, 0, 1, 1]),
+        np.array([3.0, 8.0, 3.0, 8.0]), np.ones(4, int), np.ones(4), np.where(wrong, 90.0, 0.0),
+        np.eye(4)[np.where(wrong, 0, 1)],
+    )  # fmt: skip
+    assert subtypes.reasons(said, ("UAV", "Bird", "Vehicle", "Pedestrian")) == {
+        "Crow": "called UAV in 100% of its errors; 1 of 2 motion models are wrong at every SNR; wrong more often seen "
+        "from the side"
+    }
+    assert subtypes.reasons(said.take(~wrong), ("UAV", "Bird", "Vehicle", "Pedestrian")) == {}

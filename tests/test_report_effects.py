@@ -212,5 +212,5 @@ def test_effects_are_priced_where_asked_for_and_nowhere_else(tmp_path):
     shown.write_text("report: {effects: true}\n")
     assert priced | {"report"} <= planned(folder, "--configfile", "overlay.yaml", str(shown))
     shown.write_text("effects: {adc: {}}\n")
-    text = snakemake(folder, "-n", "--configfile", "overlay.yaml", str(shown), "--", "effects_cost", status=1)
+    text = snakemake(folder, "-n", "--configfile", "overlay.yaml", str(shown), "--", "effects_cost", status=2)
     assert "effects: ['adc'], expected none" in text

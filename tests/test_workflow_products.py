@@ -44,12 +44,11 @@ def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
 def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     run, products, _ = parts({"report": {"cost": False, "effects": False, "accuracy": "", "measured": ""}})
     base, page = "results/default", products.report(CHUNK)
-    named = ("index", "gallery", "motion", "distances", "seeds", "ranges", "aspects")
+    named = ("index", "gallery", "motion", "distances", "seeds")
     assert {name: page[name] for name in named} == {
         "index": f"{base}/shards/index.json", "gallery": f"{base}/clouds.png",
         "motion": f"{base}/motion/seen-00000.csv",
-        "distances": f"{base}/distances.csv", "seeds": f"{base}/seeds.csv", "ranges": f"{base}/ranges.csv",
-        "aspects": f"{base}/aspects.csv",
+        "distances": f"{base}/distances.csv", "seeds": f"{base}/seeds.csv",
     }  # fmt: skip
     assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]

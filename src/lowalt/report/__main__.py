@@ -14,7 +14,7 @@ from lowalt.report.inputs import Inputs
 from lowalt.report.page import SECTIONS, page, section
 from lowalt.report.plots import scripts, write_plots
 from lowalt.report.run import ReportedRun
-from lowalt.report.sections.stages import write_stages
+from lowalt.report.stages import write_stages
 from lowalt.targets.cloud import read
 
 

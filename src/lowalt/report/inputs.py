@@ -15,20 +15,19 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import existing, text_of
 
 FILES = (
-    "accuracy", "confusion", "subtypes", "comparisons", "orderings", "alarms", "calibration", "reliability", "seeds",
-    "ranges", "aspects", "distances", "index", "gallery", "motion",
+    "accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index", "gallery", "motion",
 )  # fmt: skip
 """Names of which every manifest has one file."""
 LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""
 KEPT = {
     "accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv",
-    "echo_pixels": "default-cost_pixels.csv", "effects": "default-effects.csv", "hard_cases": "hard_cases.csv",
-    "measured": "measured-accuracy.csv",
+    "echo_pixels": "default-cost_pixels.csv",
 }  # fmt: skip
 """Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
 OPTIONAL = (
-    "published", "transfer", "echo_cost_figure", "effects_figure", *KEPT, *(f"kept_{name}" for name in KEPT),
+    "published", "transfer", "echo_cost_figure", "effects", "effects_figure", "measured", *KEPT,
+    *(f"kept_{name}" for name in KEPT),
 )  # fmt: skip
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""
 OPTIONAL_LISTS = ("predictions",)

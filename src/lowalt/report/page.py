@@ -11,23 +11,16 @@ from lowalt.report.run import ReportedRun
 from lowalt.report.sections import (
     accuracy,
     accuracy_cost,
-    alarms,
-    bands,
-    calibration,
     confusion,
     echo_cost,
     effects,
-    hard_cases,
     made_with,
     measured,
     orderings,
     overview,
     samples,
     scene,
-    stages,
     subtypes,
-    targets,
-    trainings,
     transfer,
 )
 
@@ -47,20 +40,16 @@ class Section(NamedTuple):
     plots: list[tuple[Plot, str]]
 
 
-RESULTS = (accuracy, orderings, confusion, subtypes, bands, alarms, calibration, transfer, trainings)
 PARTS = (
     PagePart("run", "This run", (overview,)),
-    PagePart("results", "Results", RESULTS),
-    PagePart("cost", "What accuracy costs in time", (echo_cost, accuracy_cost)),
-    PagePart("hard-cases", "Hard cases", (hard_cases,)),
-    PagePart("effects", "Effects and scenes", (effects, scene)),
-    PagePart("measured", "Held against measurement", (measured,)),
-    PagePart("targets", "Targets", (targets,)),
     PagePart("samples", "Samples", (samples,)),
-    PagePart("stages", "Stage times", (stages,)),
+    PagePart("results", "Results", (subtypes, confusion, accuracy, orderings, transfer)),
+    PagePart("cost", "What accuracy costs in time", (accuracy_cost, echo_cost)),
+    PagePart("effects", "The scene", (scene, effects)),
+    PagePart("measured", "Held against measurement", (measured,)),
     PagePart("provenance", "Provenance", (made_with,)),
 )
-"""The parts in the order of the page. Every page has all of them; a part without values says so."""
+"""The parts in the order of the page; one that the run has nothing for is left out."""
 
 
 def _name(module: ModuleType) -> str:
@@ -121,6 +110,6 @@ def page(run: ReportedRun, sections: dict[str, Section], script: str = "") -> st
     parts = []
     for part in PARTS:
         html = "\n".join(sections[_name(module)].html for module in part.sections).strip()
-        html = html or "<p>Neither this run nor the kept reference has measured this.</p>"
-        parts.append({"id": part.id, "title": part.title, "html": html})
+        if html:
+            parts.append({"id": part.id, "title": part.title, "html": html})
     return assembled(f"run “{run.config['run']}”", parts, script)

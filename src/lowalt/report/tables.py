@@ -52,12 +52,6 @@ def measurement(path: str | Path) -> dict:
         raise InputError(f"{path}: not an extended benchmark file ({error!r})") from error
 
 
-def cloud_seconds(paths: Iterable[str | Path]) -> dict[str, float]:
-    """Return the wall time (s) each subtype's cloud took, by the subtype's file name."""
-    jobs = map(measurement, paths)
-    return {job["wildcards"]["subtype"]: float(job["s"]) for job in jobs if job["rule_name"] == "cloud"}
-
-
 def stage_times(paths: Iterable[str | Path]) -> list[dict]:
     """Return the time and memory of each rule, from Snakemake's benchmark files (JSON lines, extended).
 

@@ -26,6 +26,8 @@ TABLES = (
     "calibration.csv", "reliability.csv",
 )  # fmt: skip
 """Tables of recognition; their rows name a protocol and a scheme."""
+PAGE_TABLES = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds")
+"""Those of them that the page shows."""
 
 
 class Products(DataProducts):
@@ -110,7 +112,7 @@ class Products(DataProducts):
         """The files of the report by the names of its manifest (`lowalt.report.inputs`)."""
         base, data, block = f"results/{wildcards.run}", f"results/{self._run.data}", self._config["report"]
         files: dict[str, str | list[str]] = {
-            **{Path(name).stem: f"{base}/{name}" for name in (*TABLES, "seeds.csv", "ranges.csv", "aspects.csv")},
+            **{name: f"{base}/{name}.csv" for name in PAGE_TABLES},
             "published": block["published"],
             "index": f"{data}/shards/index.json",
             "clouds": [f"{data}/clouds/{subtype}.npz" for subtype in self._run.subtypes],
@@ -126,9 +128,6 @@ class Products(DataProducts):
             for name, file in KEPT.items()
             if shipped(f"{REFERENCE}/{file}").is_file()
         }
-        # No rule makes this file, so that no run needs the package mpmath: `python -m lowalt.measure.hard_cases` does.
-        if Path(f"{base}/hard_cases.csv").is_file():
-            files["hard_cases"] = f"{base}/hard_cases.csv"
         if self._run.trainings:
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
         if block["accuracy"]:

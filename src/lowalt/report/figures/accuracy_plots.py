@@ -3,8 +3,6 @@
 from lowalt.report.figures.style import SNR_LABELS
 from lowalt.report.plots import Plot
 
-FEWEST = 30
-"""Samples a band must have to be drawn: with fewer, one sample moves it by more than three points."""
 PAGE_WIDTH, CELL = 960, 46
 """Width of the page's column, and of a cell of a matrix, in pixels; 100.0 fits into a cell."""
 _PICKED = {"name": "picked", "select": {"type": "point", "fields": ["scheme"]}, "bind": "legend"}
@@ -84,46 +82,3 @@ def confusion(counts: dict, categories: tuple[str, ...]) -> Plot:
             "columns": max(1, PAGE_WIDTH // (CELL * len(categories) + 40)),
             "spec": {"width": {"step": CELL}, "height": {"step": CELL}, "encoding": axes, "layer": layers}}  # fmt: skip
     return Plot("confusion", "confusion matrices in percent of the true class", spec, rows)
-
-
-def over_bands(bands: dict[str, list[dict[str, str]]]) -> Plot:
-    """Return accuracy over bands of a quantity, a row a protocol, a column a quantity, a line a scheme.
-
-    bands: rows {protocol, scheme, from, to, accuracy_percent, samples} by the quantity's name with its unit.
-    """
-    rows = [
-        {"quantity": quantity, "protocol": f"{row['protocol']} subtypes", "scheme": row["scheme"],
-         "from": float(row["from"]), "to": float(row["to"]), "middle": (float(row["from"]) + float(row["to"])) / 2,
-         "accuracy_percent": float(row["accuracy_percent"]), "samples": int(row["samples"])}
-        for quantity, found in bands.items() for row in found if int(row["samples"]) >= FEWEST
-    ]  # fmt: skip
-    across = {"field": "middle", "type": "quantitative", "title": None, "scale": {"zero": False}}
-    spec = {"facet": {"column": {"field": "quantity", "title": None}, "row": {"field": "protocol", "title": None}},
-            "resolve": {"scale": {"x": "independent"}},
-            "spec": {"width": 400, "height": 220, **_lines(across)}}  # fmt: skip
-    return Plot("bands", "accuracy over distance and aspect", spec, rows)
-
-
-def over_confidence(bands: list[dict[str, str]]) -> Plot:
-    """Return accuracy over confidence, a panel a protocol, a line a scheme; the diagonal is where both are equal.
-
-    bands: rows {protocol, scheme, confidence_percent, accuracy_percent, samples}.
-    """
-    rows = [
-        {"protocol": f"{row['protocol']} subtypes", "scheme": row["scheme"],
-         "confidence_percent": float(row["confidence_percent"]), "accuracy_percent": float(row["accuracy_percent"]),
-         "samples": int(row["samples"])}
-        for row in bands if int(row["samples"]) >= FEWEST
-    ]  # fmt: skip
-    across = {
-        "field": "confidence_percent",
-        "type": "quantitative",
-        "title": "confidence (%)",
-        "scale": {"domain": [25, 100], "nice": False},
-    }
-    lines = _lines(across)
-    diagonal = {"data": {"values": [{"at": 25}, {"at": 100}]}, "mark": {"type": "line", "color": "gray"}, "encoding": {
-        "x": {"field": "at", "type": "quantitative"}, "y": {"field": "at", "type": "quantitative"}}}  # fmt: skip
-    panels = {"width": 360, "height": 320, "layer": [diagonal, lines]}
-    spec = {"facet": {"column": {"field": "protocol", "title": None}}, "spec": panels}
-    return Plot("reliability", "accuracy over the network's confidence", spec, rows)

@@ -105,17 +105,3 @@ def effects(table: list[dict[str, str]]) -> Plot:
         {"mark": {"type": "point", "filled": True, "tooltip": _PER_NAME},
          "encoding": {"x": {"field": "difference_points", "type": "quantitative"}}}]}  # fmt: skip
     return Plot("effects", "time and change of accuracy of each effect", {"hconcat": [times, change]}, rows)
-
-
-def stages(times: list[dict]) -> Plot:
-    """Return the seconds of each rule's jobs, summed; `times` as `tables.stage_times` gives them."""
-    rows = [{"rule": f"{entry['rule']} ({entry['jobs']})", "wall_s": entry["wall_s"], "cpu_s": entry["cpu_s"],
-             "peak_mib": entry["peak_mib"]} for entry in times]  # fmt: skip
-    place = {"y": {"field": "rule", "type": "nominal", "sort": None, "title": None},
-             "x": {"field": "wall_s", "type": "quantitative",
-                   "title": "job seconds, summed over jobs (number of jobs in brackets)"}}  # fmt: skip
-    text = {"mark": {"type": "text", "align": "left", "dx": 3}, "encoding": {
-        "text": {"field": "wall_s", "type": "quantitative", "format": ".0f"}}}  # fmt: skip
-    spec = {"width": 560, "height": {"step": 20}, "encoding": place,
-            "layer": [{"mark": {"type": "bar", "tooltip": _PER_NAME}}, text]}  # fmt: skip
-    return Plot("stage_times", "seconds of each stage's jobs", spec, rows)

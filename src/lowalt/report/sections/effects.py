@@ -12,11 +12,9 @@ COLUMNS = (
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the rows of the table of effects, and the figure of this run's own; None where there is no table."""
-    name = run.inputs.own_or_kept("effects")
-    if name is None:
+    """Return the rows of the table of effects and their figures; None where the run has no table."""
+    if "effects" not in run.inputs:
         return None
-    own = name == "effects"
-    picture = embedded(run.inputs.path("effects_figure").read_bytes()) if own else ""
-    rows = run.inputs.table(name, *COLUMNS)
-    return {"own": own, "rows": rows, "plot": cost_plots.effects(rows) if rows[1:] else None, "picture": picture}
+    rows = run.inputs.table("effects", *COLUMNS)
+    picture = embedded(run.inputs.path("effects_figure").read_bytes())
+    return {"own": True, "rows": rows, "plot": cost_plots.effects(rows) if rows[1:] else None, "picture": picture}

@@ -64,6 +64,5 @@ def held(folder: str | Path) -> dict:
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the section's values; None where neither run nor reference has measured tables."""
-    name = run.inputs.own_or_kept("measured")
-    return None if name is None else {"own": name == "measured", **held(run.inputs.path(name).parent)}
+    """Return the section's values; None where the configuration names no measured tables."""
+    return {"own": True, **held(run.inputs.path("measured").parent)} if "measured" in run.inputs else None

@@ -1,14 +1,49 @@
-"""Section: the run in one sentence."""
+"""Section: what the run is, its accuracies beside the paper's in one sentence each, and three of its tiles."""
 
+from lowalt.common.csv_tables import read_csv
 from lowalt.common.hardware import describe
+from lowalt.report.figures.style import embedded
+from lowalt.report.figures.tiles import example_tiles
 from lowalt.report.run import ReportedRun
+from lowalt.report.sections.accuracy import COLUMNS
+from lowalt.report.tables import by_scheme, macro_f1
+
+TILES = 3
+"""Tiles at the top of the page."""
+
+
+def verdict(here: float, paper: float | None, classes: int, seeds: int) -> str:
+    """Return in a sentence whether an average accuracy (percent) is good; paper: the published one, or None."""
+    words = f"chance is {100 / classes:.0f} %"
+    if paper is not None:
+        words += f"; the paper prints {paper:.1f} % of its own data, which nobody else has"
+        words += ", so the two may be compared in kind alone" if abs(here - paper) < 2 else ""
+    return words + ("; one training seed: another moves this by about a point" if seeds < 3 else "")
+
+
+def accuracies(rows: list[dict[str, str]], published: list[dict[str, str]], classes: int) -> list[dict]:
+    """Return one entry a protocol: the scheme of highest average, its accuracy, interval of macro F1 and a verdict."""
+    ours, paper, intervals = by_scheme(rows), by_scheme(published), macro_f1(rows)
+    found = []
+    for protocol, schemes in ours.items():
+        scheme = max(schemes, key=lambda name: schemes[name]["avg"])
+        here, there = schemes[scheme]["avg"], paper.get(protocol, {}).get(scheme, {}).get("avg")
+        seeds = max(int(row["seeds"]) for row in rows)
+        found.append({
+            "protocol": protocol, "scheme": scheme, "percent": here, "paper": there,
+            "interval": intervals.get(protocol, {}).get(scheme, ""), "words": verdict(here, there, classes, seeds),
+        })  # fmt: skip
+    return found
 
 
 def values(run: ReportedRun) -> dict:
-    """Return the run's size, its seed and the machine."""
+    """Return the run's size, its accuracies with a verdict, and tiles of its first classes."""
+    published = read_csv(run.inputs.path("published"), *COLUMNS) if "published" in run.inputs else []
+    measured = run.inputs.table("accuracy", *COLUMNS, "seeds", "spread_points")
+    tiles = [(caption, embedded(data)) for caption, data in example_tiles(run.shards)[:TILES]]
     return {
-        "run": run.config["run"], "seed": run.config["seed"], "stations": len(run.stations),
-        "snrs": len(run.snr_labels), "models": len(run.shards) // len(run.snr_labels),
-        "subtypes": len(run.inputs.paths("clouds")), "samples": len(run.shards), "kind": run.shards.kind,
-        "sample_bytes": run.sample_bytes, "hardware": describe(),
+        "seed": run.config["seed"], "stations": len(run.stations), "snrs": len(run.snr_labels),
+        "models": len(run.shards) // len(run.snr_labels), "subtypes": len(run.inputs.paths("clouds")),
+        "samples": len(run.shards), "kind": run.shards.kind, "sample_bytes": run.sample_bytes,
+        "hardware": describe(), "accuracies": accuracies(measured, published, len(run.shards.classes)), "tiles": tiles,
     }  # fmt: skip

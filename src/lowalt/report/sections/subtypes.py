@@ -1,9 +1,16 @@
-"""Section: accuracy of every subtype, and the subtype nearest to it that was trained on."""
+"""Section: accuracy of every subtype, the worst first with what their errors have in common."""
 
+import numpy as np
+
+from lowalt.recognition.predictions import Predictions, read
 from lowalt.report.run import ReportedRun
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
 DISTANCES = ("category", "subtype", "nearest_trained", "trained_distance", "trained_size_ratio")
+
+
+WORST = 6
+"""Subtypes that are shown with a reason."""
 
 
 def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str, str, dict[str, str]]]]:
@@ -17,9 +24,34 @@ def subtype_table(rows: list[dict[str, str]]) -> tuple[list[str], list[tuple[str
     return list(columns), [(name, category, values) for (name, category), values in table.items()]
 
 
+def reasons(found: Predictions, classes: tuple[str, ...]) -> dict[str, str]:
+    """Return by subtype what its wrong samples have in common, in a sentence; "" where none is wrong."""
+    said = {}
+    for subtype in np.unique(found.subtype):
+        mine = found.take(found.subtype == subtype)
+        wrong = mine.take(~mine.correct)
+        if not len(wrong):
+            continue
+        called = classes[np.bincount(wrong.guesses).argmax()]
+        models = np.unique(mine.motion)
+        always = sum(not mine.correct[mine.motion == model].any() for model in models)
+        along = np.abs(np.cos(np.radians(mine.aspect_deg)))
+        words = f"called {called} in {np.mean(wrong.guesses == classes.index(called)):.0%} of its errors; "
+        words += f"{always} of {len(models)} motion models are wrong at every SNR"
+        if np.isfinite(along).all():
+            apart = along[~mine.correct].mean() - along.mean()
+            if abs(apart) > 0.1:
+                words += f"; wrong more often seen {'from the front or rear' if apart > 0 else 'from the side'}"
+        said[str(subtype)] = words
+    return said
+
+
 def values(run: ReportedRun) -> dict | None:
-    """Return the pivoted table, the worst subtype first, and the distances; None where nothing was predicted."""
+    """Return the pivoted table, the worst subtype first, distances and reasons; None where nothing was predicted."""
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
     rows.sort(key=lambda row: min(map(float, row[2].values())))
-    return {"columns": columns, "rows": rows, "distances": distances} if rows else None
+    files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
+    # The last training is of the protocol and the scheme that the configuration names last.
+    told = reasons(read(files[-1], run.shards.classes), run.shards.classes) if files else {}
+    return {"columns": columns, "rows": rows, "distances": distances, "reasons": told, "worst": WORST} if rows else None

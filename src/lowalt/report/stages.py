@@ -1,19 +1,12 @@
-"""Section: the time of each rule's jobs."""
+"""The table of the time of each rule's jobs."""
 
 from pathlib import Path
 
 from lowalt.common.csv_tables import write_csv
 from lowalt.common.hardware import describe
-from lowalt.report.figures import cost_plots
 from lowalt.report.run import ReportedRun
 
 COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")
-
-
-def values(run: ReportedRun) -> dict:
-    """Return the times of the rules, their plot, and the number of samples."""
-    times = run.stage_times
-    return {"times": times, "samples": len(run.shards), "plot": cost_plots.stages(times)}
 
 
 def write_stages(path: str | Path, run: ReportedRun) -> None:
