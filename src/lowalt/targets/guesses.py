@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial import cKDTree
 
 from lowalt.targets.mesh_files import UNITS_M
 
@@ -26,6 +27,9 @@ SMALLEST_ROTOR = 0.15
 OFF_CENTRE = 0.3
 """A rotor's surface lies about its hub: its middle is at most this share of its radius from that of its box; three
 blades have a quarter."""
+
+SYMMETRIC = 0.02
+"""Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
 
 LONG = 0.75
 """Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
@@ -84,14 +88,30 @@ def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> s
     return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
 
 
-def guessed_axes(extent: np.ndarray, category: str, up: int | None = None) -> tuple[str, str]:
+def mirror_axis(points: np.ndarray) -> int | None:
+    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
+    cannot be seen: left and right of a bird."""
+    size = float(np.ptp(points, axis=0).max())
+    tree, off = cKDTree(points), []
+    for axis in range(3):
+        mirrored = points.copy()
+        mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
+        off.append(float(np.mean(tree.query(mirrored)[0])) / max(size, 1e-300))
+    best, second = np.sort(off)[:2]
+    return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+
+
+def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
     """Return the axes of the file that may point up and to the front. Only the extents (3,) are known, so no signs are.
 
     A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across. `up` is the number of the axis upwards where something else tells it.
+    across. `up` and `right` are the numbers of axes that something else tells.
     """
-    order = [axis for axis in np.argsort(extent, kind="stable") if axis != up]
-    order = [up, *order] if up is not None else order
+    order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
+    order = order if up is None else [up, *order]
+    if right is not None:
+        order = [*order, right]
+        return "xyz"[order[0]], "xyz"[order[1]]
     front = int(order[2] if category == "Vehicle" else order[1])
     if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
         front = next(axis for axis in range(3) if axis != order[0])
@@ -171,7 +191,7 @@ def rotors(
         good = [group for group in groups if _is_rotor(group, range(3), whole)]
         if good and (count is None or len(good) == count):
             return ups[0], good
-    for up in ups:
+    for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
         flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
         sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
