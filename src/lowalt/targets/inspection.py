@@ -74,7 +74,10 @@ def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         middle = (areas[:, None] * (a + b + c)).sum(axis=0) / (3 * max(areas.sum(), 1e-300))
         closed, area = bool(mesh.closed[number]), float(areas.sum()) / 2
-        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", middle, area))
+        spread, axes = np.linalg.eigh(np.cov(points.T))
+        slender = float(np.sqrt(max(spread[1], 0.0) / max(spread[2], 1e-300)))
+        shape = (middle, area, axes[:, 2], slender)
+        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", *shape))
     return sorted(result, key=lambda part: -float(part.extent.max()))
 
 
