@@ -31,8 +31,9 @@ blades have a quarter."""
 SYMMETRIC = 0.02
 """Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
 
-SLENDER, RADIAL = 0.35, 0.95
-"""Spread of an arm across by that along, and cosine of its angle to the line from the middle: at most, and at least."""
+SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
+"""An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
+least), and where its inner end lies on that line, by where its own middle lies (at most)."""
 
 LONG = 0.75
 """Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
@@ -229,7 +230,7 @@ def _alike_set(
     choices: list[list[list[Component]]], up: int, whole: np.ndarray, count: int | None
 ) -> list[list[Component]]:
     """The set of alike groups at one height that is farthest out, of `count` groups or of at least two; slender pieces
-    that all point at the middle are arms."""
+    that all point at the middle and reach near it are arms."""
     found: list[tuple[float, list[list[Component]]]] = []
     for groups in choices:
         for group in groups:
@@ -244,7 +245,11 @@ def _alike_set(
                     along = np.array([np.delete(member[0].along, up) for member in one])
                     radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
                     slender = [len(member) == 1 and member[0].slender < SLENDER for member in one]
-                    if not (radial & slender).all():
+                    inward = (
+                        reach - np.array([np.linalg.norm(np.delete(_size(member), up)) / 2 for member in one])
+                        < INWARD * reach
+                    )
+                    if not (radial & slender & inward).all():
                         found.append((float(reach.mean()), one))
     return max(found, key=lambda item: item[0], default=(0.0, []))[1]
 
