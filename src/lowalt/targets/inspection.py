@@ -47,8 +47,8 @@ class Inspection:
 
     @property
     def shoulder_m(self) -> float:
-        """Distance (m) from the middle to the wing: farther out, no slice is both more than half as high as the highest
-        and more than half as long as the longest, as a body is and neither a drooping wing nor a tail."""
+        """Distance (m) from the middle to the wing: farther out, no slice is both at least half as high as the highest
+        and half as long as the longest, as a body is and neither a drooping wing nor a tail."""
         up, front = "xyz".index(self.up[-1]), "xyz".index(self.front[-1])
         right = 3 - up - front
         across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)
@@ -57,7 +57,7 @@ class Inspection:
         for index in range(SLICES):
             inside = self.points[(across >= edges[index]) & (across < edges[index + 1])][:, [up, front]]
             sizes[index] = np.ptp(inside, axis=0) if len(inside) else 0.0
-        return float(edges[np.flatnonzero((sizes > 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1])
+        return float(edges[np.flatnonzero((sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1])
 
 
 def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
