@@ -110,7 +110,11 @@ def _inspect(given: argparse.Namespace) -> str:
     if given.json:
         parts = [vars(part) | {"extent": part.extent, "centre": part.centre} for part in found.components]
         pieces = [{"name": name, "triangles": count, "extent": extent} for name, count, extent in found.pieces]
-        told = {name: value for name, value in vars(found).items() if name not in ("points", "owner", "groups")}
+        told = {
+            name: value
+            for name, value in vars(found).items()
+            if name not in ("points", "owner", "groups", "sides_seen")
+        }
         wings = {"wings_from_m": found.shoulder_m} if found.category == "Bird" else {}
         return as_json({**told, "components": parts, "pieces": pieces, **wings, "picture": out})
     return f"{described(found)}\n\npicture  {out}"
@@ -164,6 +168,8 @@ def _draft(
     """The record of a mesh file."""
     known = row or {"n_rotors_or_wings": given.rotors}
     found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
+    if not found.sides_seen:
+        raise InputError(f"{path}: left and right of the bird cannot be seen, expected --up and --front")
     groups = chosen(found, given.moving) if given.moving else found.groups
     count = known["n_rotors_or_wings"] or (len(groups) if given.moving else None)
     picture = Path(f"{(given.out or given.file).stem}-pieces.png")

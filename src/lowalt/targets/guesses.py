@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
+from scipy.spatial import cKDTree
 
 from lowalt.targets.mesh_files import UNITS_M
 
@@ -26,6 +27,13 @@ SMALLEST_ROTOR = 0.15
 OFF_CENTRE = 0.3
 """A rotor's surface lies about its hub: its middle is at most this share of its radius from that of its box; three
 blades have a quarter."""
+
+SYMMETRIC = 0.02
+"""Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
+
+SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
+"""An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
+least), and where its inner end lies on that line, by where its own middle lies (at most)."""
 
 LONG = 0.75
 """Width of a blade by its length, as its box has them; a blade at 30 degrees to the axes has 0.6, a disc 1."""
@@ -51,7 +59,8 @@ TURNING = {
 class Component:
     """A connected component: `low` and `high` (3,) m along the file's axes, its triangles, whether it is closed, the
     names of the piece it belongs to, the kind of part that it may be (rotor, wheel, or an empty text), the `middle`
-    (3,) of its surface and its `area` (m2)."""
+    (3,) of its surface and its `area` (m2); `along` (3,) the direction in which it is longest, `slender` its spread
+    across by that along."""
 
     number: int
     low: np.ndarray
@@ -62,6 +71,8 @@ class Component:
     guess: str = ""
     middle: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
     area: float = 1.0
+    along: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
+    slender: float = 1.0
 
     @property
     def extent(self) -> np.ndarray:
@@ -84,14 +95,30 @@ def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> s
     return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
 
 
-def guessed_axes(extent: np.ndarray, category: str, up: int | None = None) -> tuple[str, str]:
+def mirror_axis(points: np.ndarray) -> int | None:
+    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
+    cannot be seen: left and right of a bird."""
+    size = float(np.ptp(points, axis=0).max())
+    tree, off = cKDTree(points), []
+    for axis in range(3):
+        mirrored = points.copy()
+        mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
+        off.append(float(np.mean(tree.query(mirrored)[0])) / max(size, 1e-300))
+    best, second = np.sort(off)[:2]
+    return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+
+
+def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
     """Return the axes of the file that may point up and to the front. Only the extents (3,) are known, so no signs are.
 
     A car is longest to the front and lowest upwards; a craft is lowest upwards; a bird with spread wings is widest
-    across. `up` is the number of the axis upwards where something else tells it.
+    across. `up` and `right` are the numbers of axes that something else tells.
     """
-    order = [axis for axis in np.argsort(extent, kind="stable") if axis != up]
-    order = [up, *order] if up is not None else order
+    order = [axis for axis in np.argsort(extent, kind="stable") if axis not in (up, right)]
+    order = order if up is None else [up, *order]
+    if right is not None:
+        order = [*order, right]
+        return "xyz"[order[0]], "xyz"[order[1]]
     front = int(order[2] if category == "Vehicle" else order[1])
     if category == "UAV" and abs(extent[order[1]] / extent[order[2]] - 1) < ALIKE:
         front = next(axis for axis in range(3) if axis != order[0])
@@ -146,10 +173,12 @@ def _is_rotor(group: Sequence[Component], axes: Sequence[int], whole: np.ndarray
     extent, (low, high) = _size(group), box_of(group)
     area = np.array([part.area for part in group])
     middle = (np.array([part.middle for part in group]) * area[:, None]).sum(axis=0) / area.sum()
+    # By their names a helicopter's main rotor may be as wide as all of it, and its tail rotor small.
+    least, most = (SMALLEST_ROTOR, 0.7) if len(axes) == 1 else (SMALLEST_ROTOR / 2, 1.01)
     for axis in axes:
         across = np.delete(extent, axis).max()
         off = np.linalg.norm(np.delete(middle - (low + high) / 2, axis))
-        flat, wide = extent[axis] < FLAT * across, SMALLEST_ROTOR * whole.max() <= across < 0.7 * whole.max()
+        flat, wide = extent[axis] < FLAT * across, least * whole.max() <= across < most * whole.max()
         if flat and wide and not off > OFF_CENTRE * across / 2:  # a middle that is not known is no fault
             return True
     return False
@@ -171,14 +200,13 @@ def rotors(
         good = [group for group in groups if _is_rotor(group, range(3), whole)]
         if good and (count is None or len(good) == count):
             return ups[0], good
-    for up in ups:
+    for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
         flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
         sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
-        for groups in sets:
-            good = [group for group in groups if _is_rotor(group, [up], whole)]
-            if found := _alike_set(good, up, whole, count):
-                return up, found
+        sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in sets]
+        if found := _alike_set(sets, up, whole, count):
+            return up, found
     return ups[0], []
 
 
@@ -198,22 +226,32 @@ def _bladed(parts: Sequence[Component], up: int, count: int) -> list[list[list[C
     return sets
 
 
-def _alike_set(groups: list[list[Component]], up: int, whole: np.ndarray, count: int | None) -> list[list[Component]]:
-    """The set of alike groups at one height that is farthest out, of `count` groups or of at least two."""
-    sets = []
-    for group in groups:
-        height = np.mean(box_of(group), axis=0)[up]
-        same = [other for other in groups if _alike(group, other)]
-        level = [other for other in same if abs(np.mean(box_of(other), axis=0)[up] - height) < 0.1 * whole.max()]
-        sets += [one for one in (level, same) if (len(one) == count if count else one is level and len(one) >= 2)]
-    middle = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0) if groups else np.zeros(3)
-
-    def reach(chosen: list[list[Component]]) -> float:
-        """How far out the hubs of a set lie."""
-        hubs = np.array([np.mean(box_of(group), axis=0) for group in chosen]) - middle
-        return float(np.linalg.norm(np.delete(hubs, up, axis=1), axis=1).mean())
-
-    return max(sets, key=reach, default=[])
+def _alike_set(
+    choices: list[list[list[Component]]], up: int, whole: np.ndarray, count: int | None
+) -> list[list[Component]]:
+    """The set of alike groups at one height that is farthest out, of `count` groups or of at least two; slender pieces
+    that all point at the middle and reach near it are arms."""
+    found: list[tuple[float, list[list[Component]]]] = []
+    for groups in choices:
+        for group in groups:
+            height = np.mean(box_of(group), axis=0)[up]
+            same = [other for other in groups if _alike(group, other)]
+            level = [other for other in same if abs(np.mean(box_of(other), axis=0)[up] - height) < 0.1 * whole.max()]
+            for one in (level, same):
+                if len(one) == count if count else one is level and len(one) >= 2:
+                    hubs = np.delete(np.array([np.mean(box_of(member), axis=0) for member in one]), up, axis=1)
+                    away = hubs - hubs.mean(axis=0)
+                    reach = np.linalg.norm(away, axis=1)
+                    along = np.array([np.delete(member[0].along, up) for member in one])
+                    radial = np.abs((along * away).sum(axis=1)) > RADIAL * reach
+                    slender = [len(member) == 1 and member[0].slender < SLENDER for member in one]
+                    inward = (
+                        reach - np.array([np.linalg.norm(np.delete(_size(member), up)) / 2 for member in one])
+                        < INWARD * reach
+                    )
+                    if not (radial & slender & inward).all():
+                        found.append((float(reach.mean()), one))
+    return max(found, key=lambda item: item[0], default=(0.0, []))[1]
 
 
 def wheels(parts: Sequence[Component], whole: np.ndarray) -> list[list[Component]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.common.files import existing
-from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, rotors, wheels
+from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces
 
@@ -26,7 +26,7 @@ class Inspection:
     `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
     `pieces` the names with triangles and extents (3,), `components` from the largest down; `points` (K, 3) m the
     middles of some of the triangles, `owner` (K,) the number of each one's component; `groups` of components that may
-    be one moving part each.
+    be one moving part each; `sides_seen`: whether a bird's left and right are given or mirror one another.
     """
 
     path: Path
@@ -43,18 +43,21 @@ class Inspection:
     points: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     groups: list[list[Component]] = field(default_factory=list)
+    sides_seen: bool = True
 
     @property
     def shoulder_m(self) -> float:
-        """Distance (m) from the middle to the wing: farther out, no slice is more than half as high as the highest."""
-        right, up = 3 - "xyz".index(self.up[-1]) - "xyz".index(self.front[-1]), "xyz".index(self.up[-1])
+        """Distance (m) from the middle to the wing: farther out, no slice is both at least half as high as the highest
+        and half as long as the longest, as a body is and neither a drooping wing nor a tail."""
+        up, front = "xyz".index(self.up[-1]), "xyz".index(self.front[-1])
+        right = 3 - up - front
         across = np.abs(self.points[:, right] - (self.low + self.high)[right] / 2)
         edges = np.linspace(0, across.max() * (1 + 1e-9), SLICES + 1)
-        high = np.zeros(SLICES)
+        sizes = np.zeros((SLICES, 2))
         for index in range(SLICES):
-            inside = self.points[(across >= edges[index]) & (across < edges[index + 1]), up]
-            high[index] = np.ptp(inside) if len(inside) else 0.0
-        return float(edges[np.flatnonzero(high > 0.5 * high.max()).max() + 1])
+            inside = self.points[(across >= edges[index]) & (across < edges[index + 1])][:, [up, front]]
+            sizes[index] = np.ptp(inside, axis=0) if len(inside) else 0.0
+        return float(edges[np.flatnonzero((sizes >= 0.5 * sizes.max(axis=0)).all(axis=1)).max(initial=0) + 1])
 
 
 def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
@@ -71,7 +74,10 @@ def components_of(mesh: Mesh, names: list[str]) -> list[Component]:
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         middle = (areas[:, None] * (a + b + c)).sum(axis=0) / (3 * max(areas.sum(), 1e-300))
         closed, area = bool(mesh.closed[number]), float(areas.sum()) / 2
-        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", middle, area))
+        spread, axes = np.linalg.eigh(np.cov(points.T))
+        slender = float(np.sqrt(max(spread[1], 0.0) / max(spread[2], 1e-300)))
+        shape = (middle, area, axes[:, 2], slender)
+        result.append(Component(number, low, high, int(mask.sum()), closed, names[number], "", *shape))
     return sorted(result, key=lambda part: -float(part.extent.max()))
 
 
@@ -120,6 +126,8 @@ def inspect_mesh(
         unit, source = guessed_unit(size, category, wanted), "guessed from the size"
     metres = UNITS_M[unit] if isinstance(unit, str) else unit
     mesh = read_mesh(path, unit)
+    some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
+    points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     parts = components_of(mesh, _piece_names(mesh, found, metres))
     up, front = (name and "xyz".index(name[-1]) for name in axes)
@@ -131,7 +139,10 @@ def inspect_mesh(
         up = best if up is None and groups else up
     elif category == "Vehicle":
         groups = wheels(parts, high - low)
-    guessed = guessed_axes(high - low, category, ups[0] if up is None else up)
+    right = mirror_axis(points) if category == "Bird" and None in axes else None
+    up = ups[0] if up is None and category == "UAV" else up
+    guessed = guessed_axes(high - low, category, up, None if right in (up, front) else right)
+    seen = category != "Bird" or None not in axes or right is not None
     if category == "UAV" and groups and axes[0] is None:
         axis = "xyz".index(guessed[0])
         hubs = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0)
@@ -142,11 +153,9 @@ def inspect_mesh(
     parts = [replace(part, guess=kind if part.number in moving else "") for part in parts]
     groups = [[next(one for one in parts if one.number == part.number) for part in group] for group in groups]
     named = [(", ".join(piece.names), len(piece.faces), np.ptp(piece.vertices, axis=0) * metres) for piece in found]
-    some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
-    points = mesh.vertices[mesh.faces[some]].mean(axis=1)
     return Inspection(
         path, unit, source, low, high, len(mesh.faces), axes[0] or guessed[0], axes[1] or guessed[1], named, parts,
-        category, points, mesh.component[some], groups,
+        category, points, mesh.component[some], groups, seen,
     )  # fmt: skip
 
 

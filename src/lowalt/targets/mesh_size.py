@@ -23,10 +23,13 @@ SMALLEST_ROTOR_M = 0.01
 """Least diameter of a rotor at the target's final size: the smallest craft sold have propellers of 25 mm."""
 
 
-def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, low: float, high: float) -> None:
+def _refuse_size(
+    record: dict, what: str, size_m: float, wanted_m: float, low: float, high: float, own_m: float | None = None
+) -> None:
     """Raise InputError if the size of `what` is below wanted_m / high or above wanted_m / low; all sizes in metres.
 
-    The error has the line to write: the unit with which the size fits best, or the size of a row of its own.
+    The error has the line to write: the unit with which the size fits best, or `own_m` (by default the size) as that of
+    a row of its own.
     """
     if low <= wanted_m / max(size_m, 1e-12) <= high:
         return
@@ -38,9 +41,7 @@ def _refuse_size(record: dict, what: str, size_m: float, wanted_m: float, low: f
         way = f"write `unit: {best}`, with which it measures {size_m / own * UNITS_M[best]:.4g} m"
     else:
         key = "len_m" if record["size_is"] == ALL_AXES else "size_m"
-        way = (
-            f"no unit fits: give the target a row with its own size, `row: {{{key}: {size_m:.4g}}}`, or the right file"
-        )
+        way = f"no unit fits: give it a row with its own size, `row: {{{key}: {own_m or size_m:.4g}}}`, or another file"
     raise InputError(
         f"{record['subtype']}: {what} measures {size_m:.4g} m where {wanted_m:.4g} m is published: "
         f"{max(wanted_m / max(size_m, 1e-12), size_m / wanted_m):.3g} times off; is the unit {unit!r} right? {way}"
@@ -92,7 +93,7 @@ def factors(record: dict, parts: dict[str, Pool], kinds: dict[str, str]) -> tupl
         if record["size_is"] == "motor diagonal":
             # Hinges are in metres whatever the files' unit, so a motor diagonal alone would not show a wrong unit.
             # Other sizes are the mesh's own: a gull's span may be more than `limit` times its length.
-            _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit)
+            _refuse_size(record, "the whole mesh", float((high - low).max()), wanted[0], 1 / limit, limit, size[0])
     for axis in range(3):
         _refuse_size(record, f"the mesh ({record['size_is']})", size[axis], wanted[axis], 1 / limit, limit)
     whole = float((high - low).max())

@@ -14,9 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from lowalt.common import portable
 from lowalt.common.errors import InputError
-from lowalt.targets.mesh_collada import parsed, stated_metres
-from lowalt.targets.mesh_files import SUFFIXES
-from lowalt.targets.mesh_scene import selected
+from lowalt.targets.robot_geometry import Files, direction, numbers, place_of, primitive, shown
 from lowalt.targets.robots import Joint, Robot
 
 KINDS = (".urdf", ".sdf", ".xml", ".mjcf", ".world")
@@ -25,115 +23,28 @@ TEMPLATES = {
     ".erb": "erb FILE > robot.sdf",
 }  # fmt: skip
 """Templates of descriptions by suffix, and what expands them."""
-LARGEST_BYTES, MOST_FILES, DEEPEST = 16 << 20, 200, 50
+DEEPEST = 50
+"""Most links, frames or models that hang on one another."""
 MOST_TURN = 4 * math.pi
 """A joint whose range is larger turns without end: a rotor or a wheel."""
 
 
-def _numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndarray:
-    """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count` finite ones."""
-    values = np.array([float(word) for word in text.split()] if text else default, float)
-    values = np.repeat(values, count) if len(values) == 1 else values
-    if len(values) != count or not np.isfinite(values).all():
-        raise ValueError(f"{text!r}, expected {count} finite numbers")
-    return values
-
-
-def _place(shift: np.ndarray, turn: Rotation) -> np.ndarray:
-    """A place (4, 4) of a shift (3,) and a turn."""
-    place = np.eye(4)
-    place[:3, :3], place[:3, 3] = turn.as_matrix(), shift
-    return place
-
-
-class _Files:
-    """The files of a description inside the folder of inputs, and the surfaces that its geometry names."""
-
-    def __init__(self, inputs: Path) -> None:
-        self.inputs, self.opened = inputs.resolve(), 0
-
-    def find(self, name: str, base: Path) -> Path:
-        """Return the file that a description in the folder `base` names: relative, package://, model://."""
-        kind, slashes, rest = name.strip().partition("://")
-        if not slashes or kind == "file":
-            places = [base / (rest or name)]
-        elif kind in ("package", "model"):
-            head, _, tail = rest.partition("/")
-            above = [folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)]
-            places = [place for folder in above for place in (folder / rest, folder / "models" / rest)]
-            places += [folder / tail for folder in above if folder.name == head]
-        else:
-            raise InputError(f"{name!r} is no file of the folder of inputs, expected a downloaded one")
-        places = [place.resolve() for place in places]
-        inside = [place for place in places if place.is_relative_to(self.inputs)]
-        for place in inside:
-            if place.exists():
-                return place
-        problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
-        raise InputError(f"{name!r} {problem}, expected it inside, by the name that the description has")
-
-    def parsed(self, path: Path) -> Element:
-        """Return the root of an XML file, bounded in size and count."""
-        self.opened += 1
-        if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
-            raise InputError(f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB")
-        return parsed(path)
-
-    def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
-        """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit counts."""
-        path = self.find(name, base)
-        if path.suffix.lower() not in SUFFIXES:
-            raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
-        unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
-        found = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
-        triangles = np.concatenate(found or [np.zeros((0, 3, 3))]) * unit * scale
-        return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
-
-
-def _primitive(kind: str, size: np.ndarray) -> np.ndarray:
-    """Triangles (K, 3, 3) of a box (edges), cylinder, capsule (radius, length along z), sphere or ellipsoid (radii)."""
-    from trimesh import creation
-
-    if kind == "box":
-        shape = creation.box(size)
-    elif kind in ("sphere", "ellipsoid"):
-        shape = creation.icosphere(2)
-        shape.vertices = shape.vertices * size
-    else:
-        make = creation.capsule if kind == "capsule" else creation.cylinder
-        shape = make(radius=size[0], height=size[1])
-        shape.apply_translation([0, 0, -float(shape.bounds.mean(axis=0)[2])])
-    return np.asarray(shape.triangles)
-
-
-def _shown(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Triangles (K, 3, 3) at a place."""
-    return portable.applied(place[:3, :3], triangles) + place[:3, 3]
-
-
-def _unit(axis: np.ndarray) -> np.ndarray:
-    """A direction (3,) of length one. Raises: ValueError for none."""
-    if not axis.any():
-        raise ValueError("an axis of zeros, expected a direction")
-    return axis / portable.norm(axis)
-
-
-def _geometry(element: Element | None, base: Path, files: _Files) -> np.ndarray:
+def _geometry(element: Element | None, base: Path, files: Files) -> np.ndarray:
     """Triangles (K, 3, 3) of a `geometry` of URDF or SDF; planes and what is unknown have none."""
     for shape in element if element is not None else ():
         told = {**shape.attrib, **{child.tag: child.text or "" for child in shape}}
         if shape.tag == "mesh":
-            scale, part = _numbers(told.get("scale"), 3, (1, 1, 1)), shape.findtext("submesh/name")
+            scale, part = numbers(told.get("scale"), 3, (1, 1, 1)), shape.findtext("submesh/name")
             found = files.mesh(told.get("filename", told.get("uri", "")), base, scale, part)
             if shape.findtext("submesh/center") in ("1", "true") and len(found):
                 found = found - (found.min(axis=(0, 1)) + found.max(axis=(0, 1))) / 2
             return found
         if shape.tag == "box":
-            return _primitive("box", _numbers(told.get("size"), 3, ()))
+            return primitive("box", numbers(told.get("size"), 3, ()))
         if shape.tag in ("cylinder", "capsule"):
-            return _primitive(shape.tag, np.array([float(told["radius"]), float(told["length"])]))
+            return primitive(shape.tag, np.array([float(told["radius"]), float(told["length"])]))
         if shape.tag in ("sphere", "ellipsoid"):
-            return _primitive(shape.tag, _numbers(told.get("radius", told.get("radii")), 3, ()))
+            return primitive(shape.tag, numbers(told.get("radius", told.get("radii")), 3, ()))
     return np.zeros((0, 3, 3))
 
 
@@ -142,14 +53,14 @@ def _endless(kind: str, low: str | None, high: str | None) -> bool:
     return kind == "continuous" or not (low and high) or float(high) - float(low) > MOST_TURN
 
 
-def _urdf(root: Element, base: Path, files: _Files) -> Robot:
+def _urdf(root: Element, base: Path, files: Files) -> Robot:
     """A robot of URDF."""
 
     def origin(element: Element | None) -> np.ndarray:
         """The place (4, 4) of an element `origin`."""
         told = element.attrib if element is not None else {}
-        turn = Rotation.from_euler("xyz", _numbers(told.get("rpy"), 3, (0, 0, 0)))
-        return _place(_numbers(told.get("xyz"), 3, (0, 0, 0)), turn)
+        turn = Rotation.from_euler("xyz", numbers(told.get("rpy"), 3, (0, 0, 0)))
+        return place_of(numbers(told.get("xyz"), 3, (0, 0, 0)), turn)
 
     robot, hung = Robot(), {}
     for joint in root.findall("joint"):
@@ -167,7 +78,7 @@ def _urdf(root: Element, base: Path, files: _Files) -> Robot:
     for link in root.findall("link"):
         name = link.get("name", "")
         robot.surfaces[name] = [
-            _shown(_geometry(one.find("geometry"), base, files),
+            shown(_geometry(one.find("geometry"), base, files),
                    portable.product(place(name), origin(one.find("origin"))))
             for one in link.findall(visual)
         ]  # fmt: skip
@@ -177,9 +88,9 @@ def _urdf(root: Element, base: Path, files: _Files) -> Robot:
             robot.fixed.append((parent, child))
             continue
         along = joint.find("axis")
-        axis = _numbers(along.get("xyz") if along is not None else None, 3, (1, 0, 0))
+        axis = numbers(along.get("xyz") if along is not None else None, 3, (1, 0, 0))
         ends = (limit.get("lower", "0"), limit.get("upper", "0")) if limit is not None else (None, None)
-        turned = _unit(portable.applied(here[:3, :3], axis))
+        turned = direction(portable.applied(here[:3, :3], axis))
         robot.joints.append(Joint(joint.get("name", child), parent, child, here[:3, 3], turned, _endless(kind, *ends)))
     return robot
 
@@ -187,7 +98,7 @@ def _urdf(root: Element, base: Path, files: _Files) -> Robot:
 class _Sdf:
     """A model of SDF: frames by scoped name, each a place in another frame, resolved when they are asked for."""
 
-    def __init__(self, files: _Files) -> None:
+    def __init__(self, files: Files) -> None:
         self.files, self.robot = files, Robot()
         self.frames: dict[str, tuple[str, np.ndarray]] = {"": ("", np.eye(4))}
         self.links: list[tuple[str, Element, Path]] = []
@@ -209,10 +120,10 @@ class _Sdf:
         if pose is None or not (pose.text or "").strip():
             return np.eye(4)
         quat = pose.get("rotation_format") == "quat_xyzw"
-        values = _numbers(pose.text, 7 if quat else 6, ())
+        values = numbers(pose.text, 7 if quat else 6, ())
         degrees = pose.get("degrees") == "true"
         turn = Rotation.from_quat(values[3:]) if quat else Rotation.from_euler("xyz", values[3:], degrees=degrees)
-        return _place(values[:3], turn)
+        return place_of(values[:3], turn)
 
     def add(self, model: Element, base: Path, scope: str, place: tuple[str, np.ndarray], old: bool, depth: int) -> None:
         """Take the links, frames, joints and inner models of a model; `scope` ends in :: where it has a name."""
@@ -270,7 +181,7 @@ class _Sdf:
         visual = "visual" if any(link.find("visual") is not None for _, link, _ in self.links) else "collision"
         for name, link, base in self.links:
             self.robot.surfaces[name] = [
-                _shown(_geometry(one.find("geometry"), base, self.files),
+                shown(_geometry(one.find("geometry"), base, self.files),
                        portable.product(self.place(name), self.pose(one)))
                 for one in link.findall(visual)
             ]  # fmt: skip
@@ -282,11 +193,11 @@ class _Sdf:
                 continue
             axis = joint.find("axis")
             told = axis.find("xyz") if axis is not None else None
-            along = _numbers(told.text if told is not None else None, 3, (0, 0, 1))
+            along = numbers(told.text if told is not None else None, 3, (0, 0, 1))
             outer = old or (axis is not None and axis.findtext("use_parent_model_frame") in ("1", "true"))
             within = told.get("expressed_in") if told is not None else None
             frame = inner if outer or within == "__model__" else scope + within if within else f"{name} joint"
-            turned = _unit(portable.applied(self.place(frame)[:3, :3], along))
+            turned = direction(portable.applied(self.place(frame)[:3, :3], along))
             low, high = (joint.findtext(f"axis/limit/{end}") for end in ("lower", "upper"))
             here = self.place(f"{name} joint")[:3, 3]
             self.robot.joints.append(Joint(name, parent, child, here, turned, _endless(joint.get("type"), low, high)))
@@ -298,7 +209,7 @@ def _old(root: Element) -> bool:
     return float(root.get("version", "1.5")) < 1.45
 
 
-def _sdf(root: Element, base: Path, files: _Files) -> Robot:
+def _sdf(root: Element, base: Path, files: Files) -> Robot:
     """A robot of SDF: the model, or the only one of a world."""
     found = [*root.findall("model"), *root.findall("world/model")]
     if len(found) != 1:
@@ -317,7 +228,7 @@ def _clear(told: dict[str, str]) -> bool:
 class _Mjcf:
     """A robot of MJCF."""
 
-    def __init__(self, root: Element, base: Path, files: _Files) -> None:
+    def __init__(self, root: Element, base: Path, files: Files) -> None:
         self.root, self.base, self.files, self.robot = root, base, files, Robot()
         self.defaults: dict[str, dict[str, dict[str, str]]] = {"main": {}}
         self.compiler: dict[str, str] = {}
@@ -351,23 +262,23 @@ class _Mjcf:
         """The place (4, 4) of a body or geom."""
         degrees, turn = self.compiler.get("angle", "degree") == "degree", Rotation.identity()
         if "quat" in told:
-            turn = Rotation.from_quat(_numbers(told["quat"], 4, ())[[1, 2, 3, 0]])
+            turn = Rotation.from_quat(numbers(told["quat"], 4, ())[[1, 2, 3, 0]])
         elif "euler" in told:
             order = self.compiler.get("eulerseq", "xyz")
             order = order.upper() if order.islower() else order.lower()  # small letters turn with the body
-            turn = Rotation.from_euler(order, _numbers(told["euler"], 3, ()), degrees=degrees)
+            turn = Rotation.from_euler(order, numbers(told["euler"], 3, ()), degrees=degrees)
         elif "axisangle" in told:
-            *axis, angle = _numbers(told["axisangle"], 4, ())
-            turn = Rotation.from_rotvec(_unit(np.array(axis)) * (np.radians(angle) if degrees else angle))
+            *axis, angle = numbers(told["axisangle"], 4, ())
+            turn = Rotation.from_rotvec(direction(np.array(axis)) * (np.radians(angle) if degrees else angle))
         elif "xyaxes" in told or "zaxis" in told:
-            given = _numbers(told.get("xyaxes", told.get("zaxis")), 6 if "xyaxes" in told else 3, ())
+            given = numbers(told.get("xyaxes", told.get("zaxis")), 6 if "xyaxes" in told else 3, ())
             if "zaxis" in told:
                 turn = Rotation.align_vectors([given], [[0, 0, 1]])[0]
             else:
-                x = _unit(given[:3])
-                y = _unit(given[3:] - x * portable.dot(x, given[3:]))
+                x = direction(given[:3])
+                y = direction(given[3:] - x * portable.dot(x, given[3:]))
                 turn = Rotation.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1))
-        return _place(_numbers(told.get("pos"), 3, (0, 0, 0)), turn)
+        return place_of(numbers(told.get("pos"), 3, (0, 0, 0)), turn)
 
     def geom(self, told: dict[str, str], place: np.ndarray) -> np.ndarray:
         """Triangles (K, 3, 3) of a geom that viewers show: groups 0 to 2, not transparent, no plane."""
@@ -379,18 +290,18 @@ class _Mjcf:
             if told.get("mesh") not in self.meshes:
                 raise ValueError(f"mesh {told.get('mesh')!r} is no asset")
             file, asset = self.meshes[told["mesh"]]
-            found = self.files.mesh(file, self.base, _numbers(asset.get("scale"), 3, (1, 1, 1)))
-            return _shown(found, portable.product(place, self.place(told)))
+            found = self.files.mesh(file, self.base, numbers(asset.get("scale"), 3, (1, 1, 1)))
+            return shown(found, portable.product(place, self.place(told)))
         size = np.array([float(word) for word in told.get("size", "").split()])
         here = self.place(told)
         if "fromto" in told:
-            ends = _numbers(told["fromto"], 6, ()).reshape(2, 3)
+            ends = numbers(told["fromto"], 6, ()).reshape(2, 3)
             size = np.array([size[0], portable.norm(ends[1] - ends[0]) / 2])
-            here = _place(ends.mean(axis=0), Rotation.align_vectors([ends[1] - ends[0]], [[0, 0, 1]])[0])
+            here = place_of(ends.mean(axis=0), Rotation.align_vectors([ends[1] - ends[0]], [[0, 0, 1]])[0])
         if kind == "sphere":
             size = size[:1]
         full = 2 * size if kind == "box" else size * [1, 2] if kind in ("cylinder", "capsule") else size
-        return _shown(_primitive(kind, full), portable.product(place, here))
+        return shown(primitive(kind, full), portable.product(place, here))
 
     def body(self, element: Element, parent: str, above: np.ndarray, childclass: str, depth: int) -> None:
         """Take a body and those inside it."""
@@ -403,8 +314,8 @@ class _Mjcf:
         joints = [self.told(joint, childclass) for joint in element.findall("joint")] if parent else []
         hinges = [told for told in joints if told.get("type", "hinge") == "hinge"]
         for told in hinges[-1:]:
-            hinge = portable.applied(here[:3, :3], _numbers(told.get("pos"), 3, (0, 0, 0))) + here[:3, 3]
-            axis = _unit(portable.applied(here[:3, :3], _numbers(told.get("axis"), 3, (0, 0, 1))))
+            hinge = portable.applied(here[:3, :3], numbers(told.get("pos"), 3, (0, 0, 0))) + here[:3, 3]
+            axis = direction(portable.applied(here[:3, :3], numbers(told.get("axis"), 3, (0, 0, 1))))
             low, high = told["range"].split() if "range" in told and told.get("limited") != "false" else (None, None)
             if low and self.compiler.get("angle", "degree") == "degree":
                 low, high = (str(math.radians(float(end))) for end in (low, high))
@@ -415,7 +326,7 @@ class _Mjcf:
             self.body(child, name, here, childclass, depth + 1)
 
 
-def _mjcf(root: Element, base: Path, files: _Files) -> Robot:
+def _mjcf(root: Element, base: Path, files: Files) -> Robot:
     """A robot of MJCF; the world's own geoms (floors) are left."""
     for include in root.findall("include"):
         root.extend(files.parsed(files.find(include.get("file", ""), base)))
@@ -439,7 +350,7 @@ def read_robot(path: Path, inputs: Path) -> Robot:
     if path.suffix.lower() in TEMPLATES:
         how = TEMPLATES[path.suffix.lower()].replace("FILE", path.name)
         raise InputError(f"{path}: is a template, expected what it expands to: {how}")
-    files = _Files(inputs)
+    files = Files(inputs)
     try:
         root = files.parsed(path)
         readers = {"robot": _urdf, "sdf": _sdf, "gazebo": _sdf, "mujoco": _mjcf}

@@ -1,0 +1,103 @@
+"""What descriptions of robots share: files inside the folder of inputs, surfaces, places and numbers."""
+
+from pathlib import Path
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from lowalt.common import portable
+from lowalt.common.errors import InputError
+from lowalt.targets.mesh_collada import parsed, stated_metres
+from lowalt.targets.mesh_files import SUFFIXES
+from lowalt.targets.mesh_scene import selected
+
+LARGEST_BYTES, MOST_FILES = 16 << 20, 200
+
+
+def numbers(text: str | None, count: int, default: tuple[float, ...]) -> np.ndarray:
+    """Numbers of a text; a single one stands for all. Raises: ValueError where they are not `count` finite ones."""
+    values = np.array([float(word) for word in text.split()] if text else default, float)
+    values = np.repeat(values, count) if len(values) == 1 else values
+    if len(values) != count or not np.isfinite(values).all():
+        raise ValueError(f"{text!r}, expected {count} finite numbers")
+    return values
+
+
+def place_of(shift: np.ndarray, turn: Rotation) -> np.ndarray:
+    """A place (4, 4) of a shift (3,) and a turn."""
+    place = np.eye(4)
+    place[:3, :3], place[:3, 3] = turn.as_matrix(), shift
+    return place
+
+
+class Files:
+    """The files of a description inside the folder of inputs, and the surfaces that its geometry names."""
+
+    def __init__(self, inputs: Path) -> None:
+        self.inputs, self.opened = inputs.resolve(), 0
+
+    def find(self, name: str, base: Path) -> Path:
+        """Return the file that a description in the folder `base` names: relative, package://, model://."""
+        kind, slashes, rest = name.strip().partition("://")
+        if not slashes or kind == "file":
+            places = [base / (rest or name)]
+        elif kind in ("package", "model"):
+            head, _, tail = rest.partition("/")
+            above = [folder for folder in (base, *base.parents) if folder.is_relative_to(self.inputs)]
+            places = [place for folder in above for place in (folder / rest, folder / "models" / rest)]
+            places += [folder / tail for folder in above if folder.name == head]
+        else:
+            raise InputError(f"{name!r} is no file of the folder of inputs, expected a downloaded one")
+        places = [place.resolve() for place in places]
+        inside = [place for place in places if place.is_relative_to(self.inputs)]
+        for place in inside:
+            if place.exists():
+                return place
+        problem = "is not there" if inside else f"lies outside the folder of inputs {self.inputs}"
+        raise InputError(f"{name!r} {problem}, expected it inside, by the name that the description has")
+
+    def parsed(self, path: Path) -> Element:
+        """Return the root of an XML file, bounded in size and count."""
+        self.opened += 1
+        if self.opened > MOST_FILES or path.stat().st_size > LARGEST_BYTES:
+            raise InputError(f"{path}: expected at most {MOST_FILES} files of {LARGEST_BYTES >> 20} MiB")
+        return parsed(path)
+
+    def mesh(self, name: str, base: Path, scale: np.ndarray, part: str | None = None) -> np.ndarray:
+        """Return the triangles (K, 3, 3) m of a mesh file, scaled; a COLLADA file's own unit counts."""
+        path = self.find(name, base)
+        if path.suffix.lower() not in SUFFIXES:
+            raise InputError(f"{name!r} is no mesh of a known format, expected one of {SUFFIXES}")
+        unit = (stated_metres(path) or 1.0) if path.suffix.lower() == ".dae" else 1.0
+        found = [piece.vertices[piece.faces] for piece in selected(path, part and [part])]
+        triangles = np.concatenate(found or [np.zeros((0, 3, 3))]) * unit * scale
+        return triangles[:, ::-1] if np.prod(scale) < 0 else triangles
+
+
+def primitive(kind: str, size: np.ndarray) -> np.ndarray:
+    """Triangles (K, 3, 3) of a box (edges), cylinder, capsule (radius, length along z), sphere or ellipsoid (radii)."""
+    from trimesh import creation
+
+    if kind == "box":
+        shape = creation.box(size)
+    elif kind in ("sphere", "ellipsoid"):
+        shape = creation.icosphere(2)
+        shape.vertices = shape.vertices * size
+    else:
+        make = creation.capsule if kind == "capsule" else creation.cylinder
+        shape = make(radius=size[0], height=size[1])
+        shape.apply_translation([0, 0, -float(shape.bounds.mean(axis=0)[2])])
+    return np.asarray(shape.triangles)
+
+
+def shown(triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Triangles (K, 3, 3) at a place."""
+    return portable.applied(place[:3, :3], triangles) + place[:3, 3]
+
+
+def direction(axis: np.ndarray) -> np.ndarray:
+    """A direction (3,) of length one. Raises: ValueError for none."""
+    if not axis.any():
+        raise ValueError("an axis of zeros, expected a direction")
+    return axis / portable.norm(axis)

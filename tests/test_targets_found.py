@@ -1,0 +1,212 @@
+"""What moves on a mesh without joints: rotors by name, hub and number, wings from the body; sizes that do not fit."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from PIL import Image
+
+from lowalt.__main__ import main
+from lowalt.common.errors import InputWarning
+from lowalt.targets.cloud import Cloud, read
+from lowalt.targets.inspection import inspect_mesh
+from meshes import box
+
+HUBS = np.array([(0.13, 0.11), (0.13, -0.11), (-0.13, 0.11), (-0.13, -0.11)])
+
+
+def disc(at, radius: float = 0.1, height: float = 0.006) -> trimesh.Trimesh:
+    """A flat disc around a place."""
+    shape = trimesh.creation.cylinder(radius=radius, height=height, sections=24)
+    shape.apply_translation(at)
+    return shape
+
+
+def saved(path: Path, shapes: dict[str, trimesh.Trimesh]) -> Path:
+    """Write named shapes as objects of an OBJ file."""
+    lines, first = [], 1
+    for name, shape in shapes.items():
+        lines += [f"o {name}", *(f"v {x} {y} {z}" for x, y, z in shape.vertices)]
+        lines += ["f " + " ".join(str(first + corner) for corner in face) for face in shape.faces]
+        first += len(shape.vertices)
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def draft(path: Path, *words: str) -> tuple[int, Path]:
+    """Exit status of `target new` and the record it writes."""
+    out = path.with_suffix(".yaml")
+    return main(["target", "new", str(path), "--inputs", str(path.parent), "--out", str(out), *words]), out
+
+
+def cloud(out: Path) -> Cloud:
+    """The cloud of a drafted record."""
+    made = out.with_suffix(".npz")
+    assert main(["target", "make", str(out), "--inputs", str(out.parent), "--out", str(made)]) == 0
+    return read(made)
+
+
+def hull() -> dict[str, trimesh.Trimesh]:
+    """A body with arms, skids, motor caps and screws, each of which comes in fours or twos."""
+    shapes = {"hull": box((0.2, 0.12, 0.06))}
+    for index, (x, y) in enumerate(HUBS):
+        arm = box((0.12, 0.02, 0.012))
+        arm.apply_transform(trimesh.transformations.rotation_matrix(np.arctan2(y, x), [0, 0, 1]))
+        arm.apply_translation([0.55 * x, 0.55 * y, 0.02])
+        shapes |= {
+            f"arm{index}": arm,
+            f"cap{index}": disc((x, y, 0.05), 0.015),
+            f"screw{index}": disc((x, 0, 0), 0.004),
+        }
+    return shapes | {f"skid{side}": box((0.22, 0.012, 0.012), (0, side * 0.06, -0.08)) for side in (-1, 1)}
+
+
+@pytest.mark.parametrize("up", [2, 0])
+def test_four_discs_that_nearly_touch_are_four_rotors_whatever_is_up_and_nothing_else_is(up, tmp_path):
+    shapes = hull() | {f"part{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
+    if up == 0:
+        turn = trimesh.transformations.rotation_matrix(-np.pi / 2, [0, 1, 0])  # z becomes -x
+        for shape in shapes.values():
+            shape.apply_transform(turn)
+    path = saved(tmp_path / "craft.obj", shapes)
+    status, out = draft(path, "--subtype", "DJI Mavic 3 Pro")
+    assert status == 0 and f"up: {'z' if up == 2 else '-x'}  # GUESSED" in out.read_text()
+    found = cloud(out)
+    assert found.kinds.count("rotor") == 4 and "warnings" not in found.record
+    factor = found.record["published"]["size_m"] / np.hypot(0.26, 0.22)
+    hubs = np.sort(np.abs(found.hinges[1:, :2]), axis=1)
+    np.testing.assert_allclose(hubs, np.tile([0.11, 0.13], (4, 1)) * factor, rtol=0.05)
+    order = np.argsort(np.arctan2(found.hinges[1:, 1], found.hinges[1:, 0]))
+    assert np.sign(found.axes[1:, 2])[order].tolist() in ([1, -1, 1, -1], [-1, 1, -1, 1])
+
+
+def test_blades_far_from_one_another_are_taken_together_where_the_number_is_known(tmp_path):
+    shapes = hull()
+    for index, (x, y) in enumerate(HUBS):
+        for blade in range(3):
+            shape = box((0.06, 0.012, 0.003), (0.05, 0, 0))
+            angle = 2 * np.pi * blade / 3 + index
+            shape.apply_transform(trimesh.transformations.rotation_matrix(angle, [0, 0, 1]))
+            shape.apply_translation([x, y, 0.07])
+            shapes[f"b{index}{blade}"] = shape
+    path = saved(tmp_path / "craft.obj", shapes)
+    groups = inspect_mesh(path, "UAV", "m", {"n_rotors_or_wings": 4}).groups
+    assert [len(group) for group in groups] == [3, 3, 3, 3]
+    for group in groups:
+        middle = np.mean([part.centre[:2] for part in group], axis=0)
+        assert np.linalg.norm(HUBS - middle, axis=1).min() < 0.01
+
+
+def test_arms_are_no_rotors_where_propellers_are_missing(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert draft(saved(tmp_path / "craft.obj", hull()), "--subtype", "DJI Mavic 3 Pro")[0] == 2
+    assert "0 rotors found, expected 4" in capsys.readouterr().err
+
+
+def test_names_tell_rotors_of_any_size_and_axis_and_skids_are_none(tmp_path):
+    tail = disc((0, 0, 0), 0.08)
+    tail.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    tail.apply_translation([-0.6, 0.03, 0.1])
+    shapes = {"hull": box((0.4, 0.15, 0.2)), "boom": box((0.5, 0.03, 0.03), (-0.4, 0, 0.05)),
+              "helicopter-propeller-main": disc((0, 0, 0.16), 0.4), "helicopter-propeller-small": tail,
+              "skid1": box((0.3, 0.02, 0.02), (0, 0.08, -0.15)),
+              "skid2": box((0.3, 0.02, 0.02), (0, -0.08, -0.15))}  # fmt: skip
+    path = saved(tmp_path / "heli.obj", shapes)
+    assert draft(path, "--category", "UAV")[0] == 0
+    parts = yaml.safe_load(path.with_suffix(".yaml").read_text())["heli"]["parts"]
+    assert [part["kind"] for part in parts.values()].count("rotor") == 2
+    found = cloud(path.with_suffix(".yaml"))
+    assert np.abs(found.axes[1:, 2]).round(2).tolist().count(1.0) == 1  # the tail rotor's axis points sideways
+
+
+def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = hull() | {f"part{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
+    path = saved(tmp_path / "craft.obj", shapes)
+    assert draft(path, "--subtype", "DJI Matrice 600 Pro")[0] == 2
+    error = capsys.readouterr().err
+    assert "0 rotors found, expected 6" in error and "craft-pieces.png" in error and "--moving 3 5+6" in error
+    assert Image.open(tmp_path / "craft-pieces.png").size[0] > 1000
+    assert not path.with_suffix(".yaml").exists()
+    assert draft(path, "--category", "UAV")[0] == 2 and "--rotors N" in capsys.readouterr().err
+    parts = inspect_mesh(path, "UAV", "m").components
+    numbers = [str(n) for n, part in enumerate(parts, 1) if part.piece.startswith("part")]
+    assert draft(path, "--category", "UAV", "--unit", "m", "--moving", *numbers)[0] == 0
+    assert cloud(path.with_suffix(".yaml")).kinds.count("rotor") == 4
+    assert draft(path, "--category", "UAV", "--moving", "99")[0] == 2 and "--moving is '99'" in capsys.readouterr().err
+
+
+def test_a_craft_made_with_another_number_of_rotors_than_its_row_says_so(tmp_path):
+    path = saved(tmp_path / "a.obj", hull())
+    out = tmp_path / "a.yaml"
+    parts = {"body": {"kind": "body", "meshes": [{"file": path.name}]}}
+    record = {"source": "mesh", "unit": "m", "up": "z", "front": "x", "size_is": "largest extent", "parts": parts}
+    out.write_text(yaml.safe_dump({"DJI Mini 2": record}))
+    with pytest.warns(InputWarning, match="0 rotors, expected the 4 of its row"):
+        assert cloud(out).record["warnings"]
+
+
+def test_a_target_of_its_own_takes_its_size_from_the_file_and_a_given_size_sets_the_unit(tmp_path):
+    shapes = hull() | {f"prop{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
+    path = saved(tmp_path / "mine.obj", shapes)
+    status, out = draft(path, "--category", "UAV", "--size", "4.6", "--front=-x", "--up", "z")
+    assert status == 0
+    record = yaml.safe_load(out.read_text())["mine"]
+    unit = 4.6 / 0.46
+    assert record["unit"] == pytest.approx(unit) and record["front"] == "-x" and "GUESSED" not in str(record["up"])
+    assert record["row"]["size_m"] == pytest.approx(unit * np.hypot(0.26, 0.22), rel=1e-3)
+    assert record["row"]["n_rotors_or_wings"] == 4
+    assert np.ptp(cloud(out).points[:, 1]) == pytest.approx(4.6, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(1000.0, "write `unit: mm`, with which it measures 0.46"), (0.1, "no unit fits: .* `row: {size_m: 0.034"),
+     (1 / 0.0254, "write `unit: in`")],
+)  # fmt: skip
+def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(factor, words, tmp_path, capsys):
+    shapes = {"hull": box((0.2, 0.12, 0.06))} | {f"prop{i}": disc((x, y, 0.06)) for i, (x, y) in enumerate(HUBS)}
+    for shape in shapes.values():
+        shape.apply_scale(factor)
+    path = saved(tmp_path / "a.obj", shapes)
+    status, out = draft(path, "--subtype", "DJI Mavic 3 Pro", "--unit", "m")
+    assert status == 0
+    command = ["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.npz")]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert "is the unit 'm' right?" in error
+    assert re.search(words, error)
+
+
+def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:
+    """A bird longer or shorter than its span, its wings bent down from 4 cm out; `lean` moves them apart."""
+    shapes = {"trunk": trimesh.creation.icosphere(3)}
+    shapes["trunk"].apply_scale([0.045, long / 2, 0.04])
+    for side in (-1, 1):
+        wing = box((0.2, 0.1, 0.01)).subdivide().subdivide().subdivide()
+        wing.vertices[:, 2] -= 0.5 * np.abs(wing.vertices[:, 0] + side * 0.1)
+        wing.apply_translation([side * 0.14, 0.02 + lean * side, 0.03])
+        shapes[f"w{side}"] = wing
+    return saved(tmp_path / "bird.obj", shapes)
+
+
+@pytest.mark.parametrize("long", [0.3, 0.8])
+def test_wings_reach_the_body_of_a_bird_whether_it_is_longer_than_its_span_or_not(long, tmp_path):
+    status, out = draft(bird(tmp_path, long), "--category", "Bird", "--unit", "m")
+    assert status == 0
+    found = cloud(out)
+    assert found.kinds == ("body", "wing", "wing")
+    wings = found.points[found.part > 0]
+    assert np.abs(wings[:, 0]).min() < 0.05 and np.abs(wings[:, 0]).max() == pytest.approx(0.24, rel=0.03)
+    np.testing.assert_allclose(np.abs(found.hinges[1:, 0]), 0.04, atol=0.015)
+    assert np.ptp(found.points[:, 1]) == pytest.approx(long, rel=0.03)
+
+
+def test_a_bird_whose_sides_cannot_be_seen_is_asked_for(tmp_path, capsys):
+    path = bird(tmp_path, 0.3, lean=0.07)
+    assert draft(path, "--category", "Bird")[0] == 2
+    assert "left and right of the bird cannot be seen, expected --up and --front" in capsys.readouterr().err
+    assert draft(path, "--category", "Bird", "--up", "z", "--front", "y")[0] == 0
