@@ -20,7 +20,6 @@ include: "workflow/rules/shards.smk"
 include: "workflow/rules/recognition.smk"
 include: "workflow/rules/cost.smk"
 include: "workflow/rules/accuracy_cost.smk"
-include: "workflow/rules/effects_table.smk"
 include: "workflow/rules/report.smk"
 
 
@@ -98,11 +97,4 @@ rule accuracy_cost:
     input:
         f"results/{RUN.name}/accuracy_cost.csv",
         f"results/{RUN.name}/accuracy_cost.png",
-    localrule: True
-
-
-rule effects_cost:
-    input:
-        f"results/{RUN.name}/effects.csv",
-        f"results/{RUN.name}/effects.png",
     localrule: True

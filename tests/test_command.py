@@ -19,8 +19,6 @@ scene.__main__: --settings, --motion, --clouds, --station, --out, --power
 measure.accuracy_cost: --settings, --predictions, --speeds, --index, --out
 measure.echo_cost: --settings, --clouds, --out
 measure.echo_pixels: --settings, --table, --clouds, --out
-measure.effects_cost: --settings, --samples, --model, --out
-measure.effects_samples: --settings, --motion, --clouds, --out
 measure.hard_cases: --out
 measure.scale: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
@@ -35,7 +33,6 @@ recordings.download: --out
 report.__main__: --settings, --manifest, --stages, --figures, --out
 report.figures.accuracy_cost: --table, --figure
 report.figures.echo_cost: --table, --pixels, --figure
-report.figures.effects: --table, --samples, --figure
 report.figures.house: --figure
 report.measured: --pairs, --tables, --page
 shards.__main__ index: --settings, --shards, --out

@@ -14,7 +14,7 @@ from lowalt.measure.scale import main as write_estimates
 from lowalt.recognition.predictions import Predictions
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import SECTIONS, TEMPLATES, rendered
-from lowalt.report.sections import accuracy_cost, echo_cost, effects, measured, orderings, overview, subtypes, transfer
+from lowalt.report.sections import accuracy_cost, echo_cost, measured, orderings, overview, subtypes, transfer
 from lowalt.report.tables import by_scheme, confusion, spreads, stage_times
 
 
@@ -122,7 +122,7 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
     path = tmp_path / "report.json"
     path.write_text(json.dumps(bare | {"transfer": "t.csv"}))
     found = Inputs.read(path)
-    assert found.paths("clouds") == ["a.npz"] and "transfer" in found and "effects" not in found
+    assert found.paths("clouds") == ["a.npz"] and "transfer" in found and "measured" not in found
     with pytest.raises(InputError, match=r"accuracy: no file at .*accuracy\.csv"):
         found.path("accuracy")
     for wrong, words in (
@@ -142,7 +142,7 @@ def test_a_manifest_names_each_file_once_and_a_wrong_one_is_refused(tmp_path, ba
 
 def test_a_section_that_a_run_may_lack_is_left_out(bare):
     run = SimpleNamespace(inputs=Inputs(bare))
-    for section in (accuracy_cost, echo_cost, effects, measured, transfer):
+    for section in (accuracy_cost, echo_cost, measured, transfer):
         assert section.values(run) is None
     assert rendered("transfer", None) == ""
 

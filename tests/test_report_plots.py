@@ -26,7 +26,6 @@ def one_of_each():
         accuracy_plots.over_snr(ours, by_scheme(read_csv("config/published_accuracy.csv"))),
         accuracy_plots.confusion(confusion(table("confusion")), ("UAV", "Bird", "Vehicle", "Pedestrian")),
         cost_plots.recognition(table("accuracy_cost")), cost_plots.echo(table("cost")),
-        cost_plots.effects(table("effects")),
     ]  # fmt: skip
 
 
@@ -77,18 +76,14 @@ def test_costs_are_those_of_the_tables(plots):
     assert len(plots["echo_cost"].rows) == len(table("cost")) and all(
         row["error"] > 0 for row in plots["echo_cost"].rows
     )
-    effects = table("effects")[1:]
-    assert [row["call"] for row in plots["effects"].rows] == [row["call"] for row in effects]
-    assert all(row["drawn_ms"] == max(float(kept["added_ms"]), 1e-3)
-               for row, kept in zip(plots["effects"].rows, effects, strict=True))  # fmt: skip
 
 
 def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
-    few = [(plot, svg(plot)) for plot in (plots["confusion"], plots["effects"])]
+    few = [(plot, svg(plot)) for plot in (plots["confusion"], plots["accuracy_over_snr"])]
     for folder in ("one", "two"):
         write_plots(tmp_path / folder, few)
     names = sorted(path.name for path in (tmp_path / "one").iterdir())
-    assert names == ["confusion.csv", "confusion.svg", "effects.csv", "effects.svg"]
+    assert names == ["accuracy_over_snr.csv", "accuracy_over_snr.svg", "confusion.csv", "confusion.svg"]
     assert all((tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes() for name in names)
     with (tmp_path / "one/confusion.csv").open() as file:
         assert len(list(csv.DictReader(file))) == len(plots["confusion"].rows)

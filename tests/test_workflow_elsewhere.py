@@ -58,7 +58,7 @@ def test_what_a_run_keeps_names_the_package_s_files_alike_wherever_it_is_install
 def test_the_kept_configuration_and_the_page_s_have_no_path_of_this_machine(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = located(load_yaml(ROOT / "config/default.yaml"), SHIPPED)
-    settings = Settings(SimpleNamespace(config=config, records={}), None)
+    settings = Settings(SimpleNamespace(config=config, records={}))
     assert str(SHIPPED) in config["targets"]["table"]
     for text in (settings.configuration(None), settings.report(None)):
         assert str(SHIPPED) not in text and "config/targets.csv" in text

@@ -13,7 +13,6 @@ from lowalt.common.config import merge
 from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.workflow import options
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import Products
 from lowalt.workflow.settings import Settings
 
@@ -68,7 +67,7 @@ def scene(effects, **more):
     """Files and settings of the default run with effects, whether or not they fit together."""
     run = run_of()
     run = replace(run, config=merge(run.config, {"effects": effects, **more}))
-    return Products(run, EffectCalls(run)), Settings(run, EffectCalls(run))
+    return Products(run), Settings(run)
 
 
 def test_settings_name_an_effect_for_the_stages_that_read_it_alone():
@@ -142,16 +141,11 @@ def test_effects_that_do_not_fit_together_are_refused_and_so_are_links_without_a
         run_of({"network": {"stations": links}})
 
 
-def test_the_network_asked_about_effects_has_most_images_and_knows_the_seen_protocol(tmp_path):
+def test_trainings_are_those_of_each_scheme_s_protocols_and_seeds(tmp_path):
     table = tmp_path / "table.csv"
     table.write_text("scheme,stations,spectra,fusion,backbone,protocols\nfew,A,VRP,attention,,seen+unseen\n"
                      "more,AB,VRP,attention,,seen\nother,ABC,VRP,attention,,unseen\n")  # fmt: skip
     block = {"table": str(table), "schemes": ["few", "more", "other"], "timed": [], "seeds": [4, 5]}
-    run, products, _ = parts({"recognition": block})
-    assert run.asked.name == "more"
+    run, _, _ = parts({"recognition": block})
     assert run.trainings == [f"{name}/{seed}" for name in ("seen/few", "unseen/few", "seen/more", "unseen/other")
                              for seed in (4, 5)]  # fmt: skip
-    job = SimpleNamespace(run="default", scheme="few")
-    assert isinstance(products, Products) and products.asked_model(job) == "results/default/models/seen/more/4/model.pt"
-    with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
-        _ = run_of({"recognition": block | {"protocols": ["unseen"]}}).asked

@@ -42,7 +42,7 @@ def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
 
 
 def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
-    run, products, _ = parts({"report": {"cost": False, "effects": False, "accuracy": "", "measured": ""}})
+    run, products, _ = parts({"report": {"cost": False, "accuracy": "", "measured": ""}})
     base, page = "results/default", products.report(CHUNK)
     named = ("index", "gallery", "motion", "distances", "seeds")
     assert {name: page[name] for name in named} == {
@@ -52,15 +52,14 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     }  # fmt: skip
     assert page["clouds"] == [f"{base}/clouds/{subtype}.npz" for subtype in run.subtypes]
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
-    assert not {"transfer", "echo_cost", "effects", "accuracy_cost", "measured"} & set(page)
+    assert not {"transfer", "echo_cost", "accuracy_cost", "measured"} & set(page)
     accuracy, measured = "config/cost/accuracy.csv", "config/schemes.csv"
-    _, products, _ = parts({"report": {"cost": True, "effects": True, "accuracy": accuracy, "measured": measured},
+    _, products, _ = parts({"report": {"cost": True, "accuracy": accuracy, "measured": measured},
                             "recognition": {"transfer": ["other"]}})  # fmt: skip
     more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
     assert more == {
         "transfer": f"{base}/transfer.csv", "echo_cost": f"{base}/cost.csv", "echo_pixels": f"{base}/cost_pixels.csv",
-        "echo_cost_figure": f"{base}/cost.png", "effects": f"{base}/effects.csv", "accuracy_cost": accuracy,
-        "effects_figure": f"{base}/effects.png", "measured": measured,
+        "echo_cost_figure": f"{base}/cost.png", "accuracy_cost": accuracy, "measured": measured,
     }  # fmt: skip
 
 
@@ -72,12 +71,6 @@ def test_samples_made_on_the_spot_need_clouds_and_surfaces_only_where_points_are
     _, products, _ = parts({"recognition": made, "effects": {"occlusion": {}}})
     surfaces = [f"results/default/occluders/{subtype}.npz" for subtype in run.subtypes]
     assert products.samples(wildcards)["surfaces"] == surfaces
-
-
-def test_the_network_asked_about_effects_sees_the_most_images_and_knows_all_subtypes():
-    assert run_of().asked.name == "ABC:VRP+TRP+VT"
-    with pytest.raises(InputError, match="none is trained in the protocol 'seen'"):
-        _ = run_of({"recognition": {"protocols": ["unseen"]}}).asked
 
 
 def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():

@@ -9,12 +9,9 @@ import pytest
 
 from configured import parts
 from lowalt.common.config import plain
-from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
-from lowalt.scene.catalogue import PLACES
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.settings import Settings
 from snakemake_texts import body
 
@@ -51,7 +48,7 @@ def checkout(monkeypatch):
         ({"images": {"gamma": 0.7}}, {"images", "cost_pixels"}),
         ({"images": {"colour_map": "magma"}}, {"images", "cost_pixels", "training"}),
         ({"recognition": {"training": {"steps": 7}}}, {"training"}),
-        ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation", "effects_table"}),
+        ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation"}),
         ({"split": {"val": 2, "train": 7}}, {"shard"}),
         ({"echo": {"tolerance": 1e-3}}, {"echo", "echo_in_scene"}),
     ],
@@ -60,7 +57,7 @@ def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay
     job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
     names = (
         "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "cost_pixels", "views",
-        "training", "evaluation", "seed", "effects_table",
+        "training", "evaluation", "seed",
     )  # fmt: skip
     before, after = parts()[2], parts(overlay)[2]
     assert {name for name in names if getattr(before, name)(job) != getattr(after, name)(job)} == changed
@@ -103,7 +100,7 @@ def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
     ]  # fmt: skip
     for stage in stages:
         told = [getattr(settings, stage)(job) for job in jobs]
-        assert told == [getattr(Settings(run, EffectCalls(run)), stage)(job) for job in jobs]
+        assert told == [getattr(Settings(run), stage)(job) for job in jobs]
         assert (len(set(told)) > 1) == (stage not in ("images", "index"))
 
 
@@ -120,24 +117,9 @@ def test_tiles_with_range_profiles_follow_the_seed_and_the_snrs():
     assert len(set(plain)) == 1 and len(set(with_profiles)) == 3
 
 
-def test_priced_calls_are_no_effects_each_effect_alone_and_scenes():
-    run, products, settings = parts()
-    calls = EffectCalls(run)
-    assert list(calls.all) == ["none", *PLACES, "urban", "streets"]
-    assert products.call_samples(CHUNK)[0] == "results/default/effects/seen-streets.npz"
-    occluded = SimpleNamespace(run="default", group="seen", call="occlusion")
-    assert len(products.call_occluders(occluded)) == 20
-    assert json.loads(settings.effect_samples(occluded))["effects"] == {"occlusion": {}}
-    plain_call = SimpleNamespace(**vars(occluded) | {"call": "none"})
-    assert json.loads(settings.effect_samples(plain_call))["effects"] == {}
-    with pytest.raises(InputError, match="no call 'nothing'"):
-        calls.named("nothing")
-
-
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
     shown = {
         "cost": True,
-        "effects": True,
         "accuracy": "config/cost/accuracy.csv",
         "published": "config/published_accuracy.csv",
     }
@@ -145,7 +127,7 @@ def test_the_report_s_files_are_a_manifest_that_the_report_takes():
         ({"report": {"cost": False}}, set()),
         (
             {"report": shown, "recognition": {"transfer": ["other"]}},
-            {"transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure", "effects", "effects_figure"},
+            {"transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure"},
         ),
     ):
         _, products, _ = parts(overlay)

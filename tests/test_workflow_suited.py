@@ -57,7 +57,6 @@ def test_what_suits_is_taken(overlay):
         (recognition(network={"backbone": "a.py:f"}), "recognition.network.backbone: 'a.py' is not there"),
         (recognition(table="a.csv"), "recognition.table: 'a.csv' is not there"),
         ({"report": {"measured": "a.csv"}}, "report.measured: 'a.csv' is not there"),
-        ({"report": {"effect_scenes": ["config/tiny.yaml", "a.yaml"]}}, "report.effect_scenes: 'a.yaml' is not there"),
         ({"targets": {"select": ["crow"]}}, r"targets.select: \['crow'\], expected perhaps \['Crow'\]$"),
     ],
 )

@@ -4,7 +4,6 @@ from pathlib import Path
 
 from lowalt.common.config import merge
 from lowalt.common.yaml_files import load_yaml
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.products import Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings
@@ -27,5 +26,4 @@ def run_of(overlay: dict | None = None, inputs: str | None = None) -> Run:
 def parts(overlay: dict | None = None) -> tuple[Run, Products, Settings]:
     """The run of an overlay, the files it makes, and the settings of its stages."""
     run = run_of(overlay)
-    calls = EffectCalls(run)
-    return run, Products(run, calls), Settings(run, calls)
+    return run, Products(run), Settings(run)

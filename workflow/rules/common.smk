@@ -9,7 +9,6 @@ from lowalt.common.environment import prepare
 from lowalt.common.plan import PART
 from lowalt.scene.catalogue import dotted
 from lowalt.workflow import mends, options, space
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.common.shipped import located
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
@@ -23,9 +22,8 @@ with refusing():
     RUN = Run.of(config, SCHEMA, prepare(ROOT, config["inputs"]))
     space.writable(Path.cwd(), RUN.name)
 
-calls = Refusing(EffectCalls(RUN))
-products = Refusing(Products(RUN, calls))
-settings = Refusing(Settings(RUN, calls))
+products = Refusing(Products(RUN))
+settings = Refusing(Settings(RUN))
 code = partial(code_of, spectra=tuple(name for name in config["spectra"] if name != "times"))
 
 # The run whose data set is trained on, RUN's own unless the configuration names another.

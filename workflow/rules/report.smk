@@ -1,6 +1,6 @@
 # Report: one self-contained page of the run, and the table of the time that each stage took.
 # REQUIRED INPUTS: the recognition tables, the shards' index, all clouds, one motion table, every job's benchmark;
-#                  where report.cost says so the echo's cost, where report.effects says so the effects' table
+#                  where report.cost says so the echo's cost
 # OUTPUTS: results/{run}/report.json (its manifest), results/{run}/report.html, results/{run}/stages.csv,
 #          results/{run}/figures (each plot as SVG and CSV)
 

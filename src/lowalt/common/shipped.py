@@ -15,7 +15,7 @@ SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else 
 KEYS = (
     ("targets", "table"), ("targets", "records"), ("targets", "own"),
     ("recognition", "table"), ("report", "published"),
-    ("report", "effect_scenes"), ("report", "accuracy"),
+    ("report", "accuracy"),
 )  # fmt: skip
 """Block and key of every file, or list or mapping of files, that a configuration names and the package brings."""
 

@@ -26,7 +26,7 @@ KEPT = {
 }  # fmt: skip
 """Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
 OPTIONAL = (
-    "published", "transfer", "echo_cost_figure", "effects", "effects_figure", "measured", *KEPT,
+    "published", "transfer", "echo_cost_figure", "measured", *KEPT,
     *(f"kept_{name}" for name in KEPT),
 )  # fmt: skip
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""

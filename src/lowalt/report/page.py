@@ -13,7 +13,6 @@ from lowalt.report.sections import (
     accuracy_cost,
     confusion,
     echo_cost,
-    effects,
     made_with,
     measured,
     orderings,
@@ -45,7 +44,7 @@ PARTS = (
     PagePart("samples", "Samples", (samples,)),
     PagePart("results", "Results", (subtypes, confusion, accuracy, orderings, transfer)),
     PagePart("cost", "What accuracy costs in time", (accuracy_cost, echo_cost)),
-    PagePart("effects", "The scene", (scene, effects)),
+    PagePart("effects", "The scene", (scene,)),
     PagePart("measured", "Held against measurement", (measured,)),
     PagePart("provenance", "Provenance", (made_with,)),
 )

@@ -9,16 +9,15 @@ from lowalt.common.files import slug
 from lowalt.scene.lateness import timed
 from lowalt.spectra.catalogue import profiled
 from lowalt.targets.records import source_files
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
 
 class DataProducts:
     """Paths of the files from which the data set of one run is made."""
 
-    def __init__(self, run: Run, calls: EffectCalls) -> None:
-        """Keep the run and its calls for effects."""
-        self._run, self._config, self._calls = run, run.config, calls
+    def __init__(self, run: Run) -> None:
+        """Keep the run."""
+        self._run, self._config = run, run.config
         self._groups: dict[tuple, list[str]] = {}
 
     def _of_group(self, folder: str, wildcards: Any) -> list[str]:
@@ -72,11 +71,6 @@ class DataProducts:
     def chunk_occluders(self, wildcards: Any) -> list[str]:
         """Surfaces of a chunk's subtypes; none where the scene hides no points behind surfaces."""
         return self._of_chunk("occluders", wildcards) if "occlusion" in self._config["effects"] else []
-
-    def call_occluders(self, wildcards: Any) -> list[str]:
-        """Surfaces of a group's subtypes; none where the call hides no points behind surfaces."""
-        hidden = "occlusion" in self._calls.named(wildcards.call)["effects"]
-        return self._of_group("occluders", wildcards) if hidden else []
 
     def span(self, wildcards: Any) -> list[str]:
         """The part of a group's motion models that one chunk holds, as words of the stage's command line."""

@@ -71,16 +71,6 @@ class Products(DataProducts):
         sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
 
-    def asked_model(self, wildcards: Any) -> str:
-        """The network that shows what effects do."""
-        seed = self._config["recognition"]["seeds"][0]
-        return f"results/{wildcards.run}/models/seen/{self._run.asked.slug}/{seed}/model.pt"
-
-    def call_samples(self, wildcards: Any) -> list[str]:
-        """Samples of every call for effects and group; scenes first, since they take longest."""
-        groups, stem = self._run.plan.groups, f"results/{wildcards.run}/effects"
-        return [f"{stem}/{group}-{name}.npz" for name in reversed(self._calls.all) for group in groups]
-
     def fidelity(self, wildcards: Any) -> str | list[str]:
         """The table of models trained on echoes at a tolerance, made by other runs; none for a run on another's data.
 
@@ -137,8 +127,6 @@ class Products(DataProducts):
         if block["cost"]:
             files["echo_cost"], files["echo_pixels"] = f"{base}/cost.csv", f"{base}/cost_pixels.csv"
             files["echo_cost_figure"] = f"{base}/cost.png"
-        if block["effects"]:
-            files["effects"], files["effects_figure"] = f"{base}/effects.csv", f"{base}/effects.png"
         return files
 
     def manifest(self, wildcards: Any) -> str:

@@ -124,7 +124,6 @@ def refuse_missing(config: dict) -> None:
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
         "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],
-        "report.effect_scenes": report["effect_scenes"],
         **{f"report.{key}": [report[key]] for key in ("published", "accuracy", "measured")},
     }
     for key, paths in files.items():

@@ -166,20 +166,6 @@ class Run:
         seeds = self.config["recognition"]["seeds"]
         return [f"unseen/{scheme.slug}/{seed}" for scheme in self.trained for seed in seeds]
 
-    @cached_property
-    def asked(self) -> Scheme:
-        """The scheme whose network is tried on samples with effects: the one with most images, trained on all subtypes.
-
-        Raises: InputError where no scheme is trained in the protocol "seen".
-        """
-        protocols = self.config["recognition"]["protocols"]
-        able = [scheme for scheme in self.trained if "seen" in scheme.protocols and "seen" in protocols]
-        if not able:
-            raise InputError(
-                "recognition.schemes: none is trained in the protocol 'seen', expected one to ask about effects"
-            )
-        return max(able, key=lambda scheme: len(scheme.columns))
-
     def is_reduced(self, size: int) -> bool:
         """Whether the tiles stage reduces its images to this size; signal shards have no tiles."""
         return self.config["shards"]["kind"] == "image" and size in self.config["tiles"]["reduced"]

@@ -14,7 +14,6 @@ from lowalt.motion.sample import masts_in_reach
 from lowalt.scene.lateness import timed
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra.catalogue import profiled
-from lowalt.workflow.effect_calls import EffectCalls
 from lowalt.workflow.run import Run
 
 MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m")
@@ -24,9 +23,9 @@ MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m")
 class Settings:
     """Settings of the stages of one run."""
 
-    def __init__(self, run: Run, calls: EffectCalls) -> None:
-        """Keep the run and its calls for effects."""
-        self._run, self._config, self._calls = run, run.config, calls
+    def __init__(self, run: Run) -> None:
+        """Keep the run."""
+        self._run, self._config = run, run.config
         self._texts: dict[tuple, str] = {}
 
     def _text(self, *key: Any, **block: Any) -> str:
@@ -154,35 +153,13 @@ class Settings:
         return self._text("evaluation", **self._config["recognition"]["evaluation"])
 
     def backbone(self, wildcards: Any) -> list[str]:
-        """The words that name the code of the asked network's backbone, none where a library has it."""
-        scheme = self._run.schemes_by_slug[wildcards.scheme] if wildcards.get("scheme") else self._run.asked
-        name = self._run.own_backbone(scheme)
+        """The words that name the code of a scheme's backbone, none where a library has it."""
+        name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
         return ["--backbone", name] if name else []
 
     def seed(self, wildcards: Any) -> str:
         """The run's seed alone, for tables with intervals."""
         return self._text("seed", **self._blocks("seed"))
-
-    def effect_samples(self, wildcards: Any) -> str:
-        """One call for effects, and the samples and images it is tried on."""
-        call = self._calls.named(wildcards.call)
-        models, size = self._config["report"]["effect_models"], self._run.pixels(self._run.asked)
-        blocks = self._blocks("network", "spectra", "images", "split", "seed")
-        return self._text(
-            "effect_samples",
-            wildcards.call,
-            **blocks,
-            **call,
-            name=wildcards.call,
-            models=models,
-            size=size,
-            classes=self._run.classes,
-        )
-
-    def effects_table(self, wildcards: Any) -> str:
-        """The run's seed, and the settings with which a network predicts."""
-        evaluation = self._config["recognition"]["evaluation"]
-        return self._text("effects_table", **self._blocks("seed"), evaluation=evaluation)
 
     def report(self, wildcards: Any) -> str:
         """The whole configuration, and the published values of each subtype."""

@@ -82,26 +82,3 @@ def _decades(values) -> list[float]:
     """Powers of ten around positive values."""
     found = list(values)
     return [10.0 ** math.floor(math.log10(min(found))), 10.0 ** math.ceil(math.log10(max(found)))]
-
-
-def effects(table: list[dict[str, str]]) -> Plot:
-    """Return the time that each effect adds, and what it does to the accuracy with its 95 % interval.
-
-    table: rows of effects.csv, the first without effects. Times under a microsecond stand at one.
-    """
-    numbers = ("added_ms", "difference_points", "low", "high", "signal_change", "pixels_changed_percent")
-    rows = [{"call": row["call"], **{name: float(row[name]) for name in numbers}, "snr_db": row["snr_db"],
-             "drawn_ms": max(float(row["added_ms"]), 1e-3)} for row in table[1:]]  # fmt: skip
-    names = {"field": "call", "type": "nominal", "sort": None, "title": None}
-    bounds = _decades(row["drawn_ms"] for row in rows)
-    added = {"field": "drawn_ms", "type": "quantitative", "title": "processor ms added a sample and station",
-             "scale": {"type": "log", "domain": bounds}}  # fmt: skip
-    times = {"width": 420, "height": {"step": 15}, "mark": {"type": "bar", "tooltip": _PER_NAME},
-             "encoding": {"y": names, "x": added, "x2": {"datum": bounds[0]}}}  # fmt: skip
-    change = {"width": 420, "height": {"step": 15}, "encoding": {"y": {**names, "axis": None}}, "layer": [
-        {"mark": {"type": "rule", "tooltip": _PER_NAME}, "encoding": {
-            "x": {"field": "low", "type": "quantitative", "title": "change of accuracy, points, and its 95 % interval"},
-            "x2": {"field": "high"}}},
-        {"mark": {"type": "point", "filled": True, "tooltip": _PER_NAME},
-         "encoding": {"x": {"field": "difference_points", "type": "quantitative"}}}]}  # fmt: skip
-    return Plot("effects", "time and change of accuracy of each effect", {"hconcat": [times, change]}, rows)
