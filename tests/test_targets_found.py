@@ -50,7 +50,7 @@ def cloud(out: Path) -> Cloud:
 
 
 def hull() -> dict[str, trimesh.Trimesh]:
-    """A body with arms, skids, motor caps and screws, each of which comes in fours or twos."""
+    """A body with arms, plates, skids, motor caps and screws, each of which comes in fours or twos."""
     shapes = {"hull": box((0.2, 0.12, 0.06))}
     for index, (x, y) in enumerate(HUBS):
         arm = box((0.12, 0.02, 0.012))
@@ -61,6 +61,7 @@ def hull() -> dict[str, trimesh.Trimesh]:
             f"cap{index}": disc((x, y, 0.05), 0.015),
             f"screw{index}": disc((x, 0, 0), 0.004),
         }
+        shapes[f"plate{index}"] = disc((0.4 * x, 0.4 * y, 0.035), 0.036)
     return shapes | {f"skid{side}": box((0.22, 0.012, 0.012), (0, side * 0.06, -0.08)) for side in (-1, 1)}
 
 
@@ -102,7 +103,8 @@ def test_blades_far_from_one_another_are_taken_together_where_the_number_is_know
 
 def test_arms_are_no_rotors_where_propellers_are_missing(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert draft(saved(tmp_path / "craft.obj", hull()), "--subtype", "DJI Mavic 3 Pro")[0] == 2
+    shapes = {name: shape for name, shape in hull().items() if "plate" not in name}
+    assert draft(saved(tmp_path / "craft.obj", shapes), "--subtype", "DJI Mavic 3 Pro")[0] == 2
     assert "0 rotors found, expected 4" in capsys.readouterr().err
 
 
@@ -188,6 +190,7 @@ def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:
     for side in (-1, 1):
         wing = box((0.2, 0.1, 0.01)).subdivide().subdivide().subdivide()
         wing.vertices[:, 2] -= 0.5 * np.abs(wing.vertices[:, 0] + side * 0.1)
+        wing.vertices[:, 2] += 0.6 * wing.vertices[:, 1]  # its slices are higher than half a trunk
         wing.apply_translation([side * 0.14, 0.02 + lean * side, 0.03])
         shapes[f"w{side}"] = wing
     return saved(tmp_path / "bird.obj", shapes)

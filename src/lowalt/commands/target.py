@@ -3,6 +3,7 @@
 import argparse
 import os
 import re
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -168,6 +169,7 @@ def _draft(
     """The record of a mesh file."""
     known = row or {"n_rotors_or_wings": given.rotors}
     found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
+    found = replace(found, path=given.file)  # of a description, not the file that its parts lie in for now
     if not found.sides_seen:
         raise InputError(f"{path}: left and right of the bird cannot be seen, expected --up and --front")
     groups = chosen(found, given.moving) if given.moving else found.groups
