@@ -17,7 +17,7 @@ from lowalt.report.figures import cost_plots
 from lowalt.report.figures.echo_cost import figure
 from lowalt.report.figures.echo_cost import main as draw
 from lowalt.report.page import rendered
-from lowalt.report.sections.echo_cost import summary
+from lowalt.report.sections.echo_cost import sentence, summary
 from lowalt.targets.records import load_table
 from lowalt.tiles.render import Renderer
 
@@ -165,5 +165,7 @@ def test_the_summary_compares_where_all_methods_were_timed():
     assert exact["seconds"] == pytest.approx(3e-3) and exact["over_finufft"] == pytest.approx(100)
     assert (exact["error"], exact["pixels"], exact["over_direct"]) == (5e-12, None, None)
     assert loose["pixels"] == [6, 300] and loose["error"] == 1e-5 and peer["over_finufft"] == 1
-    text = rendered("echo_cost", {"own": True, "cost": found, "plot": cost_plots.echo(table), "picture": "data:,"})
+    said = sentence(found["rows"])
+    text = rendered("echo_cost", {"own": True, "cost": found, "plot": cost_plots.echo(table), "sentence": said})
+    assert said.startswith("The exact mode costs 3.00 ms a signal; ") and said in text
     assert "6 of 300" in text and "<td>3.00</td>" in text and "mean over 2 samples at 150 m" in text

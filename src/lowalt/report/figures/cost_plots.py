@@ -4,51 +4,50 @@ import math
 
 from lowalt.report.plots import Plot
 
-_ACCURACIES = {"unseen_percent": "unseen", "seen_percent": "seen"}
-_COSTS = {
-    "inference_ms_64": "inference, ms a sample on one core (batch of 64)",
-    "core_s_training": "training, core-seconds",
-    "network_bytes": "bytes a sample that the network reads",
-}
 _PER_NAME = {"content": "data"}
 _BELOW = {"orient": "bottom", "title": None, "columns": 6}
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
-    """Return accuracy over inference time, training time and bytes read; the front of the unseen is joined.
+    """Return accuracy on unseen subtypes over the time of a training, the front joined and named.
 
-    rows: of accuracy_cost.csv, averages over the SNRs, trained rows only are drawn. Each panel zooms.
+    rows: of accuracy_cost.csv, averages over the SNRs, trained rows only are drawn. Bars are 95 % intervals of the
+    difference to the first row; where they hold zero the point is grey: it cannot be told apart from the first.
     """
-    known = [row for row in rows if row["kind"] == "trained" and row["snr_db"] == "avg"]
-    data = [
-        {"scheme": row["scheme"], "cost": cost, "value": float(row[column]), "subtypes": subtypes,
-         "accuracy_percent": float(row[accuracy]), "front": row["front"], "backbone": row.get("backbone", ""),
-         "pixels": row.get("pixels", "")}
-        for column, cost in _COSTS.items() for accuracy, subtypes in _ACCURACIES.items() for row in known
-        if row[column] and row[accuracy]
+    known = [row for row in rows if row["kind"] == "trained" and row["snr_db"] == "avg" and row["unseen_percent"]]
+    first, kinds = float(known[0]["unseen_percent"]) if known else 0.0, ("the base", "cannot be told apart", "differs")
+    data, named = (
+        [],
+        sorted((row for row in known if row["front"] == "yes"), key=lambda row: float(row["core_s_training"])),
+    )
+    for row in known:
+        held = float(row["low"]) <= 0 <= float(row["high"])
+        data.append({
+            "scheme": row["scheme"], "core_s": float(row["core_s_training"]), "front": row["front"],
+            "accuracy_percent": float(row["unseen_percent"]), "low": first + float(row["low"]),
+            "high": first + float(row["high"]), "told": kinds[0] if row is known[0] else kinds[1 if held else 2],
+            "side": named.index(row) % 4 if row in named else -1,
+        })  # fmt: skip
+    x = {"field": "core_s", "type": "quantitative", "title": "core-seconds of a training", "scale": {"type": "log"}}
+    y = {"field": "accuracy_percent", "type": "quantitative", "title": "accuracy, unseen subtypes (%)",
+         "scale": {"zero": False}}  # fmt: skip
+    legend = {"orient": "bottom", "title": None, "columnPadding": 40}
+    colour = {"field": "told", "type": "nominal", "legend": legend,
+              "scale": {"domain": list(kinds), "range": ["#0550ae", "#8c959f", "#bc4c00"]}}  # fmt: skip
+    bar = {"y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": colour}
+    layers = [
+        {"transform": [{"filter": "datum.front == 'yes'"}],
+         "mark": {"type": "line", "interpolate": "step-after", "color": "gray", "strokeWidth": 1}},
+        {"mark": {"type": "rule", "opacity": 0.5}, "encoding": bar},
+        {"mark": {"type": "point", "filled": True, "size": 70, "opacity": 1, "tooltip": _PER_NAME},
+         "encoding": {"color": colour}},
+        *({"transform": [{"filter": f"datum.side == {side}"}],
+           "mark": {"type": "text", "align": "left", "dx": -6, "dy": (30, -24, -44, 30)[side]},
+           "encoding": {"text": {"field": "scheme", "type": "nominal"}}} for side in range(4)),
     ]  # fmt: skip
-    name = {"field": "scheme", "type": "nominal", "scale": {"scheme": "tableau20"}}
-    panels = []
-    for number, cost in enumerate(_COSTS.values()):
-        zoom = {"name": f"zoom{number}", "select": "interval", "bind": "scales"}
-        across = {"field": "value", "type": "quantitative", "title": cost,
-                  "scale": {"type": "linear" if cost.startswith("bytes") else "log", "zero": False}}  # fmt: skip
-        up = {"field": "accuracy_percent", "type": "quantitative", "title": "accuracy (%)", "scale": {"zero": False}}
-        points = {
-            "params": [zoom], "mark": {"type": "point", "size": 70, "opacity": 1, "tooltip": _PER_NAME},
-            "encoding": {
-                "color": {**name, "legend": _BELOW}, "fill": {**name, "legend": None},
-                "fillOpacity": {"field": "subtypes", "type": "nominal", "legend": None,
-                                "scale": {"domain": ["unseen", "seen"], "range": [1, 0]}},
-            },
-        }  # fmt: skip
-        front = {"transform": [{"filter": "datum.front == 'yes' && datum.subtypes == 'unseen'"}],
-                 "mark": {"type": "line", "interpolate": "step-after", "color": "gray", "strokeWidth": 1}}  # fmt: skip
-        layers = [front, points] if number == 0 else [points]
-        panels.append({"width": 270, "height": 280, "transform": [{"filter": {"field": "cost", "equal": cost}}],
-                       "encoding": {"x": across, "y": up}, "layer": layers})  # fmt: skip
-    words = "recognition accuracy over inference time, training time and bytes; filled unseen subtypes, hollow seen"
-    return Plot("accuracy_cost", words, {"hconcat": panels}, data)
+    words = "accuracy on unseen subtypes over the core-seconds of a training, with 95 % intervals of the difference"
+    spec = {"width": 720, "height": 340, "encoding": {"x": x, "y": y}, "layer": layers}
+    return Plot("accuracy_cost", words, spec, data)
 
 
 def echo(measured: list[dict[str, str]]) -> Plot:

@@ -1,8 +1,7 @@
 """Section: recognition accuracy over its time, from this run's table or the kept reference."""
 
 from lowalt.report.figures import cost_plots
-from lowalt.report.figures.accuracy_cost import FIDELITY, NEEDED, draw
-from lowalt.report.figures.style import embedded
+from lowalt.report.figures.accuracy_cost import FIDELITY, NEEDED
 from lowalt.report.run import ReportedRun
 
 SHOWN = ("backbone", "pixels", "inference_ms_1", "hardware")
@@ -16,4 +15,4 @@ def values(run: ReportedRun) -> dict | None:
     table = run.inputs.table(name, *NEEDED, *FIDELITY, *SHOWN)
     rows = [row for row in table if row["snr_db"] == "avg" and row["kind"] != "fidelity"]
     return {"own": name == "accuracy_cost", "rows": rows, "hardware": table[0]["hardware"],
-            "plot": cost_plots.recognition(table), "picture": embedded(draw(table))}  # fmt: skip
+            "plot": cost_plots.recognition(table)}  # fmt: skip
