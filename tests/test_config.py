@@ -12,7 +12,7 @@ from lowalt.common.errors import InputError
 from lowalt.common.files import slug
 from lowalt.common.plan import Plan
 from lowalt.motion import COLUMNS
-from lowalt.report.sections.stages import COLUMNS as STAGE_COLUMNS
+from lowalt.report.stages import COLUMNS as STAGE_COLUMNS
 from lowalt.workflow.sources import PACKAGE, sources
 
 ROOT = Path(__file__).parent.parent

@@ -23,7 +23,7 @@ def test_the_library_example_runs_as_printed(monkeypatch):
 def test_it_has_one_picture_and_one_table_of_results_and_fits_two_screens():
     assert len(README.splitlines()) < 80
     assert README.count("<img ") + README.count("![") == 1
-    assert README.count("| embedded default") == 1 and len(re.findall(r"^## ", README, re.MULTILINE)) == 5
+    assert README.count("| the default (`make`)") == 1 and len(re.findall(r"^## ", README, re.MULTILINE)) == 5
 
 
 def test_every_file_it_links_to_exists():

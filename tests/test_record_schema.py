@@ -61,7 +61,12 @@ def test_a_page_without_marks_and_a_key_without_meaning_are_refused(monkeypatch)
     ("file", "name", "change", "message"),
     [
         ("pedestrian", "Walking Pedestrian 1", {"person": 3}, r"here: person: 3 is not of type 'string'"),
-        ("uav", "DJI Mini 2", {"sources": {"maker": 1}}, r"here: sources.maker: 1 is not of type 'string'"),
+        (
+            "uav",
+            "DJI Mini 2",
+            {"sources": {"maker": 1, "authors": "x"}},
+            r"here: sources.maker: 1 is not of type 'string'",
+        ),
         ("uav", "DJI Mini 2", {"colour": "red"}, r"unknown keys \['colour'\]"),
         ("uav", "DJI Mini 2", {"like": "Boat"}, r"like is 'Boat'"),
     ],

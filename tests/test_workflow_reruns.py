@@ -106,7 +106,7 @@ CHANGES = {
     # Files of the user.
     "a target's record": Change(
         {("cloud", "crow")},
-        edit=("config/targets/bird.yaml", "length: [46, cm, reference]", "length: [47, cm, reference]"),
+        edit=("config/targets/bird.yaml", "length: [0.348, m, authors]", "length: [0.349, m, authors]"),
     ),
     "a target's published row": Change(
         {("cloud", "nio-et5t-2023"), *((work) for work in MOTION if work[1] == "unseen"), *REPORT},

@@ -113,8 +113,7 @@ def reported(folder, config, clouds, published=None):
     Image.new("L", (8, 8)).save(folder / "gallery.png")
     job = {"rule_name": "echo", "wildcards": {}, "s": 2.0, "cpu_time": 1.5, "max_rss": 100.0}
     (folder / "echo.jsonl").write_text(json.dumps(job))
-    names = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "alarms", "calibration", "reliability",
-             "seeds", "ranges", "aspects", "distances", "motion")  # fmt: skip
+    names = ("accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "motion")
     manifest = {name: str(folder / f"{name}.csv") for name in names}
     manifest |= {"index": str(folder / "index.json"), "gallery": str(folder / "gallery.png")}
     manifest |= {"clouds": list(map(str, clouds)), "benchmarks": [str(folder / "echo.jsonl")]}
