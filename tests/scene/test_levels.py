@@ -11,6 +11,9 @@ ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import scene_levels  # noqa: E402
 
+from lowalt.scene.effects.channel import cyclic_prefix  # noqa: E402
+from scenes import network  # noqa: E402
+
 SCENES = sorted(path.stem for path in (ROOT / "config/scenes").glob("*.yaml"))
 
 LINKED = "links", "triangle"
@@ -45,7 +48,7 @@ def test_the_kept_levels_of_a_scene_follow_by_hand(name):
     assert table["transmit power, 256 subcarriers"] == pytest.approx(30.0 + 24.08, abs=0.06)
     assert table["transmit array"] == table["receive array"] == pytest.approx(10 * log10(64), abs=0.06)
     # 397 points of 1 m2; what their phases make of that is held by the law below.
-    section = 10 * log10(397) - 3.6 if name == "paper" else -12.81 + 11.56 * log10(0.311 / 0.4)
+    section = 10 * log10(397) - 3.9 if name == "paper" else -12.81 + 11.56 * log10(0.32 / 0.4)
     assert table["mean cross section"] == pytest.approx(section, abs=0.06)
     assert table["expected echo"] == pytest.approx(30.0 + 2 * 18.06 + element + path + section, abs=0.2)
     if "noise, one subcarrier" in table:
@@ -74,3 +77,10 @@ def test_every_target_s_kept_level_is_the_stated_one():
         rows = {row["subtype"]: float(row["simulated_less_stated_db"]) for row in csv.DictReader(file)}
     assert list(rows) == list(scene_levels.target_records(ROOT)[1])
     assert max(map(abs, rows.values())) < 0.5
+
+
+def test_what_comes_within_the_prefix_loses_nothing_and_later_echoes_their_share_of_a_symbol():
+    radio, prefix_s = network(), 5e-7
+    delays_s = [prefix_s + later / radio.subcarrier_spacing_hz for later in (-0.02, 0, 0.1, 2)]
+    shares = [cyclic_prefix.lost(delay_s, prefix_s, radio) for delay_s in delays_s]
+    assert shares == pytest.approx([0.0, 0.0, 0.1, 1.0])

@@ -6,6 +6,7 @@ from scipy.linalg import expm, solve_continuous_lyapunov
 
 from lowalt.common.config import load
 from lowalt.common.streams import stream
+from lowalt.motion.rotations import attitude
 from lowalt.scene.effects.motion import flight, gusts, markov, rotor_spread
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
@@ -102,3 +103,11 @@ def test_masses_are_the_makers_and_grow_with_size(clouds):
     assert 1.17 * flight.mass_kg(clouds["Crow"]) ** 0.39 == pytest.approx(span_m)
     level, up = flight.response_s(clouds["Crow"], 10.0)
     assert level > 10 * up
+
+
+def test_thrust_points_where_the_craft_accelerates_to():
+    """The body's up axis, turned by pitch and roll, has the direction of (right, front, gravity)."""
+    for right, front in ((1.5, 0.0), (0.0, 1.5), (-0.4, 0.3)):
+        _, pitch, roll = gusts.tilt(np.array([[right, front, 0.0]]), pitches=True)[0]
+        thrust = attitude(0.0, pitch, roll) @ [0.0, 0.0, 1.0]
+        np.testing.assert_allclose(thrust[:2] / thrust[2], np.array([right, front]) / 9.80665, rtol=0.01)

@@ -123,6 +123,9 @@ def test_a_mixer_images_each_subcarrier_in_its_mirror():
     g, phi = 10 ** (0.5 / 20), np.radians(2.0)
     ratio = (1 + g * g + 2 * g * np.cos(phi)) / (1 + g * g - 2 * g * np.cos(phi))
     assert abs(mu / nu) ** 2 == pytest.approx(ratio)
+    # The I branch sees the real part, the Q branch the imaginary part of what lags by phi, g times.
+    r = np.exp(1j * np.linspace(0, 6, 7))
+    np.testing.assert_allclose(mu * r + nu * r.conj(), r.real + 1j * g * (r * np.exp(-1j * phi)).imag, atol=1e-14)
 
 
 def test_a_converter_errs_as_uniform_steps_do_and_clips():

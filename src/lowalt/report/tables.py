@@ -36,7 +36,7 @@ def macro_f1(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, str]]:
     for row in rows:
         if row["snr_db"] == "avg" and row.get("macro_f1_percent"):
             value, low, high = (float(row[f"macro_f1_{name}"]) for name in ("percent", "low", "high"))
-            result[row["protocol"]][row["scheme"]] = f"{value:.2f} ({low:.2f} to {high:.2f})"
+            result[row["protocol"]][row["scheme"]] = f"{value:.1f} ({low:.1f} to {high:.1f})"
     return dict(result)
 
 
