@@ -138,7 +138,7 @@ def test_a_target(checkout, monkeypatch):
 def test_an_effect(checkout, monkeypatch):
     (checkout / "workflow").unlink()
     shutil.copytree(ROOT / "workflow", checkout / "workflow")
-    linked_tree(checkout / "src", "lowalt/effects/receiver")
+    linked_tree(checkout / "src", "lowalt/scene/effects/receiver")
     printed, _ = followed("effect", checkout, monkeypatch)
     assert "dc_offset" in printed and "Schenk" in printed and "0.2" in printed
 
