@@ -1,6 +1,7 @@
 """Every reader of files with a good file of its kind, for `fuzzing` to damage."""
 
 import hashlib
+import importlib.util
 import json
 import tempfile
 from collections.abc import Callable
@@ -29,7 +30,10 @@ def _recording(kind: str) -> Callable[[Path], object]:
     from lowalt.recordings.files import read
     from lowalt.recordings.record import record
 
-    more = {".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}}.get(kind, {"rate_hz": 800.0})
+    more = {
+        ".wav": {}, ".csv": {"columns": ["i", "q"], "rate_hz": 800.0}, ".sigmf-meta": {},
+        ".iq": {"rate_hz": 800.0, "dtype": "float32", "layout": "iqiq"},
+    }.get(kind, {"rate_hz": 800.0})  # fmt: skip
     base = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", **more}
     return lambda path: read(record({**base, "file": path.name}, path.parent, "record"))
 
@@ -45,12 +49,50 @@ def _recordings() -> list[Reader]:
         ".mat": _bytes(lambda path: savemat(path, {"x": wave}, do_compression=True), "a.mat"),
         ".npy": _bytes(lambda path: np.save(path, wave), "a.npy"),
         ".csv": text.encode(),
+        ".iq": pair.astype("<f4").tobytes(),
+        ".cfile": wave.astype("<c8").tobytes(),
     }
     special = {".mat": {"share": 0.1, "seal": MATLAB}}
+    cells = "iq;t\n" + "".join(f"{a:.6f}{b:+.6f}i;{t:.6f}\n" for (a, b), t in zip(pair, times, strict=True))
+    about = {"core:datatype": "cf32_le", "core:sample_rate": 800, "core:version": "1.0.0"}
+    captures = [{"core:sample_start": 0, "core:frequency": 24e9}]
+    about = json.dumps({"global": about, "captures": captures, "annotations": []})
+    more = [("recording .sigmf-meta", "a.sigmf-meta", about.encode(), _metadata),
+            ("recording .csv, complex", "a.csv", cells.replace(".", ",").encode(), _semicolons)]  # fmt: skip
+    if importlib.util.find_spec("h5py"):
+        more.append(
+            ("recording .mat 7.3", "a.mat", _bytes(lambda path: _hdf5(path, wave), "a.mat"), _recording(".mat"))
+        )
     return [
         Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))
         for kind, data in files.items()
-    ]
+    ] + [Reader(*each) for each in more]  # fmt: skip
+
+
+def _semicolons(path: Path) -> object:
+    """Read a table with semicolons, decimal commas and complex cells."""
+    from lowalt.recordings.files import read
+    from lowalt.recordings.record import record
+
+    block = {"carrier_hz": 24e9, "channel": "complex", "source": "test", "licence": "none", "times": "t"}
+    return read(record({**block, "file": path.name}, path.parent, "record"))
+
+
+def _hdf5(path: Path, wave: np.ndarray) -> None:
+    """Write samples as MATLAB's version 7.3 does."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        pair = np.zeros(len(wave), [("real", "<f8"), ("imag", "<f8")])
+        pair["real"], pair["imag"] = wave.real, wave.imag
+        file["rec/iq"] = pair
+
+
+def _metadata(path: Path) -> object:
+    """Read a SigMF recording whose metadata are damaged, beside good samples."""
+    values = np.exp(0.7j * np.arange(2000)) * (1 + 0.1 * np.cos(0.01 * np.arange(2000)))
+    values.astype(np.complex64).tofile(path.with_suffix(".sigmf-data"))
+    return _recording(".sigmf-meta")(path)
 
 
 def _meshes() -> list[Reader]:

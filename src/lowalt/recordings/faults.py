@@ -16,8 +16,14 @@ RATE_SHARE = 1e-3
 """Largest relative difference between the rate of the record and that of the file."""
 CLIPPED_RUN = 3
 """Least number of equal samples in a row at the extreme value that count as a clipped peak."""
+ROUND_STEPS = 2.5
+"""Steps of the quantiser by which a smooth wave's top may fall to the next sample."""
+ROUND_RUN = 8
+"""Times that a smooth wave may stay longer at its highest level than at the next."""
 CLIPPED_SHARE = 1e-4
 """Share of all samples in clipped peaks from which on a recording is refused."""
+MIRRORED = 0.9
+"""Correlation of a spectrum with its mirror about a quarter of the rate from which on I and Q stand in turn."""
 SAME_SHARE = 0.999
 """Squared correlation of I and Q from which on they are the same signal."""
 SIDE_RATIO = 4.0
@@ -59,13 +65,41 @@ def agreed_rate(
 
 
 def _clipped(values: np.ndarray) -> float:
-    """Share of samples that lie in runs of equal samples at the largest or the smallest value."""
-    share = 0.0
-    for extreme in (values.max(), values.min()):
-        at = np.flatnonzero(values == extreme)
-        runs = np.split(at, np.flatnonzero(np.diff(at) > 1) + 1)
-        share += sum(len(run) for run in runs if len(run) >= CLIPPED_RUN) / len(values)
-    return share
+    """Share of samples that lie in cut tops: runs of equal samples at the largest or the smallest value.
+
+    The rounded top of a smooth wave is no cut one. A parabola that is rounded stays at its highest level at most five
+    times as long as at the next level on either side, one step below; samples in between may miss a level. A cut wave
+    leaves its top with the slope with which it came, so it falls by more steps or stays far longer than one step lasts.
+    """
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    levels, lengths = values[starts], np.diff(starts, append=len(values))
+    step = max(float(np.diff(np.unique(values)).min()), float(np.abs(values).max()) * np.finfo(np.float32).eps)
+    top = np.flatnonzero((lengths >= CLIPPED_RUN) & ((levels == values.max()) | (levels == values.min())))
+    cut = np.zeros(len(top), bool)
+    for side in (-1, 1):
+        inside = (top + side >= 0) & (top + side < len(levels))
+        beside = np.where(inside, top + side, top)
+        cut |= abs(levels[beside] - levels[top]) > ROUND_STEPS * step
+        cut |= lengths[top] > ROUND_RUN * lengths[beside]
+    return float(lengths[top][cut].sum() / len(values))
+
+
+def _mirrored(values: np.ndarray) -> float:
+    """Correlation of a real channel's power spectrum with itself mirrored about a quarter of the rate.
+
+    In-phase and quadrature in turn are two slow sequences: with w the frequency in radians a number, the spectrum is
+    E(2w) + exp(-jw) O(2w), and its value at pi - w is the conjugate of E(2w) - exp(-jw) O(2w). For a Doppler far below
+    the rate both have one magnitude, since O is E turned by a quarter. One channel sampled as it is has nothing there.
+    """
+    count = len(values) // 4 * 4
+    if count < 64:
+        return 0.0
+    power = np.abs(np.fft.rfft((values[:count] - values[:count].mean()) * np.hanning(count))) ** 2
+    edge, quarter = max(2, count // 2000), count // 4
+    low = power[edge : quarter - max(2, count // 100)]
+    high = power[::-1][edge : edge + len(low)]
+    spreads = low.std() * high.std()
+    return float(np.mean((low - low.mean()) * (high - high.mean())) / spreads) if spreads else 0.0
 
 
 def _sides(values: np.ndarray) -> tuple[float, float]:
@@ -92,6 +126,9 @@ def check(path: Path, values: np.ndarray, moves: str | None = None) -> None:
         if share > CLIPPED_SHARE:
             raise InputError(f"{path}: clipped, {100 * share:.3g} % of the samples of {name} stick to its extremes "
                              f"{channel.min():.6g} and {channel.max():.6g}")  # fmt: skip
+    if not np.iscomplexobj(values) and _mirrored(values) > MIRRORED:
+        raise InputError(f"{path}: the spectrum is mirrored about a quarter of the rate, as where I and Q stand in "
+                         "turn; expected channel 'complex' with layout 'iqiq', or one real channel")  # fmt: skip
     if np.iscomplexobj(values):
         shifted = values - values.mean()
         alike = np.mean(shifted.real * shifted.imag) ** 2 / (np.mean(shifted.real**2) * np.mean(shifted.imag**2))

@@ -1,13 +1,17 @@
 """The record of a recording: a short YAML file with the facts that the samples do not hold.
 
-file         path of the samples, relative to the record (.wav, .mat, .csv, .npy, .sigmf-meta or .sigmf-data)
+file         path of the samples, relative to the record (.wav, .mat, .csv, .npy, .sigmf-meta, .sigmf-data, or numbers
+             without a header: .iq, .cfile, .bin)
 carrier_hz   carrier of the radar (Hz)
 rate_hz      sampling rate (Hz); may be left out where the file says it itself (WAV, SigMF, a column of times)
 channel      "complex" (in-phase and quadrature) or "real" (one mixer output)
 columns      the channel's columns: names (CSV) or numbers from 0; two for complex (I, then Q), one for real.
              May be left out where the file holds just one complex array, or one or two columns
-variable     name of the array (MAT only); may be left out where there is only one
+layout       "iqiq" (I and Q in turn) or "iiqq" (all I, then all Q) where one real column holds both
+dtype        type of the numbers (.iq and .bin; complex64 in a .cfile): one of DTYPES, little-endian
+variable     name of the array (MAT only), `rec.iq` for a field of a struct; may be left out where there is only one
 times        name of the column of sample times in seconds (CSV only)
+trust        "record" where rate_hz is right and the file's own rate is wrong, else left out
 label        one of the four categories, or left out where nobody knows
 moves        "towards" or "away" where the target's direction is known, else left out
 source       who recorded it
@@ -24,8 +28,12 @@ from lowalt.common.yaml_files import load_yaml
 
 CHANNELS = ("complex", "real")
 MOVES = ("towards", "away")
+LAYOUTS = ("iqiq", "iiqq")
+DTYPES = (
+    "int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64", "complex64", "complex128",
+)  # fmt: skip
 REQUIRED = ("file", "carrier_hz", "channel", "source", "licence")
-OPTIONAL = ("rate_hz", "columns", "variable", "times", "label", "moves")
+OPTIONAL = ("rate_hz", "columns", "variable", "times", "label", "moves", "layout", "dtype", "trust")
 
 
 @dataclass(frozen=True)
@@ -43,6 +51,9 @@ class Record:
     times: str | None = None
     label: str | None = None
     moves: str | None = None
+    layout: str | None = None
+    dtype: str | None = None
+    trust: str | None = None
     rates_hz: tuple[float, ...] | None = None
     """Possible rates (Hz) where the files of a set have different ones; the file has one of them."""
 
@@ -80,7 +91,8 @@ def record(block: dict, folder: Path, where: str) -> Record:
         if key in block and not isinstance(block[key], str):
             raise InputError(f"{where}: {key} is {block[key]!r}, expected text")
     _one_of(where, "channel", block["channel"], CHANNELS)
-    for key, known in (("label", CATEGORIES), ("moves", MOVES)):
+    known_values = {"label": CATEGORIES, "moves": MOVES, "layout": LAYOUTS, "dtype": DTYPES, "trust": ("record",)}
+    for key, known in known_values.items():
         if block.get(key) is not None:
             _one_of(where, key, block[key], known)
     columns = block.get("columns")
@@ -93,7 +105,11 @@ def record(block: dict, folder: Path, where: str) -> Record:
             raise InputError(f"{where}: columns is {columns!r}, expected a list of {count} different names or numbers")
     if block["channel"] == "real" and block.get("moves") is not None:
         raise InputError(f"{where}: moves is {block['moves']!r}, but a real channel has no sign of Doppler to check")
+    if block["channel"] == "real" and block.get("layout") is not None:
+        raise InputError(f"{where}: layout is {block['layout']!r}, expected channel 'complex' with it")
     rate = block.get("rate_hz")
+    if rate is None and block.get("trust") is not None:
+        raise InputError(f"{where}: trust is 'record', but rate_hz is missing, expected a positive number of hertz")
     return Record(
         file=folder / block["file"],
         carrier_hz=_positive(where, "carrier_hz", block["carrier_hz"]),
@@ -106,6 +122,9 @@ def record(block: dict, folder: Path, where: str) -> Record:
         times=block.get("times"),
         label=block.get("label"),
         moves=block.get("moves"),
+        layout=block.get("layout"),
+        dtype=block.get("dtype"),
+        trust=block.get("trust"),
     )
 
 

@@ -23,7 +23,8 @@ from lowalt.common.classes import CATEGORIES
 from lowalt.common.errors import InputError
 from lowalt.common.yaml_files import load_yaml
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
-from lowalt.recordings.files import READERS, Baseband, read
+from lowalt.recordings.files import Baseband, read
+from lowalt.recordings.formats import READERS
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record, read_record, record
 from lowalt.recordings.twin import Twin

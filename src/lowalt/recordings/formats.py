@@ -1,0 +1,155 @@
+"""Tables of samples out of WAV, MAT, CSV, NPY, SigMF and raw files, as they stand in the file.
+
+This module only reads. `lowalt.recordings.files` picks the channel, `lowalt.recordings.faults` judges it.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.common.errors import InputError
+from lowalt.common.files import text_file
+from lowalt.recordings.mat_files import read_mat
+from lowalt.recordings.record import Record
+
+SAME_CARRIER = 1e-3
+"""Largest relative difference between the carrier of the record and that of a SigMF capture."""
+RAW = (".iq", ".cfile", ".bin")
+
+
+class Table(NamedTuple):
+    """Content of a file: columns, each (samples,), their names, and the rate the file states (Hz) or None."""
+
+    columns: list[np.ndarray]
+    names: tuple[str, ...]
+    rate_hz: float | None
+
+
+def _columns(values: np.ndarray, path: Path) -> list[np.ndarray]:
+    """Columns of an array: the longer axis is time."""
+    values = np.squeeze(np.asarray(values))
+    if values.dtype.kind not in "iufc" or not 1 <= values.ndim <= 2 or values.size == 0:
+        raise InputError(f"{path}: array {values.dtype} {values.shape}, expected numbers in one or a few columns")
+    if values.ndim == 1:
+        return [values]
+    return list(values.T if values.shape[0] >= values.shape[1] else values)
+
+
+def _wav(path: Path, record: Record) -> Table:
+    """Read a WAV file, which states its rate."""
+    from scipy.io import wavfile
+
+    try:
+        rate, values = wavfile.read(path)
+    except UnboundLocalError as error:
+        # scipy's reader ends so where a file states no format or holds no data.
+        raise InputError(f"{path}: a .wav file without a format or without samples") from error
+    return Table([values] if values.ndim == 1 else list(values.T), (), float(rate))
+
+
+def _mat(path: Path, record: Record) -> Table:
+    """Read the record's variable of a MATLAB file, or its only one; `rec.iq` is a field of a struct."""
+    held = read_mat(path)
+    name = record.variable
+    if name is None:
+        arrays = [key for key, value in held.items() if value.size > 1]
+        if len(arrays) != 1:
+            raise InputError(f"{path}: variables {sorted(held)}, expected the record to name one as `variable`")
+        name = arrays[0]
+    if name not in held:
+        raise InputError(f"{path}: no variable {name!r}, expected one of {sorted(held)}")
+    return Table(_columns(held[name], path), (), None)
+
+
+def _is_number(cell: str) -> bool:
+    """Whether a cell is a number, real or complex."""
+    try:
+        complex(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _csv(path: Path, record: Record) -> Table:
+    """Read a CSV table with commas, or with semicolons and perhaps decimal commas; cells may be complex (1+2j, 1+2i).
+
+    Its first line names the columns unless all its cells are numbers.
+    """
+    with text_file(path, "recording") as file:
+        lines = [line.strip() for line in file if line.strip()]
+    if not lines:
+        raise InputError(f"{path}: no lines, expected a table of numbers")
+    delimiter = ";" if ";" in lines[0] else ","
+
+    def plain(line: str) -> str:
+        """The line as Python writes numbers."""
+        dotted = line.replace(",", ".") if delimiter == ";" else line
+        return re.sub(r"(?<=[\d.])[iI](?=\W|$)", "j", dotted.replace(" ", ""))
+
+    first = plain(lines[0]).split(delimiter)
+    names = () if all(map(_is_number, first)) else tuple(cell.strip() for cell in lines[0].split(delimiter))
+    rows = [plain(line) for line in lines[bool(names) :]]
+    values = np.loadtxt(rows, complex if any("j" in row for row in rows) else float, delimiter=delimiter, ndmin=2)
+    columns = [column if np.iscomplexobj(column) and column.imag.any() else column.real for column in values.T]
+    return Table(columns, names, None)
+
+
+def _npy(path: Path, record: Record) -> Table:
+    """Read a NumPy array."""
+    return Table(_columns(np.load(path, allow_pickle=False), path), (), None)
+
+
+def _raw(path: Path, record: Record) -> Table:
+    """Read numbers of the record's `dtype`, little-endian, without any header; a .cfile holds complex64."""
+    name = record.dtype or ("complex64" if path.suffix.lower() == ".cfile" else None)
+    if name is None:
+        raise InputError(f"{path}: nothing says the type of its numbers, expected dtype in the record")
+    dtype = np.dtype(name).newbyteorder("<")
+    size = path.stat().st_size
+    if not size or size % dtype.itemsize:
+        raise InputError(f"{path}: {size} bytes, expected whole numbers of {dtype.itemsize} bytes ({name})")
+    return Table([np.fromfile(path, dtype)], (), None)
+
+
+def _sigmf(path: Path, record: Record) -> Table:
+    """Read a SigMF recording from its first capture on; it may state its rate and carrier."""
+    try:
+        import sigmf
+    except ImportError as error:
+        raise InputError(
+            f"{path}: the package sigmf is not installed ({error}), expected `pip install 'lowalt[sigmf]'`"
+        ) from error
+
+    with text_file(path.with_suffix(".sigmf-meta"), "metadata of a SigMF recording") as file:
+        about = json.load(file)
+    fields = about.get("global") if isinstance(about, dict) else None
+    if not isinstance(fields, dict):
+        raise InputError(f"{path}: its metadata has no block global, expected a SigMF recording")
+    other = fields.get("core:dataset")
+    if other is not None and Path(str(other)).name != other:
+        raise InputError(f"{path}: core:dataset is {other!r}, expected the name of a file beside it")
+    try:
+        signal = sigmf.sigmffile.fromfile(str(path))
+        values, rate = signal.read_samples(), signal.get_global_field("core:sample_rate")
+        captures = signal.get_captures()
+    except (sigmf.error.SigMFError, KeyError, AttributeError, AssertionError) as error:
+        raise InputError(f"{path}: not a SigMF recording ({error})") from error
+    for capture in captures:
+        carrier = capture.get("core:frequency", record.carrier_hz)
+        if abs(carrier - record.carrier_hz) > SAME_CARRIER * record.carrier_hz:
+            raise InputError(f"{path}: a capture at {carrier:.6g} Hz, expected the record's carrier_hz "
+                             f"{record.carrier_hz:.6g} in all captures")  # fmt: skip
+    start = min((capture.get("core:sample_start", 0) for capture in captures), default=0)
+    if not 0 <= start < len(values):
+        raise InputError(f"{path}: the first capture begins at sample {start} of {len(values)}, expected one inside")
+    return Table(_columns(values[start:], path), (), None if rate is None else float(rate))
+
+
+READERS: dict[str, Callable[[Path, Record], Table]] = {
+    ".wav": _wav, ".mat": _mat, ".csv": _csv, ".npy": _npy, ".sigmf-meta": _sigmf, ".sigmf-data": _sigmf,
+    **dict.fromkeys(RAW, _raw),
+}  # fmt: skip
