@@ -117,7 +117,7 @@ def test_a_recording_becomes_signals_spectra_tiles_and_a_shard_of_its_own(tmp_pa
     assert entry["fold"] == "test" and entry["geometry"]["A"]["range_m"] is None and entry["motion"]["x_m"] is None
     quiet = tmp_path / "noise.yaml"
     quiet.write_text((tmp_path / "drive.yaml").read_text().replace("channel: real", "channel: complex"))
-    with pytest.raises(InputError, match="expected two"):
+    with pytest.raises(InputError, match="expected one complex or two"):
         write(read_record(quiet), replace_channel(twin), images, tmp_path / "none")
     assert not (tmp_path / "none").exists()
 

@@ -64,6 +64,13 @@ def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path):
         assert sum(shares) == pytest.approx(1, abs=1e-3)
 
 
+def test_a_recording_at_another_band_is_refused_with_the_radar_that_suits_it(tmp_path):
+    path = drive(tmp_path, 22050, True, carrier_hz=3.4e9)
+    call = ["predict", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out")]
+    with pytest.raises(InputError, match=r"carrier_hz is 3.4e\+09, .* expected --radar uav_3ghz"):
+        main([*call, "--model", "none.pt"])
+
+
 def test_swapped_channels_are_refused_where_the_direction_is_known(tmp_path):
     call = ["import", "--radar", "cw_24ghz", "--out", str(tmp_path / "out"), "--record"]
     main([*call, str(drive(tmp_path, 22050, True, moves="away"))])

@@ -23,11 +23,15 @@ from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
 from lowalt.recordings.presence import present
 from lowalt.recordings.recognise import settings
-from lowalt.recordings.record import read_record
+from lowalt.recordings.record import Record, read_record
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, recordings, usable
 from lowalt.targets.records import load_records
 
 FOLDER = "config/measured"
+
+
+TRAINED_RATIO = 1.25
+"""Largest ratio of a recording's carrier and the twin's: speeds in a spectrum scale with it."""
 
 
 def _line(name: str, description: str, *, inputs: bool = False) -> argparse.ArgumentParser:
@@ -62,6 +66,22 @@ def _twin(library: Library, name: str):
     return library.twins[name]
 
 
+def _trained(library: Library, name: str, record: Record, path: Path):
+    """The radar of this name at the recording's carrier, whose networks know recordings like it.
+
+    Raises: InputError where the recording's carrier lies outside those that the networks were trained for.
+    """
+    twin = _twin(library, name)
+    ratio = record.carrier_hz / twin.carrier_hz
+    if not 1 / TRAINED_RATIO <= ratio <= TRAINED_RATIO:
+        near = min(library.twins, key=lambda other: abs(np.log(record.carrier_hz / library.twins[other].carrier_hz)))
+        raise InputError(
+            f"{path}: carrier_hz is {record.carrier_hz:.3g}, and those of --radar {name} know {twin.carrier_hz:.3g}, "
+            f"expected --radar {near} ({library.twins[near].carrier_hz:.3g}), or a twin of your own (--twins)"
+        )
+    return at_carrier(twin, record.carrier_hz)
+
+
 def import_(arguments: list[str]) -> None:
     """Turn one recording into signals, spectra, tiles and, with a label, a shard and its index."""
     given = _line("import", import_.__doc__).parse_args(arguments)
@@ -80,7 +100,7 @@ def predict(arguments: list[str]) -> None:
     from lowalt.tiles.settings import Images
 
     library, record, block = Library.read(given.twins), read_record(given.record), settings(given.recognition)
-    twin = at_carrier(_twin(library, given.radar), record.carrier_hz)
+    twin = _trained(library, given.radar, record, given.record)
     intervals = samples.signals(record, twin)
     images, count = rendered(intervals, twin, Images.from_settings(block["images"]), block["size"]), len(intervals)
     told = facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), "test")
