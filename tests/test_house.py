@@ -149,3 +149,21 @@ def test_no_tracked_file_is_large_or_names_this_machine():
     home = "/" + "work/"
     named = [path for path in files if path.suffix != ".png" and home in path.read_text(errors="replace")]
     assert not named
+
+
+CEILINGS = {
+    "commands": (11, 1110), "common": (42, 3460), "echo": (30, 3080), "measure": (9, 1170), "motion": (8, 670),
+    "noise": (5, 210), "recognition": (50, 5040), "recordings": (24, 3110), "report": (42, 2660), "scene": (83,
+    6920), "shards": (25, 2910), "spectra": (14, 810), "targets": (54, 7320), "tiles": (16, 1500), "workflow":
+    (16, 1930),
+}  # fmt: skip
+"""Most files and lines of each room. Only a commit of its own raises one, and its message says why."""
+
+
+def test_no_room_grows_beyond_its_ceiling():
+    files = {room: list((ROOT / "src/lowalt" / room).rglob("*.py")) for room in CEILINGS}
+    lines = {room: sum(len(path.read_text().splitlines()) for path in paths) for room, paths in files.items()}
+    grown = {room: (len(paths), lines[room]) for room, paths in files.items()
+             if len(paths) > CEILINGS[room][0] or lines[room] > CEILINGS[room][1]}  # fmt: skip
+    assert not grown
+    assert set(CEILINGS) == {path.name for path in (ROOT / "src/lowalt").iterdir() if any(path.glob("*.py"))}
