@@ -138,6 +138,13 @@ def craft(name: str, shown: list[np.ndarray]) -> list[tuple]:
         hubs[colour] = (low + high) / 2
         rows.append((name, f"{colour} rotor, diameter", 2 * radius, 2 * DOT / unit[0], "m"))
         rows.append((name, f"{colour} rotor, layers apart", gap, 2 * DOT * 1.5 / abs(base[3, 1]), "m"))
+    some = [found["red"][0] for found in seen[::9]]
+    told = {what.partition(",")[2].strip(): value for _, what, value, _, _ in rows if what.startswith("red")}
+    apart = told["layers apart"] if told["layers apart"] > 0.1 * told["diameter"] else 0.0
+    count, turn, left = blades(base, some, told["diameter"] / 2, apart)
+    rows.append((name, "red rotor, blades a layer", count, left, "1, pixels left"))
+    if apart:
+        rows.append((name, "red rotor, turn of the lower layer", turn, 0.01, "turns"))
     # Hubs of one height differ in x and y alone. Four or six of them stand about their middle.
     places = np.array(list(hubs.values()))
     spots = np.linalg.solve(plan, (places - places.mean(0)).T).T
@@ -148,6 +155,36 @@ def craft(name: str, shown: list[np.ndarray]) -> list[tuple]:
     body = np.concatenate([found["body"][0] for found in seen[::30]])
     rows.append((name, "body, height in the picture", np.ptp(body[:, 1]) / abs(base[3, 1]), np.nan, "m, at most"))
     return rows
+
+
+def blades(base: np.ndarray, seen: list[np.ndarray], radius: float, gap: float) -> tuple[int, float, float]:
+    """Return number of blades a layer, turn from the upper to the lower layer (turns), and mean pixels left.
+
+    seen: places (dots, 2) of one rotor's dots in some frames; radius, gap: m. Each frame is fitted by segments from the
+    hub, equal in all layers; more blades are taken only where they leave less than 0.6 of what fewer do.
+    """
+    everywhere = np.concatenate(seen)
+    hub, plan = (everywhere.min(0) + everywhere.max(0)) / 2, base[1:3].T
+    best = (0, 0.0, np.inf)
+    for count in (2, 3, 4, 5):
+        angles, left, turns = np.arange(0, 360 // count, 3), [], []
+        ends = radius * np.exp(1j * np.radians(angles[:, None] + 360 / count * np.arange(count)))
+        spokes = np.stack([ends.real, ends.imag], -1) @ plan.T
+        for places in seen:
+            off = []
+            for depth in (gap / 2, -gap / 2):
+                away = places - hub - base[3] * depth
+                along = np.clip((away[None, None] * spokes[:, :, None]).sum(3) / (spokes**2).sum(2)[..., None], 0, 1)
+                off.append(np.hypot(*np.moveaxis(away - along[..., None] * spokes[:, :, None], 3, 0)).min(1))
+            cost = np.minimum(off[0][:, None], off[1][None]).mean(2)
+            upper, lower = np.unravel_index(cost.argmin(), cost.shape)
+            left.append(cost.min())
+            turns.append((angles[lower] - angles[upper]) / 360 % (1 / count))
+        if np.mean(left) < 0.6 * best[2]:
+            # A turn is an angle: its mean is that of its phasors.
+            middle = np.angle(np.exp(2j * np.pi * count * np.array(turns)).mean()) / (2 * np.pi * count) % (1 / count)
+            best = (count, float(middle), float(np.mean(left)))
+    return best
 
 
 def circle(places: np.ndarray) -> float:
