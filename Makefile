@@ -152,7 +152,7 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs, an
 
 # The page of keys is made of the schema, and the picture of a sample by the command that it shows.
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
-	$(BIN)/python -m lowalt.common.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
+	$(BIN)/python -m lowalt.config.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
 	$(BIN)/lowalt sample 'DJI Mini 2' 0 --out site/sample && cp site/sample/*-axes.png docs/pictures/sample.png
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 

@@ -23,18 +23,18 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.config import canonical
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.network import Network
-from lowalt.common.streams import stream
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import canonical
+from lowalt.config.network import Network
 from lowalt.echo import echo_signal
 from lowalt.echo.fast import driver
 from lowalt.echo.rounding import nearest
 from lowalt.echo.scene import Rigid
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.measure import echo_cost as cost
 from lowalt.motion import poses, write_table
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.records import load_table
 

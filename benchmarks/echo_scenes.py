@@ -18,13 +18,13 @@ from unittest.mock import patch
 
 import numpy as np
 
-from lowalt.common.errors import BelowFloor
-from lowalt.common.files import replacing
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.common.streams import stream
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid, echo_signal, refine
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import BelowFloor
 from lowalt.measure.echo_baselines import judge
 from lowalt.measure.echo_cost import hardware
+from lowalt.numerics.streams import stream
 
 TOLERANCES = (1e-3, 1e-6, 1e-9)
 SYMBOLS = 48

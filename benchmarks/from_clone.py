@@ -28,8 +28,8 @@ import time
 from collections import defaultdict
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv, short, write_csv
-from lowalt.common.hardware import describe
+from lowalt.files.csv_tables import read_csv, short, write_csv
+from lowalt.machine.hardware import describe
 
 ROOT = Path(__file__).parents[1]
 COLUMNS = ("label", "part", "processes", "wall_s", "cpu_s", "percent", "hardware")

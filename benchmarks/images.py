@@ -26,9 +26,9 @@ import yaml
 from PIL import Image
 from zlib_ng import zlib_ng
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.hardware import describe
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.files.csv_tables import write_csv
+from lowalt.machine.hardware import describe
 from lowalt.shards.tar import Writer
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, Scale, encode, paint

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.streams import stream
+from lowalt.files.csv_tables import write_csv
+from lowalt.numerics.streams import stream
 from lowalt.recognition.intervals import model_weights, strict_difference
 
 COLUMNS = ("case", "seeds", "subtypes", "models", "trials", "held_percent", "plain_held_percent")

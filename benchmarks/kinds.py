@@ -21,11 +21,11 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.config import load
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.hardware import describe
-from lowalt.common.streams import stream
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.layers import load
+from lowalt.files.csv_tables import write_csv
+from lowalt.machine.hardware import describe
+from lowalt.numerics.streams import stream
 from lowalt.recognition.made import DatasetSamples
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import train

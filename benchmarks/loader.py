@@ -21,13 +21,13 @@ import yaml
 from PIL import Image
 from torch.utils.data import DataLoader, Dataset
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.hardware import describe
-from lowalt.common.network import Network
-from lowalt.common.splits import FOLDS
-from lowalt.common.streams import stream
+from lowalt.config.network import Network
+from lowalt.config.splits import FOLDS
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.machine.hardware import describe
 from lowalt.motion import read_table
+from lowalt.numerics.streams import stream
 from lowalt.recognition.order import batches, epoch_order
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet

@@ -16,7 +16,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from lowalt.common.csv_tables import write_csv
+from lowalt.files.csv_tables import write_csv
 
 ROOT = Path(__file__).resolve().parents[1]
 FAULTS = Path(__file__).with_suffix(".csv")

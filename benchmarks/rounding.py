@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.config import load
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.hardware import describe
-from lowalt.common.streams import stream
+from lowalt.config.layers import load
 from lowalt.echo import echo_signal
 from lowalt.echo.rounding import nearest
 from lowalt.echo.scene import Rigid, Target, target
+from lowalt.files.csv_tables import write_csv
+from lowalt.machine.hardware import describe
 from lowalt.motion import poses
+from lowalt.numerics.streams import stream
 from lowalt.shards.dataset import Dataset, Place
 
 COLUMNS = (

@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.config import load
-from lowalt.common.csv_tables import write_csv
+from lowalt.config.layers import load
+from lowalt.files.csv_tables import write_csv
 from lowalt.scene.explain import Finding, finding, samples, scene_of
 from lowalt.targets.records import records_of
 

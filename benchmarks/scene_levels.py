@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.config import load
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.common.streams import stream
+from lowalt.config.layers import load
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.files.csv_tables import write_csv
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.scene.catalogue import called
 from lowalt.scene.chain import received_signal
 from lowalt.scene.effects.channel import mean_cross_section

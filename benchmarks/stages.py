@@ -14,10 +14,10 @@ import json
 from collections import defaultdict
 from pathlib import Path
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
-from lowalt.common.hardware import describe
+from lowalt.files.atomic import existing
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.machine.hardware import describe
 from lowalt.shards.index import load
 from lowalt.shards.size import sample_bytes
 

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 from torch._subclasses.fake_tensor import FakeTensorMode
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import network
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.objective import descent

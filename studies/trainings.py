@@ -7,7 +7,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
-from lowalt.common.config import load
+from lowalt.config.layers import load
 from lowalt.recognition import runs, tables
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.methods import built

@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from lowalt.common import archives
-from lowalt.common.errors import InputError
+from lowalt.files import archives
+from lowalt.files.errors import InputError
 
 ARRAYS = {
     "points": np.arange(12.0).reshape(4, 3), "columns": np.asfortranarray(np.arange(6.0).reshape(2, 3)),

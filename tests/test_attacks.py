@@ -17,8 +17,8 @@ import torch
 import fuzzed_readers
 import fuzzing
 from fuzzed_seals import ARCHIVE, PNG, RECIPE
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
 from lowalt.shards import index, recipe
 from lowalt.targets.cloud import read as read_cloud

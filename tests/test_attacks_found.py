@@ -9,10 +9,10 @@ import torch
 
 from craft import craft
 from fuzzed_seals import ARCHIVE, PNG
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.atomic import existing
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import COLUMNS, read_table
 from lowalt.recognition import checkpoint, freeze, schemes
 from lowalt.recognition.one_sample import images_of

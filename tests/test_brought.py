@@ -11,8 +11,8 @@ import pytest
 import torch
 
 from lowalt.__main__ import main
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint, model_file, runs, samples, zoo
 from lowalt.recognition.__main__ import main as recognition
 from lowalt.shards import ShardSet, index

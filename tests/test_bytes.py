@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from emulation import EMULATED, able, run
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import manifest
 
 ROOT = Path(__file__).parent.parent
@@ -17,8 +17,8 @@ NAMES = [pytest.param(name, marks=pytest.mark.skipif(not able(name), reason=f"no
 PROBE = """
 import hashlib, json, sys
 import numpy as np
-from lowalt.common.config import load
-from lowalt.common.streams import stream
+from lowalt.config.layers import load
+from lowalt.numerics.streams import stream
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.noise.chunk import noisy_signals
 from lowalt.targets.make import make
@@ -83,7 +83,7 @@ def test_a_whole_small_data_set_is_that_of_another_processor(tmp_path):
 SCENE = """
 import sys
 import numpy as np
-from lowalt.common.config import load
+from lowalt.config.layers import load
 from lowalt.shards.dataset import Dataset
 found = []
 for scene in ("urban", "worst"):

@@ -12,7 +12,7 @@ CLOSE = 2e-7
 PROBE = """
 import sys
 import numpy as np
-from lowalt.common.config import load
+from lowalt.config.layers import load
 from lowalt.scene.catalogue import PLACES
 from lowalt.shards.dataset import Dataset
 from lowalt.targets.occluders import make

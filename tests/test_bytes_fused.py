@@ -17,8 +17,8 @@ llvm = pytest.importorskip("llvmlite.binding")
 
 # The stages whose stored values are not rounded afterwards from a bound, as the echo's are.
 MODULES = (
-    "common.exact.arithmetic", "common.exact.sines", "echo.rounding.nearest", "echo.rounding.sums", "motion.kernels",
-    "common.normals", "spectra.sliding", "tiles.filters", "tiles.huffman",
+    "numerics.exact.arithmetic", "numerics.exact.sines", "echo.rounding.nearest", "echo.rounding.sums",
+    "motion.kernels", "numerics.normals", "spectra.sliding", "tiles.filters", "tiles.huffman",
     "tiles.huffman_code", "tiles.pixels", "tiles.resample",
 )  # fmt: skip
 LOOSE = re.compile(
@@ -30,7 +30,7 @@ LINE, TABLE = "float32[::1]", "float32[:, ::1]"
 SIGNATURES = {
     ("motion.kernels", "_product"): "float64[:, ::1], float64[:, ::1], float64[:, ::1]",
     ("motion.kernels", "_sines"): "float64[::1], float64[::1], float64[::1]",
-    ("common.normals", "fill"): "uint64[::1], float64, float64[:, ::1], float64[:, ::1]",
+    ("numerics.normals", "fill"): "uint64[::1], float64, float64[:, ::1], float64[:, ::1]",
     ("spectra.sliding", "fourier_magnitudes"): f"{LINE}, {LINE}, int64, int64, {LINE}, {LINE}, {TABLE}",
     ("spectra.sliding", "transfer"): f"{LINE}, {LINE}, int64, {TABLE}, {TABLE}, {LINE}, {TABLE}",
     ("tiles.pixels", "index_image"): f"{TABLE}, boolean, int32, int32, int32[::1], int32[::1], uint8[:, ::1]",

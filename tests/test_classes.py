@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from chain import SNRS, TARGETS, WAVE, recognised, reported, simulated
-from lowalt.common import classes
-from lowalt.common.config import load
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import sha256
+from lowalt.config import classes
+from lowalt.config.layers import load
+from lowalt.files.atomic import sha256
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.report.page import PARTS
 from lowalt.targets.records import load_table, merge
 from pages import sound

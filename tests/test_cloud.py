@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check, read, write
 from lowalt.targets.validate import main as validate
 

@@ -7,13 +7,13 @@ import sys
 import pytest
 
 from forks import ended
-from lowalt.common.command import pick, refusal, run, settings
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256
+from lowalt.config.command import pick, refusal, run, settings
+from lowalt.files.atomic import existing, replacing, sha256
+from lowalt.files.errors import InputError
 from needed_options import assert_needed_options_are_named
 
 NEEDED = """
-common.config: --settings, --out
+config.layers: --settings, --out
 echo.__main__: --settings, --motion, --clouds, --station, --out
 scene.__main__: --settings, --motion, --clouds, --station, --out, --power
 measure.accuracy_cost: --settings, --predictions, --speeds, --index, --out

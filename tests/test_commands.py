@@ -15,9 +15,9 @@ from dataset import build, publish
 from lowalt import Dataset
 from lowalt.__main__ import main
 from lowalt.commands import workflow
-from lowalt.common.config import load, load_yaml, plain
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.shipped import located
+from lowalt.config.layers import load, load_yaml, plain
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.shipped import located
 from lowalt.recognition import one_sample, runs
 from lowalt.report.figures.sample import axes_of
 from lowalt.tiles.png import decode

@@ -12,8 +12,8 @@ import yaml
 from lowalt.__main__ import main
 from lowalt.commands import spectra, workflow
 from lowalt.commands.for_programs import as_json
-from lowalt.common.config import load, plain
-from lowalt.common.files import replacing
+from lowalt.config.layers import load, plain
+from lowalt.files.atomic import replacing
 from lowalt.report.figures import inspection, target
 from lowalt.scene.catalogue import PLACES
 from lowalt.tiles.render import Renderer

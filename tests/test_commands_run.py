@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from lowalt.commands import explain, target, workflow
-from lowalt.common.errors import InputError
-from lowalt.common.shipped import SHIPPED
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED
 
 
 def given(**changes):

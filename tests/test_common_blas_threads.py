@@ -7,7 +7,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from emulation import run
-from lowalt.common.blas_threads import one_blas_thread
+from lowalt.machine.blas_threads import one_blas_thread
 
 
 def counts() -> set[int]:
@@ -56,7 +56,7 @@ import hashlib, sys
 sys.path.insert(0, "tests/support")
 import numpy as np
 from scenes import target
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.scene.catalogue import called
 from lowalt.scene.chain import received_signal
 from lowalt.scene.observe import Scene

@@ -7,12 +7,12 @@ import sys
 
 import numpy as np
 
-from lowalt.common.memory import LINE, aligned
+from lowalt.machine.memory import LINE, aligned
 
 PROBE = """
 import resource, sys
 import numpy as np
-from lowalt.common.memory import keep_freed_arrays
+from lowalt.machine.memory import keep_freed_arrays
 
 def fetched():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt

@@ -6,8 +6,8 @@ import time
 
 import pytest
 
-from lowalt.common.files import replacing
-from lowalt.common.processes import lives, state
+from lowalt.files.atomic import replacing
+from lowalt.files.processes import lives, state
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ from functools import partial
 
 import pytest
 
-from lowalt.common.errors import InputError, SpaceError
-from lowalt.common.side_by_side import together
+from lowalt.files.errors import InputError, SpaceError
+from lowalt.machine.side_by_side import together
 
 
 def told(number, wait):

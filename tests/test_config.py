@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.common import yaml_files
-from lowalt.common.config import canonical, check, load, load_yaml, merge
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.plan import Plan
+from lowalt.config.layers import canonical, check, load, load_yaml, merge
+from lowalt.config.plan import Plan
+from lowalt.files import yaml_files
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.motion import COLUMNS
 from lowalt.report.stages import COLUMNS as STAGE_COLUMNS
 from lowalt.workflow.sources import PACKAGE, sources
@@ -152,7 +152,7 @@ def test_slugs_are_plain_and_distinct():
 
 def test_sources_follow_imports_and_leave_a_commands_own_choices_to_the_caller():
     clouds = set(sources("lowalt.targets"))
-    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/gait.py", PACKAGE / "common/errors.py"} <= clouds
+    assert {PACKAGE / "targets/__main__.py", PACKAGE / "targets/gait.py", PACKAGE / "files/errors.py"} <= clouds
     plain = set(sources("lowalt.recognition"))
     assert PACKAGE / "recognition/views.py" not in plain
     views = set(sources("lowalt.recognition", "lowalt.recognition.views"))

@@ -100,8 +100,8 @@ SPECTRUM_TRIAL = """
 import json, sys
 import numpy as np
 import torch
-from lowalt.common.config import load
-from lowalt.common.network import Network
+from lowalt.config.layers import load
+from lowalt.config.network import Network
 from lowalt.recognition.augment import augment
 from lowalt.recognition.schemes import columns_in, scheme
 from lowalt.spectra import Spectra, spectrum

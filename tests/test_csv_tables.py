@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.common.csv_tables import read_csv, short, write_csv
+from lowalt.files.csv_tables import read_csv, short, write_csv
 
 
 def test_a_table_has_these_bytes_and_is_read_back_as_text(tmp_path):

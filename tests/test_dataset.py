@@ -12,11 +12,11 @@ import pytest
 
 import lowalt
 from lowalt.__main__ import main as lowalt_command
-from lowalt.common.command import settings
-from lowalt.common.config import canonical, load
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.config.command import settings
+from lowalt.config.layers import canonical, load
 from lowalt.echo.__main__ import main as echo
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.motion.__main__ import main as motion
 from lowalt.noise.__main__ import main as noise
 from lowalt.shards import ShardSet, card

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import dataset as datasets
 from lowalt.shards.dataset import Dataset
 from lowalt.targets import occluders

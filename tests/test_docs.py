@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.common import schema_page
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config import schema_page
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.scene.catalogue import PLACES
 
 ROOT = Path(__file__).parent.parent
@@ -78,8 +78,9 @@ def test_every_module_and_its_options_exist(page, command):
     path = ROOT / "src" / words[0].replace(".", "/")
     source = path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__main__.py"
     assert source.is_file(), f"{page}: {command}"
-    # A command may take its options from functions of its room, or of the ground floor.
-    rooms = (source, *source.parent.glob("*.py"), *(ROOT / "src/lowalt/common").glob("*.py"))
+    # A command may take its options from functions of its room, or of the rooms that know no stage.
+    ground = [file for room in ("files", "config") for file in (ROOT / "src/lowalt" / room).glob("*.py")]
+    rooms = (source, *source.parent.glob("*.py"), *ground)
     known = "\n".join(file.read_text() for file in rooms)
     missing = [word for word in words if word.startswith("--") and word != "--help" and f'"{word}"' not in known]
     assert not missing, f"{page}: {command}"

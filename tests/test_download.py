@@ -4,7 +4,7 @@ import hashlib
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets import download
 from real_inputs import FOLDER, needs_inputs
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_matrix, echo_signal
 from lowalt.echo.scene import target
 
@@ -161,8 +161,8 @@ def test_the_command_s_memory_grows_by_its_output_alone():
 
 
 def test_settings_that_are_missing_are_named(tmp_path):
-    from lowalt.common.errors import InputError
     from lowalt.echo.__main__ import main
+    from lowalt.files.errors import InputError
 
     with pytest.raises(InputError, match=r"missing \['network', 'tolerance'\]"):
         main(["--settings", "{}", "--motion", "x", "--clouds", "y", "--station", "A", "--out", str(tmp_path / "o.npy")])
@@ -179,7 +179,7 @@ BAD = {
 
 @pytest.mark.parametrize("case", BAD)
 def test_bad_positions_are_named(case):
-    from lowalt.common.errors import InputError
+    from lowalt.files.errors import InputError
 
     value, message = BAD[case]
     net = network()
@@ -188,7 +188,7 @@ def test_bad_positions_are_named(case):
 
 
 def test_other_bad_arguments_are_named():
-    from lowalt.common.errors import InputError
+    from lowalt.files.errors import InputError
 
     net = network()
     good = np.full((2, 3, 3), 40.0)

@@ -5,11 +5,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Station
+from lowalt.config.network import Station
 from lowalt.echo import Path, Rigid, echo_matrix, echo_signal, echo_signals, method_text, scene
 from lowalt.echo.api import EchoResult
 from lowalt.echo.refine import Method
+from lowalt.files.errors import InputError
 from test_echo import network
 
 NET = network(symbols=2)

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Path, Rigid, echo_signal
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE, cell_polynomials
 from lowalt.echo.fast.polynomials import CELL_REACH
 from lowalt.echo.fast.strongest_cell import far_limit, far_moments
+from lowalt.files.errors import InputError
 from test_echo import cloud_in_motion, network, relative
 
 

@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
 from lowalt.echo import Path, Rigid, api, echo_matrix, echo_signal
 from lowalt.echo.scene import EchoScene, Target, _float, check, target
+from lowalt.files.errors import InputError
 from small_echo import NETWORK, pieces
 
 SEEN = NETWORK.stations[0]

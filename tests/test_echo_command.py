@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from craft import NETWORK, craft, row
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.echo import echo_signal, echo_signals
 from lowalt.echo.__main__ import main
 from lowalt.echo.scene import Rigid, target
+from lowalt.files.errors import InputError
 from lowalt.measure import echo_baselines
 from lowalt.measure.echo_cost import COLUMNS, rows_of, sample
 from lowalt.motion import poses, positions, write_table

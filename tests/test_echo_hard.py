@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import reference
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import BelowFloor
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import Path, echo_signal
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import BelowFloor
 from lowalt.measure.hard_cases import CASES, COLUMNS, away, cluster, judged, main, naive, network
 
 C = SPEED_OF_LIGHT

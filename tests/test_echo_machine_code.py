@@ -9,9 +9,9 @@ import pytest
 
 import lowalt
 from forks import printed
-from lowalt.common.jit import INNER, LEAN, _DigestCache, digest
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.sums import matrix
+from lowalt.machine.jit import INNER, LEAN, _DigestCache, digest
 
 PROGRAM = """
 import sys
@@ -25,7 +25,7 @@ path.write_text(kept.replace(text, other))
 # Bytecode is not kept: two edits of equal length within a second would look alike.
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(package).parent))
-from lowalt.common.jit import digest
+from lowalt.machine.jit import digest
 from lowalt.echo.fast.driver import run
 from lowalt.echo.pointwise.sums import matrix
 path.write_text(kept)
@@ -93,7 +93,7 @@ def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):
     pair = "from typing import NamedTuple\nclass Pair(NamedTuple):\n    a: float\n    b: float\n"
     (tmp_path / "one.py").write_text(pair)
     (tmp_path / "use.py").write_text(
-        "from lowalt.common.jit import LEAN\n@LEAN\ndef total(pair):\n    return pair.a + pair.b\n"
+        "from lowalt.machine.jit import LEAN\n@LEAN\ndef total(pair):\n    return pair.a + pair.b\n"
     )
     program = "import sys, use; print(use.total(getattr(__import__(sys.argv[1]), 'Pair')(1.0, 2.0)))"
     paths = f"{tmp_path}:{Path(lowalt.__file__).parents[1]}"
@@ -106,7 +106,7 @@ def test_kept_code_for_a_type_that_has_moved_is_compiled_anew(tmp_path):
 
 PRODUCTS = """
 import numpy as np
-from lowalt.common.jit import LEAN, VECTOR
+from lowalt.machine.jit import LEAN, VECTOR
 
 
 def loop(a, b, out):
@@ -140,7 +140,7 @@ CALLED = """
 import platform
 import numpy as np
 from numba.core.registry import cpu_target
-from lowalt.common.jit import INNER, LEAN, PLAIN, VECTOR, _DigestCache
+from lowalt.machine.jit import INNER, LEAN, PLAIN, VECTOR, _DigestCache
 
 _DigestCache.load_overload = lambda *_arguments: None
 

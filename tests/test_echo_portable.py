@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from craft import NETWORK, craft, row
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud

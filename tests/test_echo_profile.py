@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import reference
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_matrix, echo_signal, range_profile
+from lowalt.files.errors import InputError
 from test_echo import cloud_in_motion, network, positions, relative
 
 WIDE = {"subcarrier_spacing_hz": 480e3, "subcarriers": 1024}

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import reference
-from lowalt.common.exact import sines
-from lowalt.common.jit import LEAN
 from lowalt.echo import api, echo_signal, refine
 from lowalt.echo.fast.workspace import Found
 from lowalt.echo.rounding import double, nearest, sums
+from lowalt.machine.jit import LEAN
+from lowalt.numerics.exact import sines
 from test_echo import cloud_in_motion, network
 from test_echo_hard import CASES
 

@@ -44,8 +44,8 @@ def test_the_judge_agrees_with_fifty_digits():
 
 
 def test_a_tolerance_must_be_a_fraction():
-    from lowalt.common.errors import InputError
     from lowalt.echo import echo_signal
+    from lowalt.files.errors import InputError
 
     network, station, motion, rcs, aim = echo_scenes.scene(7, 0)
     for wrong in (0.0, -1e-3, 1.0, float("nan"), "fine"):

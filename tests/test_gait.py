@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import cloud as clouds
 from lowalt.targets import gait, gait_walk
 from lowalt.targets.make import make

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from lowalt.common import hardware
+from lowalt.machine import hardware
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from lowalt.common.splits import FOLDS, fold
+from lowalt.config.splits import FOLDS, fold
 from lowalt.noise.chunk import noisy_signals
 from lowalt.recognition import statistics, tables
 from lowalt.recognition.evaluated import Evaluated

@@ -9,10 +9,10 @@ import pytest
 
 from configured import ROOT, SCHEMA
 from dataset import build
-from lowalt.common.config import load, merge
-from lowalt.common.plan import Plan
-from lowalt.common.streams import digest
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import load, merge
+from lowalt.config.plan import Plan
+from lowalt.files.yaml_files import load_yaml
+from lowalt.numerics.streams import digest
 from lowalt.shards import ShardSet, index
 from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import echo_signal
 from lowalt.echo.scene import Rigid
+from lowalt.files.yaml_files import load_yaml
 from lowalt.measure import echo_baselines, fifty_digits, hard_cases
 
 ROOT = Path(__file__).parent.parent

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from craft import NETWORK, craft
-from lowalt.common.config import load
-from lowalt.common.errors import BelowFloor
-from lowalt.common.network import Network
+from lowalt.config.layers import load
+from lowalt.config.network import Network
+from lowalt.files.errors import BelowFloor
 from lowalt.measure import echo_cost, scale
 from lowalt.recognition.schemes import named
 

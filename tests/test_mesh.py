@@ -9,7 +9,7 @@ import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputWarning
+from lowalt.files.errors import InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from meshes import TABLE, box, car_record, made, plain, quad_record

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import read_mesh
 from meshes import made, plain, quad_record
 

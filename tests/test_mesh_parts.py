@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from lowalt.common.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets.make import make
 from lowalt.targets.records import merge
 from meshes import TABLE, box, car_record, made, quad_record

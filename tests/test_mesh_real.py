@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets import mesh
 from lowalt.targets.records import read_records
 from meshes import TABLE, made, plain

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.mesh_files import read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import pieces
 from real_inputs import FOLDER

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_motion import FROM_FILE, nodes_m, posed
 from lowalt.targets.skeleton import NODES

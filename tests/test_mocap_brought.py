@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets import mocap
 from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import SMPL, moved, read_bvh, to_nodes

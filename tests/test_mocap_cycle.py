@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.gallery import caption
 from lowalt.targets.mocap_cycle import closed, find_cycle
 from lowalt.targets.mocap_files import read_skeleton

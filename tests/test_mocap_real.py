@@ -2,7 +2,7 @@
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.skeleton import NODES
 from real_inputs import FOLDER, needs_inputs
 from walkers import cloud_of

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.motion import poses, positions
 from lowalt.motion.rotations import attitude, rodrigues, turns
 from lowalt.targets.cloud import Cloud

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from builtin_records import CONFIG, TABLE
-from lowalt.common.classes import AIRBORNE
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.config.classes import AIRBORNE
+from lowalt.files.errors import InputError
 from lowalt.motion import positions, read_table, write_table
 from lowalt.motion.rotations import attitude
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
+from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import load_records

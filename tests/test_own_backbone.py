@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import network, own_backbone
 
 GOOD = """

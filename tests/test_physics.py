@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.common.config import load_yaml
-from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.common.streams import stream
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.echo import Rigid, echo_signal
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import NUMBERS
+from lowalt.numerics.streams import stream
 from lowalt.spectra import Spectra, trp, vrp
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make

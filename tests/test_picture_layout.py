@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from lowalt.common.picture_layout import DIGITS, settle
+from lowalt.numerics.picture_layout import DIGITS, settle
 
 SHIFT = 1e-13
 """A thousand times the difference between the solver's answers in two processes."""

@@ -6,11 +6,11 @@ import mpmath
 import numpy as np
 import pytest
 
-from lowalt.common import portable, streams
-from lowalt.common.draws import Draws
-from lowalt.common.errors import InputError
-from lowalt.common.matrices import nearest_rotations, thinnest
-from lowalt.common.raw_words import FEWEST, words
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable, streams
+from lowalt.numerics.draws import Draws
+from lowalt.numerics.matrices import nearest_rotations, thinnest
+from lowalt.numerics.raw_words import FEWEST, words
 
 RNG = np.random.default_rng(5)
 WIDE = RNG.uniform(-1e5, 1e5, 300)

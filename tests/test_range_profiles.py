@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import pytest
 
-from lowalt.common.config import canonical
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.config.layers import canonical
 from lowalt.echo import Rigid, range_profile
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.motion import poses, write_table
 from lowalt.noise.profile import noisy_profile
 from lowalt.shards.build import rows_of

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import fusion as fusion_of
 from lowalt.recognition import network, schemes
 

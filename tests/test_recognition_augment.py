@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition.augment import KEYS, augment
 
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition import freeze, order, protocols, samples, schemes, score
 from made_predictions import SNRS, SUBTYPES, facts
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
 from lowalt.motion import positions
+from lowalt.numerics.streams import stream
 from lowalt.recognition import distances
 from lowalt.recognition.distances import cycle_s, energy_distance, form, swept
 from moving_clouds import rigid_cloud, row

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import runs
 from trainings import sources
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import augment, checkpoint, inference, predictions, recipe, runs, statistics, tables
 from lowalt.recognition import training as loop
 from lowalt.recognition.evaluated import Evaluated

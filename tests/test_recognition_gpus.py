@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
 
 SHOW = "import os, sys, time; print(os.environ.get('CUDA_VISIBLE_DEVICES')); sys.stdout.flush(); time.sleep({})"

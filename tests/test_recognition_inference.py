@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import inference
 from lowalt.recognition.inference import Machine, probabilities
 from lowalt.recognition.matrix_products import MatrixProduct

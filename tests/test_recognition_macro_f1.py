@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import schemes, tables
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.macro_f1 import f1_by_snr, macro_f1

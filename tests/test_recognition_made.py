@@ -10,8 +10,8 @@ import torch
 import yaml
 
 from configured import Inputs, parts
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.errors import InputError
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, samples, schemes
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.inference import Machine

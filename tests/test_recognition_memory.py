@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import inference, network, objective, recipe, runs
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.reader import Reader

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import predictions
 from lowalt.recognition.samples import Facts
 

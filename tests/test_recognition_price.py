@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.measure import accuracy_cost, network_speed
 from lowalt.recognition import predictions, samples, schemes, statistics
 from lowalt.recognition.evaluated import Evaluated
@@ -176,7 +176,7 @@ def test_a_network_is_timed_on_images_of_all_values():
 
 
 def test_the_least_time_is_the_least_and_warm_up_is_not_counted():
-    from lowalt.common.timing import least_s
+    from lowalt.machine.timing import least_s
 
     now, spans = [0.0], itertools.chain([9.0, 3.0, 2.0, 4.0], itertools.repeat(5.0))
 

@@ -9,7 +9,7 @@ import sys
 import pytest
 import torch
 
-from lowalt.common.config import load_yaml
+from lowalt.config.layers import load_yaml
 from lowalt.recognition import checkpoint, predictions, schemes
 from lowalt.recognition.__main__ import main
 from trainings import SETTINGS, with_training

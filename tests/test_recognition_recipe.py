@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import recipe
 from trainings import TRAINING
 

@@ -10,8 +10,8 @@ import time
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, recipe, runs, schemes
 from lowalt.recognition.__main__ import main
 from trainings import SCHEME, TRAINING, Killed, equal, kill_at, sources, train, with_training

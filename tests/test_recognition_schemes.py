@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import schemes
 
 ROW = {"scheme": "x", "stations": "A", "spectra": "VT", "fusion": "attention", "backbone": "", "protocols": "seen"}

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from dataset import RENDER, SNRS, build
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, network, one_sample, predictions, runs, samples, schemes, score, views
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.protocols import folds

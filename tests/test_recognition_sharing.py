@@ -13,7 +13,7 @@ import yaml
 from safetensors import safe_open
 
 from lowalt.__main__ import main
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, eight_bits, model_file, one_sample, runs, upload, zoo
 from lowalt.recognition.export import export
 from made_predictions import facts

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import orderings, predictions, protocols, schemes, tables
 from lowalt.recognition.__main__ import main
 from lowalt.recognition.evaluated import Evaluated

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe, runs
 from trainings import SCHEME, SETTINGS, TRAINING, equal, sources, train, with_training
 

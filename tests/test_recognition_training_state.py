@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import checkpoint, inference, recipe
 from lowalt.recognition import training as loop
 from lowalt.recognition.statistics import cross_entropy

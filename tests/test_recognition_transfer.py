@@ -6,8 +6,8 @@ import json
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, samples, transfer
 from lowalt.recognition.evaluated import Evaluated
 

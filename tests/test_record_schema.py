@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets import bird, builtin_record, document, record_schema, uav, vehicle
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import ALL_AXES, SIZES

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat, wavfile
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recordings import coherent_intervals, read, read_record, symbol_rate
 from lowalt.recordings.channel import analytic
 from lowalt.recordings.record import record

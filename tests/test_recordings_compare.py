@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.io import wavfile
 
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.compare import DISTANCES, distances
 from lowalt.recordings.figures import INTERVAL
 from lowalt.recordings.library import Library

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from scipy.io import savemat, wavfile
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recordings import read, read_record
 from lowalt.recordings.record import record
 

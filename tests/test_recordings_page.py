@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 from scipy.io import wavfile
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import download, read_record
 from lowalt.recordings.library import Library
 from lowalt.recordings.samples import spectra, write

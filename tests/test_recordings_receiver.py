@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recordings import ablate, kinds, reality
 from lowalt.recordings.library import Library
 from lowalt.recordings.presence import ENOUGH, noise_floor, present

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings import figures, kinds
 from lowalt.recordings.courses import hover, straight, to_and_fro
 from lowalt.recordings.library import Library

@@ -8,8 +8,8 @@ import pytest
 import yaml
 from scipy.io import wavfile
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.recordings.__main__ import main
 from lowalt.recordings.library import Library
 from lowalt.recordings.sets import measured_intervals, recordings, usable

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.targets.records import load_records, load_table, missing_inputs, read_records, source_files
 
 CONFIG = Path(__file__).parents[1] / "config"

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lowalt.common.config import load
-from lowalt.common.errors import InputError
+from lowalt.config.layers import load
+from lowalt.files.errors import InputError
 from lowalt.targets.records import records_of, with_row
 from lowalt.workflow.run import Run
 

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.config import load
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
+from lowalt.config.layers import load
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.measure.scale import estimate, training_hours
 from lowalt.measure.scale import main as write_estimates
 from lowalt.recognition.predictions import Predictions

@@ -9,8 +9,8 @@ import pytest
 
 from chain import SPECTRA, WAVE
 from craft import craft
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.measure.echo_cost import COLUMNS as MEASURED
 from lowalt.measure.echo_pixels import changes, main, pixels, saved, signals
 from lowalt.report.figures import cost_plots
@@ -96,7 +96,7 @@ def test_motion_models_are_different_samples_whose_changes_add_up_and_whose_larg
 
 
 def test_a_tolerance_below_the_floor_keeps_the_exact_signal(cloud):
-    from lowalt.common.network import Network
+    from lowalt.config.network import Network
     from lowalt.measure.echo_cost import sample
 
     network = Network.from_settings(NETWORK)

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from dataset import build
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.report.figures import cover
 from lowalt.report.figures.tiles import _picture, example_tiles
 from lowalt.shards import ShardSet

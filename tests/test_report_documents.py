@@ -2,7 +2,7 @@
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.report.documents import fill, main
 
 ACCURACY = """protocol,scheme,snr_db,accuracy_percent,samples,hardware

@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from lowalt.common.csv_tables import read_csv
+from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures import accuracy_plots, cost_plots
 from lowalt.report.page import assembled
 from lowalt.report.plots import Plot, plotted, svg, whole, write_plots

@@ -7,8 +7,8 @@ import subprocess
 import pytest
 import yaml
 
-from lowalt.common.config import canonical, check, load, merge
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import canonical, check, load, merge
+from lowalt.files.yaml_files import load_yaml
 from lowalt.report import provenance
 
 SCHEMA, BASE = "workflow/schemas/config.schema.yaml", "config/default.yaml"

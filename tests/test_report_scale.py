@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.csv_tables import read_csv, write_csv
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import FILES, Inputs
 from lowalt.report.page import assembled, rendered
 from lowalt.report.sections import accuracy, confusion, orderings, subtypes

@@ -8,7 +8,7 @@ import trimesh
 import yaml
 
 from lowalt.__main__ import main
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.robot_files import read_robot
 from lowalt.targets.robots import Joint, parts_of

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.sampling import face_normals, sample_surface, thin
 
 SEEDS = st.integers(0, 2**32 - 1)

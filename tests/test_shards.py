@@ -12,8 +12,8 @@ import webdataset
 from PIL import Image
 
 from dataset import SEED, SNRS, SPLIT, TARGETS, build, motion_rows, write_settings
-from lowalt.common.errors import InputError
-from lowalt.common.splits import fold
+from lowalt.config.splits import fold
+from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main

@@ -9,8 +9,8 @@ import pytest
 import yaml
 
 from dataset import RENDER, SEED, SNRS, SPLIT, build, motion_rows
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, card
 from lowalt.shards.card import main, readme, write_samples
 from lowalt.shards.croissant import metadata

@@ -8,8 +8,8 @@ import pytest
 import yaml
 
 from dataset import SEED, SNRS, build
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.noise.chunk import noisy_signals
 from lowalt.recognition.views import ShardSamples, cache_shard, facts_of
 from lowalt.shards import ShardSet, clean

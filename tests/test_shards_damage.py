@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dataset import build, publish
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, faults, verify
 from lowalt.shards.__main__ import main
 from lowalt.shards.table import map_samples

@@ -2,7 +2,7 @@
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import manifest
 
 SUM = "0123456789abcdef" * 4

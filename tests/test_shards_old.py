@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition.views import cache_shard, facts_of
 from lowalt.shards import ShardSet, card
 from lowalt.shards.__main__ import main

@@ -8,8 +8,8 @@ import yaml
 
 from dataset import build, publish
 from lowalt.__main__ import main as lowalt
-from lowalt.common.config import load
-from lowalt.common.errors import InputError
+from lowalt.config.layers import load
+from lowalt.files.errors import InputError
 from lowalt.shards import recipe
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset

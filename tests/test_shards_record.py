@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import pytest
 
 from dataset import SEED, motion_rows
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.shards.record import geometry, record, row_of, sample_key, snr_label
 from lowalt.shards.tar import Writer
 from pictures import NETWORK

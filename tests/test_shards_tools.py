@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from dataset import build
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, upload
 from lowalt.shards.card import main as card
 from lowalt.shards.hub import size_category

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dataset import build, publish
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition.freeze import freeze
 from lowalt.shards import faults
 from lowalt.shards.__main__ import main

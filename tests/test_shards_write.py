@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from dataset import RENDER, motion_rows, pack
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet
 from lowalt.shards.hub import configs, patterns
 from lowalt.shards.index import build

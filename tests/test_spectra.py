@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import reference_spectra as reference
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
 from lowalt.spectra import NAMES, Fourier, Spectra, Transfer, magnitudes, spectrum, trp, vrp, vt, windows, zero_index
 from lowalt.spectra.sliding import fourier_magnitudes, transfer, turns
 

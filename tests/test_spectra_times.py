@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.files.errors import InputError
 from lowalt.spectra import Fourier, Spectra, Transfer, spectrum
 from lowalt.tiles import Images, Renderer, join
 from lowalt.tiles.render import normalised

@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from lowalt.common.config import canonical
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.layers import canonical
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.scene.catalogue import called
 from lowalt.scene.checks import check

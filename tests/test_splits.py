@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lowalt.common.errors import InputError
-from lowalt.common.splits import fold
-from lowalt.common.streams import digest, stream
+from lowalt.config.splits import fold
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import digest, stream
 
 SPLIT = {"by": "motion", "train": 8, "val": 1, "test": 1}
 

@@ -5,10 +5,10 @@ import pytest
 import yaml
 
 from chain import SIZE, SNRS, WAVE, recognised, reported, simulated
-from lowalt.common.config import load, merge
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, station_names
+from lowalt.config.layers import load, merge
+from lowalt.config.network import Network, station_names
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition import schemes
 
 NAMES = ("west", "A", "east", "B2", "north")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import intervals, statistics
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))

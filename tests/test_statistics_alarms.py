@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import statistics
 
 

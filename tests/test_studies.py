@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.common.config import load
+from lowalt.config.layers import load
 
 ROOT = Path(__file__).parent.parent
 # As `studies/study.mk` sets it, and the sources of this checkout.

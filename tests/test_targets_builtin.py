@@ -11,8 +11,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from builtin_records import BIRDS, CARS, NAMES, RECORDS, TABLE, UAVS, WRITTEN
-from lowalt.common.files import slug
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.atomic import slug
+from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import bird
 from lowalt.targets.assemble import turn
 from lowalt.targets.builtin import builtin_cloud

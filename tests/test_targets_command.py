@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from lowalt.common.files import slug
+from lowalt.files.atomic import slug
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.cloud import read, write
 from lowalt.targets.gallery import main as gallery

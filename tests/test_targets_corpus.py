@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from awkward import CASES, HUBS, written
-from lowalt.common.config import canonical, load
+from lowalt.config.layers import canonical, load
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of

@@ -10,7 +10,7 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
-from lowalt.common.errors import InputWarning
+from lowalt.files.errors import InputWarning
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.inspection import inspect_mesh
 from meshes import box

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lowalt.common import portable
-from lowalt.common.config import load
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.streams import stream
+from lowalt.config.layers import load
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw
+from lowalt.numerics import portable
+from lowalt.numerics.streams import stream
 from lowalt.report.figures.motion_strip import motion_strip, view_of
 from lowalt.report.figures.target import target_animation
 from lowalt.targets import cyclist, quadruped

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from builtin_records import RECORDS
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets import occluders
 from lowalt.targets.builtin_record import MODULES
 from lowalt.targets.skeleton import NODES, PARENTS

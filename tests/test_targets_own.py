@@ -10,7 +10,7 @@ import yaml
 from PIL import Image
 
 from lowalt.__main__ import main
-from lowalt.common.errors import InputWarning
+from lowalt.files.errors import InputWarning
 from lowalt.report.figures.target import target_animation
 from lowalt.targets.cloud import read
 from lowalt.targets.guesses import clusters, guessed_axes, guessed_unit

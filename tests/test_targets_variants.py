@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from builtin_records import NAMES, RECORDS, TABLE, WRITTEN
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.assemble import allot
 from lowalt.targets.builtin import builtin_cloud
 from lowalt.targets.builtin_record import MODULES

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import reference_spectra as reference
-from lowalt.common.command import settings as read_settings
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.command import settings as read_settings
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.spectra import Fourier, Spectra, Transfer, trp, vrp, vt
 from lowalt.tiles import (
     Images,

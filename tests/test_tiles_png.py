@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.tiles import colour_map, decode, encode, paint
 from lowalt.tiles.filters import apply_paeth, undo
 from lowalt.tiles.huffman import MATCH_BITS, MATCH_EXTRA, MATCH_SYMBOL, zlib_compress

@@ -8,11 +8,11 @@ import time
 
 import pytest
 
-from lowalt.common import turns
-from lowalt.common.turns import Turn
+from lowalt.machine import turns
+from lowalt.machine.turns import Turn
 
 KERNEL = """
-from lowalt.common.jit import PLAIN
+from lowalt.machine.jit import PLAIN
 
 @PLAIN
 def twice(x):
@@ -49,7 +49,7 @@ def test_a_kernel_waits_for_the_process_that_compiles_it(tmp_path):
 
 
 def test_the_turn_of_a_killed_process_is_free_and_an_endless_one_is_not_waited_for(tmp_path):
-    take = "import sys, time; from pathlib import Path; from lowalt.common.turns import Turn;"
+    take = "import sys, time; from pathlib import Path; from lowalt.machine.turns import Turn;"
     take += f"Turn(Path({str(tmp_path / 'a.lock')!r})).take(); print('taken', flush=True); time.sleep(60)"
     holder = start(tmp_path, take)
     assert holder.stdout.readline().strip() == "taken"

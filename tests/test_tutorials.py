@@ -16,7 +16,7 @@ import pytest
 
 from dataset import build, publish
 from lowalt.__main__ import main
-from lowalt.common.config import load
+from lowalt.config.layers import load
 
 ROOT = Path(__file__).parent.parent
 FOLDER = ROOT / "docs/tutorials"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from lowalt.common.shipped import SHIPPED, located, shipped
+from lowalt.files.shipped import SHIPPED, located, shipped
 
 ROOT = Path(__file__).parents[1]
 BUILD = "from setuptools import build_meta; print(build_meta.build_{kind}({out!r}))"

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 import yaml
 
-from lowalt.common.config import load_yaml
-from lowalt.common.files import slug
-from lowalt.common.network import Network
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import Network
 from lowalt.echo import Rigid, echo_signal
+from lowalt.files.atomic import slug
 from lowalt.motion import poses, read_table
 from lowalt.targets.cloud import read
 from snakemake_runs import run
@@ -204,7 +204,7 @@ def test_declared_code_holds_every_module_the_jobs_really_imported(finished):
     assert set(seen) == set(RULES.values()) - {"gallery"}
     for rule, imported in seen.items():
         assert imported <= declared(rule), rule
-        assert "common/errors.py" in imported
+        assert "files/errors.py" in imported
 
 
 def test_any_one_sample_is_made_again_alone_from_its_row(finished):

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from lowalt.common import progress
+from lowalt.machine import progress
 from lowalt.workflow.board import Board, Job, pace, span
 
 

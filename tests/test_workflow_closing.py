@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from lowalt.common.config import merge
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import merge
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import closing
 from test_workflow_display import handler_of, record
 

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from lowalt.common.shipped import SHIPPED, as_named, located
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.shipped import SHIPPED, as_named, located
+from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import code, sources
 

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
+from lowalt.config.layers import load_yaml
+from lowalt.files.errors import InputError
 from lowalt.workflow import kernels
 
 ROOT = Path(__file__).parent.parent

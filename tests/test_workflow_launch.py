@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from configured import run_of
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition import nodes
 from lowalt.workflow.launch import Launch
 

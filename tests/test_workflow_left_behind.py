@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.workflow import locks
 
 

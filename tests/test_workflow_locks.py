@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import snakemake_runs
-from lowalt.common.processes import started
+from lowalt.files.processes import started
 from lowalt.workflow import locks
 from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refusal, take, take_over
 

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import pytest
 
 from configured import Inputs, parts, run_of
-from lowalt.common.config import merge
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.config.layers import merge
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.workflow import options
 from lowalt.workflow.products import Products
 from lowalt.workflow.settings import Settings

@@ -11,8 +11,8 @@ import pytest
 import yaml
 
 from configured import parts, run_of
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import options
 from lowalt.workflow.products import FIDELITY
 
@@ -112,7 +112,7 @@ def test_stages_before_the_first_training_do_without_torch():
     """In a process of its own: torch is not to be found there, as while `make` is still fetching it."""
     stages = ["targets", "targets.gallery", "motion", "echo", "noise", "tiles", "shards", "shards.card", "recognition"]
     stages += ["recognition.views", "recognition.freeze", "recognition.distances", "measure.echo_cost"]
-    stages += ["measure.echo_pixels", "report.figures.echo_cost", "common.config", "workflow.run"]
+    stages += ["measure.echo_pixels", "report.figures.echo_cost", "config.layers", "workflow.run"]
     program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
     program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}

@@ -9,8 +9,8 @@ import yaml
 
 import snakemake_runs
 from configured import run_of
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
+from lowalt.config.layers import load_yaml
+from lowalt.files.errors import InputError
 from lowalt.workflow import refusals
 
 

@@ -8,8 +8,8 @@ from types import SimpleNamespace
 import pytest
 
 from configured import parts
-from lowalt.common.config import plain
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import plain
+from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
 from lowalt.workflow.settings import Settings

@@ -5,50 +5,52 @@ import pytest
 from lowalt.workflow import sources
 
 LINES = '''
-import lowalt.common.errors
+import lowalt.files.errors
 if True:
-    from lowalt.common import slug_is_none, files
+    from lowalt.files import slug_is_none, atomic
 elif False:
-    import os, lowalt.common.plan
+    import os, lowalt.config.plan
 else:
-    from lowalt.common.streams import stream
+    from lowalt.numerics.streams import stream
 for _ in ():
-    import lowalt.common.splits
+    import lowalt.config.splits
 else:
-    import lowalt.common.turns
+    import lowalt.machine.turns
 try:
-    import lowalt.common.network
+    import lowalt.config.network
 except ImportError:
-    import lowalt.common.classes
+    import lowalt.config.classes
 else:
-    import lowalt.common.timing
+    import lowalt.machine.timing
 finally:
-    import lowalt.common.memory
+    import lowalt.machine.memory
 with open("x"):
-    import lowalt.common.config
+    import lowalt.config.layers
 match 1:
     case 1:
-        import lowalt.common.progress
+        import lowalt.machine.progress
 class Held:
     def method(self):
         while True:
-            import lowalt.common.shipped
+            import lowalt.files.shipped
 async def later():
-    import lowalt.common.portable
+    import lowalt.numerics.portable
 from . import nothing
 import lowalt_other.common, numpy
 '''  # fmt: skip
-FOUND = ["errors", "files", "plan", "streams", "splits", "turns", "network", "classes", "timing", "memory", "config",
-         "progress", "shipped", "portable"]  # fmt: skip
+FOUND = {
+    "files": ["errors", "atomic", "shipped"], "numerics": ["streams", "portable"],
+    "machine": ["turns", "timing", "memory", "progress"], "config": ["plan", "splits", "network", "classes", "layers"],
+}  # fmt: skip
 
 
 def test_imports_count_in_every_kind_of_block_and_in_a_command_only_at_its_top(tmp_path):
     for name in ("module.py", "__main__.py"):
         (tmp_path / name).write_text(LINES)
-    found = [name for name in sources._imports(tmp_path / "module.py") if name != "lowalt.common"]
-    assert sorted(found) == sorted(f"lowalt.common.{name}" for name in FOUND)
-    assert [name for name in sources._imports(tmp_path / "__main__.py") if name != "lowalt.common"] == [
-        "lowalt.common.errors"
+    found = [name for name in sources._imports(tmp_path / "module.py") if name.count(".") == 2]
+    assert sorted(found) == sorted(f"lowalt.{room}.{name}" for room, names in FOUND.items() for name in names)
+    assert [name for name in sources._imports(tmp_path / "__main__.py") if name.count(".") == 2] == [
+        "lowalt.files.errors"
     ]
 
 
@@ -56,7 +58,7 @@ def test_files_of_a_module_are_its_own_its_packages_and_all_they_import_sorted()
     found = sources.sources("lowalt.noise")
     names = [str(path.relative_to(sources.ROOT)) for path in found]
     own = {f"lowalt/{name}.py" for name in ("__init__", "noise/__init__", "noise/__main__", "noise/awgn")}
-    assert names == sorted(set(names)) and own | {"lowalt/common/streams.py"} <= set(names)
+    assert names == sorted(set(names)) and own | {"lowalt/numerics/streams.py"} <= set(names)
     assert not [name for name in names if name.startswith(("lowalt/recognition/", "lowalt/workflow/"))]
     with pytest.raises(ModuleNotFoundError, match=r"lowalt\.none"):
         sources.sources("lowalt.none")

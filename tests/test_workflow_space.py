@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError, SpaceError
-from lowalt.common.files import replacing
-from lowalt.common.plan import Plan
+from lowalt.config.layers import load_yaml
+from lowalt.config.plan import Plan
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError, SpaceError
 from lowalt.workflow import space
 
 ROOT = Path(__file__).parent.parent

@@ -3,7 +3,7 @@
 import pytest
 
 from configured import run_of
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 ALONE = {"stations": {"B": None, "C": None}}
 CORNERS = {"region": {"polygon_m": [[0, 0], [500, 0], [250, 433]]}}

@@ -8,8 +8,8 @@ import argparse
 import sys
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
-from lowalt.common.command import refusal
-from lowalt.common.errors import InputError
+from lowalt.config.command import refusal
+from lowalt.files.errors import InputError
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -21,9 +21,9 @@ from snakemake.settings.enums import Quietness
 from snakemake_interface_logger_plugins.base import LogHandlerBase
 from snakemake_interface_logger_plugins.common import LogEvent
 
-from lowalt.common import progress
-from lowalt.common.errors import InputError
-from lowalt.common.files import FULL, NEARLY_FULL_BYTES, free_bytes
+from lowalt.files.atomic import FULL, NEARLY_FULL_BYTES, free_bytes
+from lowalt.files.errors import InputError
+from lowalt.machine import progress
 from lowalt.workflow import closing, status
 from lowalt.workflow.board import Board, Job
 

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 from read import LABELS, axes
 
-from lowalt.common.config import load
+from lowalt.config.layers import load
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 

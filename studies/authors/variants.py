@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from lowalt.common.config import load
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import load
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.one_sample import answer
 from lowalt.recognition.runs import load as load_model
 from lowalt.shards.dataset import Dataset

@@ -9,10 +9,10 @@ import json
 
 import numpy as np
 
-from lowalt.common.classes import label
-from lowalt.common.errors import InputError
-from lowalt.common.splits import fold
-from lowalt.common.streams import stream
+from lowalt.config.classes import label
+from lowalt.config.splits import fold
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition.made import stations_of, views_of
 from lowalt.recognition.samples import Facts, Samples, fingerprint
 from lowalt.recognition.schemes import columns_in

@@ -24,14 +24,14 @@ import numpy as np
 from fresh import Fresh
 
 import trainings
-from lowalt.common.classes import stated
-from lowalt.common.command import run
-from lowalt.common.config import merge
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.streams import stream
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import stated
+from lowalt.config.command import run
+from lowalt.config.layers import merge
+from lowalt.files.atomic import slug
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, runs
 from lowalt.recognition.intervals import model_shares, strict_difference
 from lowalt.recognition.made import opened

@@ -26,11 +26,11 @@ import numpy as np
 import torch
 from torch import nn
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, sha256
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.common.streams import stream
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.files.atomic import replacing, sha256
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.streams import stream
 from lowalt.recognition.fusion import FUSIONS, AttentionFusion
 from lowalt.recognition.network import Recogniser
 from lowalt.recognition.samples import Samples

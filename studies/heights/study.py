@@ -16,7 +16,7 @@ import numpy as np
 from heights import Heights, built, of_run
 
 import trainings
-from lowalt.common.command import run
+from lowalt.config.command import run
 from lowalt.recognition.methods import built as plain
 from lowalt.recognition.samples import Samples, joined_sources
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named

@@ -8,7 +8,7 @@ al., Int. J. Microw. Wirel. Technol. 6, 2014 (features of micro-Doppler signatur
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 
 POINTS = 1024
 """Points of the zero-padded transform of a look."""

@@ -10,8 +10,8 @@ images' views do. A scheme names one as its backbone:
 import torch
 from torch import nn
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.recognition.fusion import Fused, encoder
 from lowalt.recognition.network import KEYS
 from lowalt.recognition.schemes import Scheme

@@ -6,9 +6,9 @@ import numpy as np
 from features import features
 
 import trainings
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.motion import read_table
 from lowalt.recognition.samples import Samples, fingerprint
 from lowalt.recognition.schemes import Scheme

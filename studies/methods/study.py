@@ -18,9 +18,9 @@ from signal_networks import BACKBONES, SignalRecogniser
 from signals import Signals
 
 import trainings
-from lowalt.common.command import run
-from lowalt.common.files import replacing
-from lowalt.common.hardware import describe
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.machine.hardware import describe
 from lowalt.recognition import predictions
 from lowalt.recognition.methods import built as plain
 from lowalt.recognition.order import epoch_order

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, station_names
-from lowalt.common.streams import stream
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import run
+from lowalt.config.network import SPEED_OF_LIGHT, station_names
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.numerics.streams import stream
 from lowalt.recognition.compared import whole_subtypes
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import model_shares, strict_difference

@@ -26,11 +26,11 @@ import numpy as np
 from rotor import LEAST_CYCLES, folded, passing, passing_of_rests, without_body, without_pursued_body
 from rotor_blades import Blades, blades
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network
-from lowalt.common.shipped import located
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import located
+from lowalt.files.yaml_files import load_yaml
 from lowalt.motion import read_table
 from lowalt.targets.records import records_of
 from lowalt.tiles.signals import load_signals

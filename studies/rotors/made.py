@@ -19,8 +19,8 @@ from estimates import NEAR_CYCLES, Read, summary
 from rotor import folded, passing_of_rests, without_body
 from rotor_blades import blades
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.streams import stream
+from lowalt.files.csv_tables import write_csv
+from lowalt.numerics.streams import stream
 
 COLUMNS = (
     "rotors", "blades", "lines", "draws", "right_percent", "length_told_percent", "length_error_percent",

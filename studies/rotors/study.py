@@ -3,7 +3,7 @@
 import estimates
 import made
 
-from lowalt.common.command import dispatch, run
+from lowalt.config.command import dispatch, run
 
 if __name__ == "__main__":
     run(lambda arguments: dispatch("study.py", {"estimates": estimates.main, "made": made.main}, arguments))

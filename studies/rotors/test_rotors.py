@@ -8,7 +8,7 @@ import rotor_blades
 from made import INTERVAL_S, SYMBOLS, made
 from scipy.special import jv
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 
 TIMES = np.arange(SYMBOLS) * INTERVAL_S
 

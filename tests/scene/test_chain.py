@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import reference_effects
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.streams import stream
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_signal
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.catalogue import ORDER, PLACES, called, dotted
 from lowalt.scene.chain import SceneSample, received_signal

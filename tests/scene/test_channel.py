@@ -9,8 +9,8 @@ from scipy import stats
 from scipy.optimize import minimize
 
 import reference_effects
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
 from lowalt.motion.cross_section import mean_cross_section as over_looks
 from lowalt.scene.antenna import Element, gain
 from lowalt.scene.crossing import crossing

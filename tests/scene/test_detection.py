@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.scene import set_noise
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel.windblown import windblown

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm, solve_continuous_lyapunov
 
-from lowalt.common.config import load
-from lowalt.common.streams import stream
+from lowalt.config.layers import load
 from lowalt.motion.rotations import attitude
+from lowalt.numerics.streams import stream
 from lowalt.scene.effects.motion import flight, gusts, markov, rotor_spread
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of

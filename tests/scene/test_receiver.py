@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.scene import waveform
 from lowalt.scene.checks import check
 from lowalt.scene.effects.receiver import (

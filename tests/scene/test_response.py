@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import reference_effects
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo import echo_matrix
+from lowalt.files.errors import InputError
 from lowalt.scene.response import ImagePath, response
 from scenes import A, B, drifting, link, linked, network, view_of
 

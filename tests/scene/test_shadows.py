@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.effects.channel import occlusion
 from lowalt.scene.rays import hidden_by_bones
 from lowalt.scene.view import View

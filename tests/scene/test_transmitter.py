@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.scene import lateness, waveform
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.transmitter import comb_pilots, data_symbols, power_amplifier, slow_time

@@ -6,7 +6,7 @@ from dataclasses import replace
 from PIL import Image
 
 from craft import NETWORK, craft, row
-from lowalt.common.network import station_names
+from lowalt.config.network import station_names
 from lowalt.motion import write_table
 from lowalt.recognition import schemes
 from lowalt.targets.cloud import write as write_cloud

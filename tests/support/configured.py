@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from lowalt.common.config import merge
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import merge
+from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.products import Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings

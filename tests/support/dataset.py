@@ -7,7 +7,7 @@ import shutil
 import numpy as np
 import yaml
 
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.motion import COLUMNS, write_table
 from lowalt.shards import card
 from lowalt.shards.__main__ import main

@@ -128,10 +128,10 @@ def _robots() -> list[Reader]:
 
 def _texts() -> list[Reader]:
     """Readers of configurations, tables and other texts, each with a good file."""
-    from lowalt.common.command import settings
-    from lowalt.common.config import check, merge
-    from lowalt.common.csv_tables import read_csv
-    from lowalt.common.yaml_files import load_yaml
+    from lowalt.config.command import settings
+    from lowalt.config.layers import check, merge
+    from lowalt.files.csv_tables import read_csv
+    from lowalt.files.yaml_files import load_yaml
     from lowalt.motion import read_table, write_table
     from lowalt.recognition import freeze, orderings, schemes
     from lowalt.recordings.record import read_record
@@ -199,7 +199,7 @@ def _arrays() -> list[Reader]:
     """Readers of arrays, shards and models, each with a good file."""
     import torch
 
-    from lowalt.common.yaml_files import load_yaml
+    from lowalt.files.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
     from lowalt.recognition.one_sample import images_of
     from lowalt.shards import recipe, table
@@ -263,8 +263,8 @@ def _all(tiles) -> list[bytes]:
 def _recipe() -> bytes:
     """The bytes of a recipe of a data set of one subtype, four motion models and two short signals of each."""
     from lowalt import __version__
-    from lowalt.common.config import merge, plain
-    from lowalt.common.yaml_files import load_yaml
+    from lowalt.config.layers import merge, plain
+    from lowalt.files.yaml_files import load_yaml
     from lowalt.targets.cloud import write as write_cloud
     from lowalt.targets.records import records_of
 

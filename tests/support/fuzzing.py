@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 LIMIT_S = 20.0
 LIMIT_MB = 2048

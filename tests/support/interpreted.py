@@ -9,7 +9,7 @@ from types import FunctionType, ModuleType, SimpleNamespace
 
 from numba.core.dispatcher import Dispatcher
 
-from lowalt.common.exact import arithmetic
+from lowalt.numerics.exact import arithmetic
 
 
 def fused(a, b, c):

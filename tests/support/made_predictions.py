@@ -5,7 +5,7 @@ import json
 
 import numpy as np
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import predictions, samples, schemes
 
 SUBTYPES = {"Mini": ("seen", 0), "Avata": ("unseen", 0), "Crow": ("seen", 1), "Owl": ("unseen", 1),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.spectra import Spectra
 from lowalt.tiles import Images, Renderer, Scale
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.motion.table import NUMBERS
 from lowalt.scene.catalogue import called
 from lowalt.scene.observe import Scene

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid, api
 from lowalt.echo.fast.layout import layout
 

@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition import checkpoint, runs, samples, schemes
 
 TRAINING = {

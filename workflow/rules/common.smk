@@ -4,12 +4,12 @@
 from functools import partial
 from pathlib import Path
 
-from lowalt.common.command import Refusing, refusing
-from lowalt.common.environment import prepare
-from lowalt.common.plan import PART
+from lowalt.config.command import Refusing, refusing
+from lowalt.machine.environment import prepare
+from lowalt.config.plan import PART
 from lowalt.scene.catalogue import dotted
 from lowalt.workflow import mends, options, space
-from lowalt.common.shipped import located
+from lowalt.files.shipped import located
 from lowalt.workflow.products import TABLES, Products
 from lowalt.workflow.run import Run
 from lowalt.workflow.settings import Settings

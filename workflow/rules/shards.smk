@@ -71,4 +71,4 @@ rule configuration:
     params:
         settings=settings.configuration,
     shell:
-        "python -m lowalt.common.config --settings {params.settings:q} --out {output:q} 2> {log:q}"
+        "python -m lowalt.config.layers --settings {params.settings:q} --out {output:q} 2> {log:q}"

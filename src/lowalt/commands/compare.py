@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import text_of
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.atomic import text_of
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 
 
 def add_to(commands: argparse._SubParsersAction) -> None:

@@ -4,10 +4,10 @@ import argparse
 from pathlib import Path
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.command import name_backbone
-from lowalt.common.config import overlaid
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.config.command import name_backbone
+from lowalt.config.layers import overlaid
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.shards.verify import faults, frozen
 
 

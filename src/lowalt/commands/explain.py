@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.config import merge, overlaid
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.layers import merge, overlaid
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 
 
 def _sample(text: str) -> tuple[str, int]:
@@ -92,7 +92,7 @@ def _comparison(
     """What two sets of signals (K, stations, N) differ in as images, and in the answers of a trained model."""
     from dataclasses import replace
 
-    from lowalt.common.network import Network
+    from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
     visible = 8

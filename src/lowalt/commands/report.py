@@ -9,10 +9,10 @@ import yaml
 from lowalt.commands import workflow
 from lowalt.commands.compare import facts
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.shipped import as_named, shipped
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import as_named, shipped
+from lowalt.files.yaml_files import load_yaml
 
 BASE = "config/default.yaml"
 

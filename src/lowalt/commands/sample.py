@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.config import overlaid
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.config.layers import overlaid
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.record import sample_key
 from lowalt.tiles.png import encode

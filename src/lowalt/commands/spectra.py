@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.config import overlaid
-from lowalt.common.hardware import describe
-from lowalt.common.timing import median_s
+from lowalt.config.layers import overlaid
+from lowalt.machine.hardware import describe
+from lowalt.machine.timing import median_s
 from lowalt.spectra import spectrum, windows, zero_index
 from lowalt.spectra.interface import OfProfiles
 from lowalt.tiles.render import Renderer, normalised

@@ -11,9 +11,9 @@ import numpy as np
 import yaml
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, slug
-from lowalt.common.shipped import SHIPPED
+from lowalt.files.atomic import existing, replacing, slug
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import axis_vector, chosen, drafted, refuse_miscount, row_lines

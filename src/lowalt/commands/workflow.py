@@ -10,10 +10,10 @@ import time
 from pathlib import Path
 
 from lowalt.commands.for_programs import acts, as_json
-from lowalt.common.command import exit_status
-from lowalt.common.errors import InputError
-from lowalt.common.shipped import SHIPPED, shipped
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import exit_status
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED, shipped
+from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import status
 from lowalt.workflow.status import PLANNED_JOBS
 

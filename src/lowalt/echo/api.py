@@ -5,8 +5,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import BelowFloor, InputError
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.echo import refine
 from lowalt.echo.pointwise import sums
 from lowalt.echo.pointwise.reference_range import reference
@@ -15,6 +14,7 @@ from lowalt.echo.radar import radar
 from lowalt.echo.refine import Method
 from lowalt.echo.rounding import nearest
 from lowalt.echo.scene import EchoScene, Rigid, Target, check, target
+from lowalt.files.errors import BelowFloor, InputError
 
 
 class Path(NamedTuple):

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lowalt.common.network import Network
-from lowalt.common.progress import reported
+from lowalt.config.network import Network
 from lowalt.echo.api import echo_signal, method_text
 from lowalt.echo.scene import Rigid, target
+from lowalt.machine.progress import reported
 from lowalt.motion import poses
 from lowalt.targets.cloud import Cloud, cloud_of
 

@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.echo.api import check_fault, echo_signal, prepared
 from lowalt.echo.pointwise.profile_cells import profile_cells
 from lowalt.echo.scene import Rigid, Target
+from lowalt.files.errors import InputError
 
 
 class Profile(NamedTuple):

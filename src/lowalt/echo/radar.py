@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.exact.constants import DIGITS, PI, Pair, decimal_of, pair, sine_cosine
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.numerics.exact.constants import DIGITS, PI, Pair, decimal_of, pair, sine_cosine
 
 LIGHT = Fraction(int(SPEED_OF_LIGHT))
 

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
+from lowalt.files.errors import InputError
 
 
 class Rigid(NamedTuple):

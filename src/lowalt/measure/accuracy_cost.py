@@ -29,12 +29,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.csv_tables import read_csv, short, write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import text_of
-from lowalt.common.network import station_names
-from lowalt.common.streams import stream
+from lowalt.config.command import parser, pick, run
+from lowalt.config.network import station_names
+from lowalt.files.atomic import text_of
+from lowalt.files.csv_tables import read_csv, short, write_csv
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition.compared import difference, spread_points
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.schemes import SPECTRA, TABLE, Scheme, joined, named, names

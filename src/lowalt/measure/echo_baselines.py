@@ -7,7 +7,7 @@ closed form in plain numpy. `judge` is the slow truth: plain sums whose phases s
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo.scene import Rigid
 
 

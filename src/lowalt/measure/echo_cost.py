@@ -11,18 +11,18 @@ import sys
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import BelowFloor
-from lowalt.common.hardware import processor
-from lowalt.common.network import Network, Station
-from lowalt.common.streams import stream
-from lowalt.common.timing import in_turn
+from lowalt.config.command import parser, pick, run
+from lowalt.config.network import Network, Station
 from lowalt.echo.api import echo_signal
 from lowalt.echo.scene import Rigid
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import BelowFloor
+from lowalt.machine.hardware import processor
+from lowalt.machine.timing import in_turn
 from lowalt.measure import echo_baselines
 from lowalt.motion import poses
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 
 COLUMNS = (

@@ -12,11 +12,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.csv_tables import read_csv, write_csv
-from lowalt.common.errors import BelowFloor, InputError
-from lowalt.common.network import Network
+from lowalt.config.command import parser, pick, run
+from lowalt.config.network import Network
 from lowalt.echo import echo_signal
+from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.errors import BelowFloor, InputError
 from lowalt.measure.echo_cost import sample
 from lowalt.spectra import Spectra
 from lowalt.targets.cloud import Cloud, read

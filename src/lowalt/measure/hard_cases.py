@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.hardware import describe
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.command import run
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import echo_signal
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.machine.hardware import describe
 
 COLUMNS = ("case", "why", "naive_error", "error", "bound", "right_cell", "hardware")
 C = SPEED_OF_LIGHT

@@ -16,10 +16,10 @@ from collections.abc import Callable
 import numpy as np
 import torch
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.files import replacing
-from lowalt.common.hardware import describe
-from lowalt.common.timing import least_s
+from lowalt.config.command import parser, pick, run
+from lowalt.files.atomic import replacing
+from lowalt.machine.hardware import describe
+from lowalt.machine.timing import least_s
 from lowalt.recognition import network, recipe
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.methods import built

@@ -10,12 +10,12 @@ import argparse
 import math
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.config import load
-from lowalt.common.csv_tables import read_csv, write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.network import station_names
-from lowalt.common.plan import Plan
+from lowalt.config.command import run
+from lowalt.config.layers import load
+from lowalt.config.network import station_names
+from lowalt.config.plan import Plan
+from lowalt.files.csv_tables import read_csv, write_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import named
 from lowalt.targets.records import records_of
 

@@ -4,10 +4,10 @@ import sys
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.streams import stream
+from lowalt.config.command import parser, pick, run
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.motion.table import write_table
+from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import read
 
 

@@ -6,10 +6,10 @@ station, so the mean lies up to 5 dB beside the sum of the points' cross section
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import AIRBORNE
+from lowalt.config.classes import AIRBORNE
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.motion.table import NUMBERS
+from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 
 LOOKS = 2048

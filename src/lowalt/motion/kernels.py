@@ -6,10 +6,10 @@ operations. Here every operation is one that IEEE 754 fixes, in the order writte
 
 import numpy as np
 
-from lowalt.common.exact.arithmetic import multiply
-from lowalt.common.exact.constants import PI, pair
-from lowalt.common.exact.sines import sine_cosine
-from lowalt.common.jit import LEAN
+from lowalt.machine.jit import LEAN
+from lowalt.numerics.exact.arithmetic import multiply
+from lowalt.numerics.exact.constants import PI, pair
+from lowalt.numerics.exact.sines import sine_cosine
 
 TURNS = pair(1 / (2 * PI))
 """Turns of a radian."""

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.portable import applied, product
+from lowalt.files.errors import InputError
 from lowalt.motion.rotations import attitude, compiled, rodrigues, turns
+from lowalt.numerics.portable import applied, product
 from lowalt.targets.cloud import Cloud
 
 

@@ -5,8 +5,8 @@ All of them have the same bits on every processor: sines and products are those 
 
 import numpy as np
 
-from lowalt.common.double_double import two_product
-from lowalt.common.portable import product
+from lowalt.numerics.double_double import two_product
+from lowalt.numerics.portable import product
 
 
 def compiled():

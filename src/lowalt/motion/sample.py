@@ -8,10 +8,10 @@ import math
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import AIRBORNE
-from lowalt.common.errors import InputError
+from lowalt.config.classes import AIRBORNE
+from lowalt.files.errors import InputError
 from lowalt.motion.table import NUMBERS, PHASES, SCALE
+from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud, extent
 
 

@@ -4,9 +4,9 @@ import csv
 import math
 from pathlib import Path
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import text_file
+from lowalt.files.atomic import text_file
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import MOST_TURNING_PARTS
 
 PHASES = MOST_TURNING_PARTS

@@ -5,10 +5,10 @@ import sys
 
 import numpy as np
 
-from lowalt.common.array_files import array_of
-from lowalt.common.command import parser, pick, run
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.config.command import parser, pick, run
+from lowalt.files.array_files import array_of
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.noise.chunk import noisy_signals
 

@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.normals import circular
-from lowalt.common.power import rms
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.normals import circular
+from lowalt.numerics.power import rms
 
 
 def add_noise(

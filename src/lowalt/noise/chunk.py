@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lowalt.common.streams import stream
 from lowalt.noise.awgn import add_noise
+from lowalt.numerics.streams import stream
 
 
 def noisy_signals(

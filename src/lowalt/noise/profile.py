@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.power import rms
+from lowalt.files.errors import InputError
 from lowalt.noise.awgn import add_noise
+from lowalt.numerics.power import rms
 
 
 def noisy_profile(

@@ -4,10 +4,10 @@ import json
 import sys
 from pathlib import Path
 
-from lowalt.common.command import dispatch, name_backbone, parser, pick, run
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import dispatch, name_backbone, parser, pick, run
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.schemes import PROTOCOLS, TABLE, Scheme, named, names
 from lowalt.recognition.sources import name_sources, of_size

@@ -15,8 +15,8 @@ Settings of this module, the block `recognition.augmentation` (zeros change noth
 
 import numpy as np
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.spectra.catalogue import NAMES, zero_index
 
 KEYS = ("mirror", "shift_doppler", "shift_time", "contrast", "mask_doppler", "mask_time", "drop_view")

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import torch
 
-from lowalt.common.errors import InputError, in_one_line
-from lowalt.common.files import existing, replacing
-from lowalt.common.schema import check_brought
+from lowalt.config.schema import check_brought
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.errors import InputError, in_one_line
 
 
 def _digest(state: object) -> str:

@@ -5,7 +5,7 @@ Only schemes of one protocol are compared here; which differences a table shows 
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.intervals import Interval, model_shares, strict_difference
 

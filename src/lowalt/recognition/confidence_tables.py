@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.statistics import (

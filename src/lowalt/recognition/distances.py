@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.motion import positions
 from lowalt.targets.cloud import Cloud
 

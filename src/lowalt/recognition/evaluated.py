@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from lowalt.common.classes import stated
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.config.classes import stated
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.recognition import predictions
 from lowalt.recognition.predictions import Predictions
 from lowalt.recognition.protocols import folds

@@ -7,8 +7,8 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.runs import Trained
 

@@ -7,9 +7,9 @@ The file has the form of `sha256sum`, so `sha256sum --check SHA256SUMS` verifies
 import sys
 from pathlib import Path
 
-from lowalt.common.command import parser, pick
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256, text_of
+from lowalt.config.command import parser, pick
+from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.errors import InputError
 
 
 def freeze(paths: list[str | Path], out: str | Path) -> None:

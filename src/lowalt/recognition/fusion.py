@@ -12,7 +12,7 @@ from collections.abc import Callable
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 
 def encoder(width: int, depth: int, heads: int, feed_forward: float, dropout: float) -> nn.Module:

@@ -20,7 +20,7 @@ import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 POLL_S = 1.0
 
@@ -125,6 +125,6 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    from lowalt.common.command import run
+    from lowalt.config.command import run
 
     run(main)

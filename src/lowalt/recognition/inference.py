@@ -9,8 +9,8 @@ import numpy as np
 import torch
 from torch import distributed, nn
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.matrix_products import as_products

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import label
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import label
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import columns_in

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 Metrics = Callable[[int, dict[str, float]], None]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import yaml
 
 from lowalt import __version__
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import read_csv
 from lowalt.recognition.model_file import EIGHT, ModelFile, run_folder
 from lowalt.recognition.schemes import SPECTRA
 from lowalt.shards.hub import TAGS

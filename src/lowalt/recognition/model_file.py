@@ -20,11 +20,11 @@ import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 
-from lowalt.common.classes import stated
-from lowalt.common.errors import InputError, in_one_line
-from lowalt.common.files import existing, replacing, text_of
-from lowalt.common.schema import check_brought
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import stated
+from lowalt.config.schema import check_brought
+from lowalt.files.atomic import existing, replacing, text_of
+from lowalt.files.errors import InputError, in_one_line
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition import checkpoint
 from lowalt.recognition.eight_bits import restored
 from lowalt.recognition.runs import Trained, of_state

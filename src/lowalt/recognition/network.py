@@ -23,8 +23,8 @@ import torch
 from safetensors import SafetensorError
 from torch import nn
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.recognition import own_backbone
 from lowalt.recognition.fusion import Fused
 from lowalt.recognition.schemes import SPECTRA, Scheme

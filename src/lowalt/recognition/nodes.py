@@ -14,8 +14,8 @@ import socket
 import subprocess
 import sys
 
-from lowalt.common.command import exit_status
-from lowalt.common.errors import InputError
+from lowalt.config.command import exit_status
+from lowalt.files.errors import InputError
 
 NAMED = ["sh", "-c", 'export PET_LOCAL_ADDR="$(hostname)"; exec "$@"', "sh"]
 """Before a task's command: torchrun's own idea of its node's name is "localhost" where /etc/hosts lists that first."""
@@ -78,6 +78,6 @@ def main(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    from lowalt.common.command import run
+    from lowalt.config.command import run
 
     run(main)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import torch
 
-from lowalt.common.array_files import array_of
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.files.array_files import array_of
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.recognition.runs import Trained
 from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import named

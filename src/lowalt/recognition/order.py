@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition.samples import Facts
 
 

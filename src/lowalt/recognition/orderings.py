@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 
 CLAIMS = (
     *(("A:VRP+TRP+VT", f"A:{single}", "three spectra over one") for single in ("VRP", "TRP", "VT")),

@@ -12,7 +12,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 MIDDLE = {"mean": (0.5, 0.5, 0.5), "std": (0.5, 0.5, 0.5)}
 """How colours in 0..1 are shifted and scaled for a module that has no `pretrained_cfg` of its own."""

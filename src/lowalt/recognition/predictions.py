@@ -17,10 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES, word
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, text_file, text_of
+from lowalt.config.classes import CATEGORIES, word
+from lowalt.files.atomic import existing, text_file, text_of
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition.samples import Facts
 
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")

@@ -1,6 +1,6 @@
 """The two protocols: which (group, fold) pairs train, validate and test."""
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 _SEEN_FOLDS = {part: {("seen", fold), ("unseen", fold)} for part, fold in
                (("train", "train"), ("validation", "val"), ("test", "test"))}  # fmt: skip

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.recognition.ahead import tensors
 from lowalt.recognition.inference import Machine
 

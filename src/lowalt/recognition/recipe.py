@@ -35,9 +35,9 @@ from types import ModuleType
 import torch
 from torch import nn
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
-from lowalt.common.streams import digest
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import digest
 from lowalt.recognition.flat_weights import FlatAdamW
 
 KEYS = (

@@ -16,11 +16,11 @@ import timm
 import torch
 from torch import nn
 
-from lowalt.common.classes import stated
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError, in_one_line
-from lowalt.common.files import replacing, sha256
-from lowalt.common.hardware import describe
+from lowalt.config.classes import stated
+from lowalt.config.command import pick
+from lowalt.files.atomic import replacing, sha256
+from lowalt.files.errors import InputError, in_one_line
+from lowalt.machine.hardware import describe
 from lowalt.recognition import (
     augment,
     checkpoint,

@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lowalt.common.array_files import UNREADABLE, checked_archive
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.files.array_files import UNREADABLE, checked_archive
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.recognition.augment import augment
 from lowalt.recognition.schemes import columns_in
 from lowalt.spectra.catalogue import LISTED

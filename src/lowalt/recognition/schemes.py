@@ -19,9 +19,9 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.files.atomic import slug
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.spectra.catalogue import NAMES
 
 TABLE = "config/schemes.csv"

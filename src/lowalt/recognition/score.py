@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import probability_columns
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion

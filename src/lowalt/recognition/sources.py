@@ -2,7 +2,7 @@
 
 from argparse import ArgumentParser
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.recognition.samples import Samples
 
 

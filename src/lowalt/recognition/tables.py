@@ -26,10 +26,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import word
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.config.classes import word
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition import compared
 from lowalt.recognition.confidence_tables import alarm_rows, calibration_rows, percent, reliability_rows
 from lowalt.recognition.evaluated import Evaluated

@@ -14,9 +14,9 @@ import numpy as np
 import torch
 from torch import nn
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.progress import Reporter
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.machine.progress import Reporter
 from lowalt.recognition import checkpoint, network
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.batch_norm import over_ranks

@@ -18,9 +18,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recognition import compared
 from lowalt.recognition.evaluated import Evaluated
 from lowalt.recognition.tables import snr_text

@@ -10,9 +10,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from lowalt.common import hub_upload
-from lowalt.common.command import name_backbone, run
-from lowalt.common.files import existing
+from lowalt.config.command import name_backbone, run
+from lowalt.files import hub_upload
+from lowalt.files.atomic import existing
 from lowalt.recognition import model_file
 
 NAMES = {"model": "model.safetensors", "card": "README.md"}

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, station_names
+from lowalt.config.network import Network, station_names
+from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.recognition import samples
 from lowalt.recognition.samples import Facts

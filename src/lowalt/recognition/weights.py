@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch import nn
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 
 def refuse_unfinite(weights: Any, path: str | Path) -> None:

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from lowalt.common.command import name_backbone, run
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
+from lowalt.config.command import name_backbone, run
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.recognition import model_card, model_file
 from lowalt.recognition.eight_bits import rounded
 from lowalt.recognition.inference import Machine, probabilities

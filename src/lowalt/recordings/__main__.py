@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.command import dispatch, run
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.shipped import shipped
-from lowalt.common.side_by_side import together
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.command import dispatch, run
+from lowalt.config.layers import load_yaml
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.machine.side_by_side import together
 from lowalt.recordings import compare, samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recordings.library import Library
 from lowalt.recordings.reality import tested, windows_of
 from lowalt.recordings.recognise import simulated, train

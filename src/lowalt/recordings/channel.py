@@ -19,7 +19,7 @@ from functools import lru_cache
 import numpy as np
 from scipy.signal import hilbert
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 SAMPLINGS = ("anti_aliased", "one_sided", "bare")
 LOBES = 24

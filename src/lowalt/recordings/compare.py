@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import wasserstein_distance
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.streams import stream
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.numerics.streams import stream
 from lowalt.recordings.figures import INTERVAL, interval_figures, unit
 from lowalt.recordings.kinds import KINDS
 from lowalt.recordings.library import Library

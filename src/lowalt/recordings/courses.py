@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 
 class Course(NamedTuple):

@@ -9,12 +9,12 @@ import argparse
 import urllib.parse
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.download import download, fetch_each
-from lowalt.common.errors import InputError
-from lowalt.common.files import sha256
-from lowalt.common.shipped import shipped
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import run
+from lowalt.files.atomic import sha256
+from lowalt.files.download import download, fetch_each
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.files.yaml_files import load_yaml
 
 SOURCES = "config/measured/sources.yaml"
 

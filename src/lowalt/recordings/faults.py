@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 RATE_SHARE = 1e-3
 """Largest relative difference between the rate of the record and that of the file."""

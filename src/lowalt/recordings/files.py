@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.array_files import UNREADABLE
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.files.array_files import UNREADABLE
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.recordings import faults
 from lowalt.recordings.formats import READERS, Table
 from lowalt.recordings.record import Record

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import text_file
+from lowalt.files.atomic import text_file
+from lowalt.files.errors import InputError
 from lowalt.recordings.mat_files import read_mat
 from lowalt.recordings.record import Record
 

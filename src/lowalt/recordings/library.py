@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.config import load_yaml, merge
-from lowalt.common.errors import InputError
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.layers import load_yaml, merge
+from lowalt.files.errors import InputError
 from lowalt.recordings.scenes import clouds_of, intervals
 from lowalt.recordings.twin import Twin
 from lowalt.targets.cloud import Cloud

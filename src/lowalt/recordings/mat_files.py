@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 NUMERIC = "biufc"
 """Kinds of arrays that samples can be."""

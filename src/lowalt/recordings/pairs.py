@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.streams import stream
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.recordings.figures import spectrogram, speeds_shown
 from lowalt.recordings.files import read
 from lowalt.recordings.scenes import clouds_of, heard, samples, stretch

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.streams import stream
+from lowalt.config.classes import CATEGORIES
+from lowalt.numerics.streams import stream
 from lowalt.recordings.library import Library
 from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered, simulated, train
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals

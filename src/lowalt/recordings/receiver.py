@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from lowalt.common.command import pick
-from lowalt.common.power import rms
+from lowalt.config.command import pick
 from lowalt.noise.awgn import add_noise
+from lowalt.numerics.power import rms
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.config import load_yaml, merge
-from lowalt.common.errors import InputError
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.layers import load_yaml, merge
+from lowalt.files.errors import InputError
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.schemes import SPECTRA, named
 from lowalt.recordings.library import Library

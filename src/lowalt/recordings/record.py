@@ -22,9 +22,9 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 
 CHANNELS = ("complex", "real")
 MOVES = ("towards", "away")

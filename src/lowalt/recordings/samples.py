@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.files import replacing
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import write_csv
 from lowalt.motion.table import NUMBERS
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.record import Record

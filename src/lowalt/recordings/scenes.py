@@ -25,9 +25,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.power import rms
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
+from lowalt.numerics.power import rms
+from lowalt.numerics.streams import stream
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.courses import Course, hover, straight, to_and_fro
 from lowalt.recordings.presence import present

@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.channel import coherent_intervals, symbol_rate
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.formats import READERS

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.command import pick
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid, echo_signals
+from lowalt.files.errors import InputError
 from lowalt.motion import Perturbation, poses
 from lowalt.motion.table import NUMBERS, PHASES
 from lowalt.recordings.channel import SAMPLINGS

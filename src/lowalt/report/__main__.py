@@ -5,9 +5,9 @@ import sys
 from functools import partial
 from pathlib import Path
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.files import replacing
-from lowalt.common.side_by_side import together
+from lowalt.config.command import parser, pick, run
+from lowalt.files.atomic import replacing
+from lowalt.machine.side_by_side import together
 from lowalt.motion import read_table
 from lowalt.report.figures.stills import write_stills
 from lowalt.report.inputs import Inputs

@@ -8,10 +8,10 @@ next to the paper's, and which orderings hold) or `cost` (accuracy and its times
 
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.config.command import run
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.report.sections.orderings import ordering_words
 from lowalt.report.tables import by_scheme
 

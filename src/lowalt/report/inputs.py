@@ -10,9 +10,9 @@ Paths are relative to the folder in which the report is made. The workflow write
 import json
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, text_of
+from lowalt.files.atomic import existing, text_of
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 
 FILES = (
     "accuracy", "confusion", "subtypes", "comparisons", "orderings", "seeds", "distances", "index", "gallery", "motion",

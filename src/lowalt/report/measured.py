@@ -10,8 +10,8 @@ measured-overview.png, and the vehicles' pair without its third row as measured-
 import argparse
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.files import replacing
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
 from lowalt.report.figures.measured import overview, pair_picture, read_pair
 from lowalt.report.page import section_page
 from lowalt.report.sections.measured import held

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from markupsafe import Markup, escape
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import write_csv
 
 VEGA_LITE = "6.4"
 """Version of Vega-Lite whose scripts the page holds, one of those that the converter brings."""

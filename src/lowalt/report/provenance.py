@@ -7,10 +7,10 @@ from typing import Any
 
 import yaml
 
-from lowalt.common.config import plain
-from lowalt.common.files import sha256
-from lowalt.common.shipped import SHIPPED
-from lowalt.common.street import PACKAGE
+from lowalt.config.layers import plain
+from lowalt.files.atomic import sha256
+from lowalt.files.shipped import SHIPPED
+from lowalt.files.street import PACKAGE
 
 COUNTED = (".py", ".smk", ".yaml")
 """Endings of the files of the package that decide a run's products."""

@@ -2,8 +2,8 @@
 
 import functools
 
-from lowalt.common.network import station_names
-from lowalt.common.plan import snrs_of
+from lowalt.config.network import station_names
+from lowalt.config.plan import snrs_of
 from lowalt.report.inputs import Inputs
 from lowalt.report.tables import stage_times
 from lowalt.shards import ShardSet

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.hardware import describe
+from lowalt.files.csv_tables import write_csv
+from lowalt.machine.hardware import describe
 from lowalt.report.run import ReportedRun
 
 COLUMNS = ("rule", "jobs", "wall_s", "cpu_s", "peak_mib", "samples", "sample_bytes", "hardware")

@@ -5,8 +5,8 @@ from collections import defaultdict
 from collections.abc import Iterable
 from pathlib import Path
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import text_of
+from lowalt.files.atomic import text_of
+from lowalt.files.errors import InputError
 
 
 def by_scheme(rows: Iterable[dict[str, str]]) -> dict[str, dict[str, dict[str, float]]]:

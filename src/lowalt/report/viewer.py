@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from lowalt.common.files import slug, text_file
+from lowalt.files.atomic import slug, text_file
 from lowalt.motion import positions
 from lowalt.recognition import predictions
 from lowalt.recognition.distances import cycle_s, still_row

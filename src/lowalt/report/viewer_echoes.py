@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 
 FLOOR_DB = 40.0
 """Powers this far below a station's largest one, or further, stand on the lower edge of their panel."""

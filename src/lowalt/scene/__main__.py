@@ -4,10 +4,10 @@ import sys
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.network import Network
+from lowalt.config.command import parser, pick, run
+from lowalt.config.network import Network
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.scene.catalogue import called
 from lowalt.scene.chunk import scene_signals

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.common.jit import VECTOR
-from lowalt.common.network import Station
+from lowalt.config.network import Station
+from lowalt.machine.jit import VECTOR
 
 
 class Element(NamedTuple):

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 PLACE_ORDER = ("motion", "transmitter", "channel", "receiver", "detection")
 """The places where effects act, in the order of the chain."""

@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.blas_threads import one_blas_thread
-from lowalt.common.memory import keep_freed_arrays
-from lowalt.common.network import SPEED_OF_LIGHT, Station
-from lowalt.common.power import rms
+from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo import echo_signal
+from lowalt.machine.blas_threads import one_blas_thread
+from lowalt.machine.memory import keep_freed_arrays
+from lowalt.numerics.power import rms
 from lowalt.scene import protocols, waveform
 from lowalt.scene.arrivals import Physics, arriving
 from lowalt.scene.catalogue import BY_END, NamedEffect, placed, providing

@@ -2,9 +2,9 @@
 
 from typing import NamedTuple
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
-from lowalt.common.plan import snrs_of
+from lowalt.config.network import Network
+from lowalt.config.plan import snrs_of
+from lowalt.files.errors import InputError
 from lowalt.scene.catalogue import called
 
 STILL = ("clutter", "background_channel", "transmit_leakage", "direct_path")

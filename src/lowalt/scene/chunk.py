@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lowalt.common.progress import reported
+from lowalt.machine.progress import reported
 from lowalt.scene.chain import received_signal
 from lowalt.scene.observe import Scene
 from lowalt.targets.cloud import Cloud, cloud_of

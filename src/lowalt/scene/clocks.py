@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 
 STREAM = "link_offset"
 """The random stream of these errors, one for all stations of a look."""

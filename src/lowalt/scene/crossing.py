@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.scene.antenna import array_sum, gain
 from lowalt.scene.response import cosines
 from lowalt.scene.view import View

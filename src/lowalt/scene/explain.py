@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, Station, masts_m
-from lowalt.common.streams import stream
+from lowalt.config.network import Network, Station, masts_m
+from lowalt.files.errors import InputError
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.scene.catalogue import PLACES, NamedEffect, called
 from lowalt.scene.chain import SceneSample
 from lowalt.scene.checks import check

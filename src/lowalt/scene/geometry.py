@@ -5,7 +5,7 @@ Coordinates of a symbol's points stand together in memory, (N, 3, L).
 
 import numpy as np
 
-from lowalt.common.jit import VECTOR
+from lowalt.machine.jit import VECTOR
 
 
 @VECTOR

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import kernel
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.echo.radar import radar
+from lowalt.machine.jit import kernel
 from lowalt.scene.antenna import Element, gain
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response import cosines

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from lowalt.common.network import Network
-from lowalt.common.streams import stream
+from lowalt.config.network import Network
+from lowalt.numerics.streams import stream
 
 
 def timed(config: Mapping[str, Any]) -> bool:

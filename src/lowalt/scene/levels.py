@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene import antenna, land
 from lowalt.scene.catalogue import NamedEffect

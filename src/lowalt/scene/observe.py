@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
-from lowalt.common.streams import stream
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.numerics.streams import stream
 from lowalt.scene import protocols
 from lowalt.scene.catalogue import LOOK_WIDE, PAIR_WIDE, SHARED_STREAMS, NamedEffect, placed, providing
 from lowalt.scene.view import View

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lowalt.common.jit import kernel
 from lowalt.echo.fast.polynomials import smooth
+from lowalt.machine.jit import kernel
 
 # cos(2 pi t) and sin(2 pi t) / t as polynomials of t^2 on [-1/2, 1/2], to rounding; written out one by one, all steps
 # stay in registers.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 
 NORMAL = 144 / 2048
 """Length of NR's normal cyclic prefix, in useful symbol lengths (3GPP TS 38.211, 5.3.1)."""

@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.motion.poses import Perturbation
 from lowalt.scene.antenna import Element
 from lowalt.scene.listening import Listening

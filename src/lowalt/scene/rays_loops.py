@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_ORDERED, ORDERED
+from lowalt.machine.jit import INNER_ORDERED, ORDERED
 
 STRIP = 16
 """Symbols whose rays walk together."""

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import jv
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.files.errors import InputError
 from lowalt.scene import response_loops, spherical
 from lowalt.scene.geometry import ball
 from lowalt.scene.view import View

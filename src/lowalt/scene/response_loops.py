@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, kernel
+from lowalt.machine.jit import INNER_VECTOR, kernel
 from lowalt.scene.phasor import phasor
 
 CHUNK = 128

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.common.jit import VECTOR
+from lowalt.machine.jit import VECTOR
 
 STRIP = 256
 """Places that pass through the loop together."""

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import jv
 
-from lowalt.common.jit import INNER_VECTOR
+from lowalt.machine.jit import INNER_VECTOR
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response_loops import CHUNK, LOOPS, End
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 from lowalt.echo import Rigid
 from lowalt.motion.poses import Perturbation, poses
 from lowalt.scene.antenna import Element, gain

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from scipy import fft
 
-from lowalt.common.network import Network, Station
+from lowalt.config.network import Network, Station
 
 QPSK = np.sqrt(0.5) * np.array([1 + 1j, -1 + 1j, -1 - 1j, 1 - 1j])
 """The four data symbols, of unit modulus."""

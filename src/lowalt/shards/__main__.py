@@ -3,10 +3,10 @@
 import argparse
 from collections.abc import Iterable
 
-from lowalt.common.classes import stated
-from lowalt.common.command import dispatch, parser, pick, run
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.classes import stated
+from lowalt.config.command import dispatch, parser, pick, run
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.motion import read_table
 from lowalt.shards.content import clean_content, noisy_content
 from lowalt.shards.index import build

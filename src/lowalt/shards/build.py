@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.command import run
-from lowalt.common.config import merge
-from lowalt.common.files import slug
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import run
+from lowalt.config.layers import merge
+from lowalt.files.atomic import slug
+from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place

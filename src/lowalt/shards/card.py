@@ -13,12 +13,12 @@ from pathlib import Path
 import yaml
 
 from lowalt import __version__
-from lowalt.common.classes import plural
-from lowalt.common.command import run
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, sha256, text_of
-from lowalt.common.network import station_names
+from lowalt.config.classes import plural
+from lowalt.config.command import run
+from lowalt.config.network import station_names
+from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.csv_tables import write_csv
+from lowalt.files.errors import InputError
 from lowalt.shards import sums
 from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata

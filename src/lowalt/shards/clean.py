@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.noise.chunk import noisy_signals
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
 from lowalt.shards.record import NO_NOISE_DB, sample_key

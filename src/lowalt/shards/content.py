@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.noise.__main__ import load_echoes, load_powers
 from lowalt.shards.record import npy
 from lowalt.tiles.files import Tiles

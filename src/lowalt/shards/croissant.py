@@ -3,7 +3,7 @@
 Source: Croissant format specification 1.1 (MLCommons).
 """
 
-from lowalt.common.classes import stated
+from lowalt.config.classes import stated
 from lowalt.shards.table import EXTENSIONS
 from lowalt.spectra.catalogue import named
 

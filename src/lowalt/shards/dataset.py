@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.classes import classes_of, label
-from lowalt.common.config import SCHEMA, check
-from lowalt.common.errors import InputError
-from lowalt.common.network import masts_m
-from lowalt.common.plan import GROUPS, Plan
-from lowalt.common.shipped import located, shipped
-from lowalt.common.splits import FOLDS, fold
-from lowalt.common.streams import stream
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import classes_of, label
+from lowalt.config.layers import SCHEMA, check
+from lowalt.config.network import masts_m
+from lowalt.config.plan import GROUPS, Plan
+from lowalt.config.splits import FOLDS, fold
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import located, shipped
+from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.record import accompanied, npy, record, sample_key
 from lowalt.shards.remake import CloudFolder

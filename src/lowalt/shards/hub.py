@@ -2,7 +2,7 @@
 
 from fnmatch import fnmatchcase
 
-from lowalt.common.splits import FOLDS
+from lowalt.config.splits import FOLDS
 from lowalt.shards.read import ShardSet
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]

@@ -9,10 +9,10 @@ import json
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256, text_of
-from lowalt.common.schema import check_brought
+from lowalt.config.classes import CATEGORIES
+from lowalt.config.schema import check_brought
+from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.errors import InputError
 from lowalt.shards.table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"

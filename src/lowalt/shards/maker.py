@@ -8,9 +8,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
+from lowalt.files.errors import InputError
 from lowalt.noise.chunk import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells

@@ -10,9 +10,9 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing, sha256, text_of
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing, sha256, text_of
+from lowalt.files.errors import InputError
 
 STAGES = {
     "clouds": ("clouds/*.npz",), "motion": ("motion/*.csv",), "echo": ("echo/*/*.npy",), "noise": ("noisy/*.npy",),

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.classes import stated
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, sha256
-from lowalt.common.network import station_names
-from lowalt.common.plan import GROUPS
-from lowalt.common.splits import FOLDS
+from lowalt.config.classes import stated
+from lowalt.config.network import station_names
+from lowalt.config.plan import GROUPS
+from lowalt.config.splits import FOLDS
+from lowalt.files.atomic import existing, sha256
+from lowalt.files.errors import InputError
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load

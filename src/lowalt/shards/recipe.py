@@ -16,13 +16,13 @@ import tempfile
 from pathlib import Path
 
 from lowalt import __version__
-from lowalt.common.command import run
-from lowalt.common.config import SCHEMA, check, plain
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing, sha256, text_of
-from lowalt.common.schema import check_brought
-from lowalt.common.shipped import shipped
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.command import run
+from lowalt.config.layers import SCHEMA, check, plain
+from lowalt.config.schema import check_brought
+from lowalt.files.atomic import existing, replacing, sha256, text_of
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.files.yaml_files import load_yaml
 from lowalt.shards import manifest
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset

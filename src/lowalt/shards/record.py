@@ -9,12 +9,12 @@ import math
 import numpy as np
 
 from lowalt import __version__
-from lowalt.common.classes import CATEGORIES, label
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.network import Network, Station
-from lowalt.common.portable import dot, norm
-from lowalt.common.streams import digest
+from lowalt.config.classes import CATEGORIES, label
+from lowalt.config.network import Network, Station
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.numerics.portable import dot, norm
+from lowalt.numerics.streams import digest
 from lowalt.tiles.files import npy_header
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, slug
-from lowalt.common.network import Network
-from lowalt.common.schema import check_brought
-from lowalt.common.streams import stream
+from lowalt.config.network import Network
+from lowalt.config.schema import check_brought
+from lowalt.files.atomic import existing, slug
+from lowalt.files.errors import InputError
+from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.record import accompanied, npy, record, row_of

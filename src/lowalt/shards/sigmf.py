@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from lowalt import __version__
-from lowalt.common.command import run
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.network import Network
-from lowalt.common.plan import GROUPS
-from lowalt.common.splits import FOLDS
+from lowalt.config.command import run
+from lowalt.config.network import Network
+from lowalt.config.plan import GROUPS
+from lowalt.config.splits import FOLDS
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.shards.read import ShardSet
 
 KEPT = ("key", "category", "subtype", "group", "model", "fold", "snr_db", "noise", "motion")

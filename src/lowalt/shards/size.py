@@ -2,12 +2,12 @@
 
 import argparse
 
-from lowalt.common.command import run
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
-from lowalt.common.plan import snrs_of
-from lowalt.common.splits import FOLDS
+from lowalt.config.command import run
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import Network
+from lowalt.config.plan import snrs_of
+from lowalt.config.splits import FOLDS
+from lowalt.files.errors import InputError
 from lowalt.shards.tar import BLOCK
 
 RECORD_BYTES = 2048

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.common.files import replacing, sha256
+from lowalt.files.atomic import replacing, sha256
 from lowalt.shards.table import table_path
 
 NAME = "SHA256SUMS"

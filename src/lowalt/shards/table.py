@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.archives import write_arrays
-from lowalt.common.array_files import UNREADABLE, checked_archive
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.files.archives import write_arrays
+from lowalt.files.array_files import UNREADABLE, checked_archive
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.errors import InputError
 from lowalt.tiles.files import map_array
 
 SAMPLE = np.dtype(

@@ -9,7 +9,7 @@ import tarfile
 from dataclasses import dataclass
 from typing import BinaryIO
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 BLOCK = 512
 RECORD = 10240

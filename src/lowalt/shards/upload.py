@@ -8,9 +8,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lowalt.common import hub_upload
-from lowalt.common.command import run
-from lowalt.common.errors import InputError
+from lowalt.config.command import run
+from lowalt.files import hub_upload
+from lowalt.files.errors import InputError
 from lowalt.shards.index import load
 from lowalt.shards.verify import faults
 

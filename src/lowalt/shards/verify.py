@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import sha256
+from lowalt.files.atomic import sha256
+from lowalt.files.errors import InputError
 from lowalt.shards import manifest, sums
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path

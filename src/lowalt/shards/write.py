@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.classes import CATEGORIES, label
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
-from lowalt.common.network import Network
-from lowalt.common.splits import FOLDS, fold
+from lowalt.config.classes import CATEGORIES, label
+from lowalt.config.network import Network
+from lowalt.config.splits import FOLDS, fold
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.shards.clean import packed
 from lowalt.shards.record import model_key, rank, record, sample_key
 from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path

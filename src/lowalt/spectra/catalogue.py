@@ -11,8 +11,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.spectra.interface import KnowsTimes, OfProfiles, Spectrum
 from lowalt.spectra.settings import windows
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Fourier

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 MOST_SPEEDS = 65_536
 """Most matched speeds, as many as a transform may have points."""

@@ -11,7 +11,7 @@ bits on every machine that keeps IEEE 754. The kernels work in the precision of 
 import numpy as np
 from numba import njit
 
-from lowalt.common.portable import sine_cosine_turns
+from lowalt.numerics.portable import sine_cosine_turns
 
 
 def turns(points: int, dtype: type) -> tuple[np.ndarray, np.ndarray]:

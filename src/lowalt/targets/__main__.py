@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from lowalt.common.command import parser, pick, run
+from lowalt.config.command import parser, pick, run
 from lowalt.targets.cloud import write
 from lowalt.targets.make import make
 

@@ -5,8 +5,8 @@ import json
 
 import numpy as np
 
-from lowalt.common.classes import like
-from lowalt.common.streams import stream
+from lowalt.config.classes import like
+from lowalt.numerics.streams import stream
 from lowalt.targets.assemble import assemble
 from lowalt.targets.builtin_record import MODULES, check_record, record_files
 from lowalt.targets.cloud import Cloud

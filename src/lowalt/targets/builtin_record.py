@@ -2,8 +2,8 @@
 
 import math
 
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError
+from lowalt.config.classes import like
+from lowalt.files.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 
 MODULES = {"UAV": uav, "Bird": bird, "Vehicle": vehicle}

@@ -24,11 +24,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import classes
-from lowalt.common.archives import write_arrays
-from lowalt.common.array_files import UNREADABLE, checked_archive
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.config import classes
+from lowalt.files.archives import write_arrays
+from lowalt.files.array_files import UNREADABLE, checked_archive
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 
 KINDS = ("body", "rotor", "wing", "wheel", "node")
 MOST_TURNING_PARTS = 16

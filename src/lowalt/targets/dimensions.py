@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import write_csv
+from lowalt.config.command import run
+from lowalt.files.csv_tables import write_csv
 from lowalt.targets.records import load_records
 
 COLUMNS = ("subtype", "category", "figure", "value", "unit", "source")

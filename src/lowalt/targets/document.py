@@ -8,9 +8,9 @@ rewrites what stands between the two marks of the page and leaves the rest.
 import argparse
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.config.command import run
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.errors import InputError
 from lowalt.targets.record_schema import schema
 
 BEGIN, END = "<!-- keys of records -->", "<!-- end of the keys -->"

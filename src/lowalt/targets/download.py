@@ -9,9 +9,9 @@ import argparse
 import hashlib
 from pathlib import Path
 
-from lowalt.common.command import run
-from lowalt.common.download import download, fetch_each
-from lowalt.common.errors import InputError
+from lowalt.config.command import run
+from lowalt.files.download import download, fetch_each
+from lowalt.files.errors import InputError
 
 OFFICIAL = "http://mocap.cs.cmu.edu/subjects"
 

@@ -6,9 +6,9 @@ The draft is a YAML text with one record; it passes the checks of `mesh_record`,
 import numpy as np
 import yaml
 
-from lowalt.common import portable
-from lowalt.common.classes import AIRBORNE
-from lowalt.common.errors import InputError
+from lowalt.config.classes import AIRBORNE
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.guesses import TURNING, Component, box_of
 from lowalt.targets.inspection import Inspection
 from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND

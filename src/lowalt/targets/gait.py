@@ -10,10 +10,10 @@ import json
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError
-from lowalt.common.portable import product
+from lowalt.config.classes import like
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.portable import product
 from lowalt.targets import cyclist, gait_run, gait_walk, quadruped, record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.skeleton import FEET, NODES, forward_kinematics, node_cloud, rotation

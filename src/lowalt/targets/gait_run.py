@@ -12,7 +12,7 @@ Hip angles are those of the thigh against the vertical: [H] minus 1 degree, whic
 
 import numpy as np
 
-from lowalt.common.portable import sine_cosine_turns
+from lowalt.numerics.portable import sine_cosine_turns
 from lowalt.targets.gait_walk import through
 
 STRIDES_PER_SECOND = 84.8 / 60

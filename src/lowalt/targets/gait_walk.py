@@ -7,8 +7,8 @@ Source: "A global human walking model with real-time kinematic personification",
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.portable import sine_cosine_turns
+from lowalt.files.errors import InputError
+from lowalt.numerics.portable import sine_cosine_turns
 
 
 def through(points: list[tuple[float, float]], phase: np.ndarray) -> np.ndarray:

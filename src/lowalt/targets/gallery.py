@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.command import run
-from lowalt.common.files import replacing
-from lowalt.common.picture_layout import settle
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.numerics.picture_layout import settle
 from lowalt.targets import cyclist, quadruped
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.skeleton import NODES, PARENTS

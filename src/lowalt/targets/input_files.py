@@ -2,7 +2,7 @@
 
 from pathlib import PureWindowsPath
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 FORBIDDEN = "{}\\"
 """Characters that a name must not have: Snakemake takes braces for a wildcard, and a backslash is a folder on Windows

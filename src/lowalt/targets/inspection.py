@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.files import existing
+from lowalt.files.atomic import existing
 from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces

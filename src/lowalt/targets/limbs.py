@@ -5,8 +5,8 @@ Axes: x right, y front, z up, metres; positions, not angles, since the paths of 
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 
 
 def joint(start: np.ndarray, end: np.ndarray, upper_m: float, lower_m: float, bend: float) -> np.ndarray:

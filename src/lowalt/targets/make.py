@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, check
 
 

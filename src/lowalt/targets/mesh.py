@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError, InputWarning
-from lowalt.common.files import sha256
-from lowalt.common.streams import stream
+from lowalt.config.classes import like
+from lowalt.files.atomic import sha256
+from lowalt.files.errors import InputError, InputWarning
+from lowalt.numerics import portable
+from lowalt.numerics.streams import stream
 from lowalt.targets import vehicle
 from lowalt.targets.assemble import Part, allot, sample_part
 from lowalt.targets.builtin import checksum

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.mesh_polygons import triangulated
 
 

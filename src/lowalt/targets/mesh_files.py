@@ -12,9 +12,9 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError, InputWarning
-from lowalt.common.files import existing
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError, InputWarning
+from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import stated_metres
 from lowalt.targets.mesh_obj import stated_unit
 from lowalt.targets.mesh_scene import selected

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.mesh_polygons import stripped
 
 TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}

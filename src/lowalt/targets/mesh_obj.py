@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.mesh_polygons import triangulated
 
 NAMES = ("o", "g", "usemtl")

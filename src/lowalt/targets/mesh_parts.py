@@ -9,9 +9,9 @@ from itertools import combinations
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.matrices import thinnest
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.matrices import thinnest
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.sampling import face_normals, sample_faces
 from lowalt.targets.skeleton import rotation

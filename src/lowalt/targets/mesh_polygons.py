@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 
 FLAT = 1e-9
 """A corner dents its polygon where its turn against the polygon's sense is more than this share of the area."""

@@ -5,8 +5,8 @@ unit; a checked record has metres. The order of keys and parts changes nothing. 
 with their meaning.
 """
 
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError
+from lowalt.config.classes import like
+from lowalt.files.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
 from lowalt.targets.input_files import check_file_name

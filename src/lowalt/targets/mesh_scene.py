@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import for_trimesh
 from lowalt.targets.mesh_glb import read_glb
 from lowalt.targets.mesh_obj import read_obj

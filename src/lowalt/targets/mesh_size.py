@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError
+from lowalt.config.classes import like
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets import bird
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_parts import Pool

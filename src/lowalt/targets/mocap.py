@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.classes import like
-from lowalt.common.errors import InputError, InputWarning
-from lowalt.common.files import sha256
+from lowalt.config.classes import like
+from lowalt.files.atomic import sha256
+from lowalt.files.errors import InputError, InputWarning
+from lowalt.numerics import portable
 from lowalt.targets import record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps

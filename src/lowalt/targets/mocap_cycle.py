@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.matrices import nearest_rotations
-from lowalt.common.portable import product
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.matrices import nearest_rotations
+from lowalt.numerics.portable import product
 from lowalt.targets.mocap_motion import Motion, nodes_m
 from lowalt.targets.skeleton import NODES
 

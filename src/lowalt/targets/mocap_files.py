@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.skeleton import LIMBS, NODES
 
 INCH_M = 0.0254

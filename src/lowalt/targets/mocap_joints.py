@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.array_files import UNREADABLE, checked_archive
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.files.array_files import UNREADABLE, checked_archive
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.mocap_motion import Motion
 from lowalt.targets.skeleton import NODES, PARENTS, rotation, stature_m
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
-from lowalt.common.portable import applied, product
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+from lowalt.numerics.portable import applied, product
 from lowalt.targets.mocap_files import Skeleton
 from lowalt.targets.skeleton import NODES, PARENTS, forward_kinematics, rotation
 

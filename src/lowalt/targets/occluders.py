@@ -12,13 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.archives import write_arrays
-from lowalt.common.array_files import UNREADABLE, checked_archive
-from lowalt.common.classes import like
-from lowalt.common.command import parser, pick, run
-from lowalt.common.environment import INPUTS
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.config.classes import like
+from lowalt.config.command import parser, pick, run
+from lowalt.files.archives import write_arrays
+from lowalt.files.array_files import UNREADABLE, checked_archive
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
+from lowalt.machine.environment import INPUTS
 from lowalt.targets.assemble import Part, turn
 from lowalt.targets.skeleton import NODES, PARENTS
 from lowalt.targets.surfaces import Surface, inside, merged

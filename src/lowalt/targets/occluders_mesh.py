@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.streams import stream
+from lowalt.numerics.streams import stream
 from lowalt.targets import mesh, vehicle
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut, inside

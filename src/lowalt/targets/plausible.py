@@ -9,7 +9,7 @@ import warnings
 
 import numpy as np
 
-from lowalt.common.errors import InputError, InputWarning
+from lowalt.files.errors import InputError, InputWarning
 from lowalt.targets.mesh_parts import Pool
 
 ACROSS = np.cos(np.radians(20.0))

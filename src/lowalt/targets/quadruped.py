@@ -8,8 +8,8 @@ J Mammalogy 49, 353-360. Lengths in heights at the withers, and the sway of back
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.limbs import joint
 
 STANCE = 0.42

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import jsonschema
 
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 
 PATH = Path(__file__).with_name("records.schema.yaml")
 COMMON = "every record"

@@ -11,10 +11,10 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from lowalt.common.classes import AIRBORNE, classes_of, like
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import AIRBORNE, classes_of, like
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")

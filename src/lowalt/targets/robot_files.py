@@ -12,8 +12,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.robot_geometry import Files, direction, numbers, place_of, primitive, shown
 from lowalt.targets.robots import Joint, Robot
 

@@ -6,8 +6,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 from lowalt.targets.mesh_collada import parsed, stated_metres
 from lowalt.targets.mesh_files import SUFFIXES
 from lowalt.targets.mesh_scene import selected

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.targets.draft import alternating, row_lines, size_word
 from lowalt.targets.guesses import TURNING
 from lowalt.targets.mesh_files import LARGEST_TRIANGLES

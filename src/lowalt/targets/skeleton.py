@@ -6,7 +6,7 @@ end of the bone that carries its name, as in the CMU skeleton files. Axes: x rig
 
 import numpy as np
 
-from lowalt.common import portable
+from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 
 LIMBS = {

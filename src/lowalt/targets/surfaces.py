@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.common import portable
+from lowalt.numerics import portable
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ body's height. FIGURES lists the figures that each layout needs. A plain factor 
 
 import numpy as np
 
-from lowalt.common import portable
+from lowalt.numerics import portable
 from lowalt.targets import aircraft
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import box, cylinder, hull, ring, tube

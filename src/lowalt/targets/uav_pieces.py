@@ -5,7 +5,7 @@ Axes: front +y, right +x, up +z, metres. `figure` is a record's figures in SI un
 
 import numpy as np
 
-from lowalt.common import portable
+from lowalt.numerics import portable
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, cylinder, ellipsoid, foil, hull, tube
 

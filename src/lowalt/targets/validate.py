@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.targets.cloud import Cloud, read
 
 

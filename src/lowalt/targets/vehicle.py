@@ -6,7 +6,7 @@ the height above the ground.
 
 import numpy as np
 
-from lowalt.common import portable
+from lowalt.numerics import portable
 from lowalt.targets.assemble import Part
 from lowalt.targets.surfaces import Surface, box, cylinder, hull, loft, ring, superellipse
 

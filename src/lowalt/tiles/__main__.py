@@ -4,8 +4,8 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from lowalt.common.command import parser, pick, run
-from lowalt.common.progress import reported
+from lowalt.config.command import parser, pick, run
+from lowalt.machine.progress import reported
 from lowalt.tiles import files, reduced
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer

@@ -4,7 +4,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 
 @lru_cache(maxsize=16)

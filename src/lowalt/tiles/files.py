@@ -13,9 +13,9 @@ from pathlib import Path
 import deflate
 import numpy as np
 
-from lowalt.common.array_files import UNREADABLE
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.files.array_files import UNREADABLE
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.errors import InputError
 
 
 def npy_header(dtype: str, shape: tuple[int, ...]) -> bytes:

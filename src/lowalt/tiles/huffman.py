@@ -10,7 +10,7 @@ import struct
 import deflate
 import numpy as np
 
-from lowalt.common.jit import PLAIN
+from lowalt.machine.jit import PLAIN
 from lowalt.tiles.huffman_code import LONGEST, canonical_codes, code_lengths
 
 END = 256

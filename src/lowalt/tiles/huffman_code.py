@@ -5,7 +5,7 @@ In plain loops: NumPy's sorting, joining and summing take longer to compile than
 
 import numpy as np
 
-from lowalt.common.jit import PLAIN
+from lowalt.machine.jit import PLAIN
 
 LONGEST = 15
 """Bits of the longest code that DEFLATE allows for literals and lengths (RFC 1951, section 3.2.7)."""

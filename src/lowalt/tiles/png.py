@@ -11,7 +11,7 @@ import deflate
 import numpy as np
 from PIL import Image
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.tiles import filters
 from lowalt.tiles.huffman import zlib_compress
 

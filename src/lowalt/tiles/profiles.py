@@ -4,13 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
-from lowalt.common.streams import stream
+from lowalt.config.network import Network
 from lowalt.echo import Rigid, range_profile
 from lowalt.echo.scene import target
+from lowalt.files.errors import InputError
 from lowalt.motion import poses
 from lowalt.noise.profile import noisy_profile
+from lowalt.numerics.streams import stream
 from lowalt.spectra import Spectra, spectrum
 from lowalt.spectra.interface import OfProfiles
 from lowalt.targets.cloud import Cloud, cloud_of

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing, replacing
+from lowalt.files.atomic import existing, replacing
+from lowalt.files.errors import InputError
 from lowalt.tiles.render import split
 from lowalt.tiles.resample import resize
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.command import pick
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.spectra import Spectra, spectrum, windows
 from lowalt.spectra.interface import KnowsTimes, OfProfiles
 from lowalt.spectra.known_times import even

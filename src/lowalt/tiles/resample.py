@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 from numba import njit
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 
 
 @lru_cache(maxsize=64)

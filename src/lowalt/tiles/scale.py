@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
 
 SCALES = ("linear", "decibel", "power")
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lowalt.common.command import pick
-from lowalt.common.errors import InputError
+from lowalt.config.command import pick
+from lowalt.files.errors import InputError
 from lowalt.tiles.colour import colour_map
 from lowalt.tiles.scale import Scale
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 
 
 def load_signals(path: str | Path, network: Network) -> np.ndarray:

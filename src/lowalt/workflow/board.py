@@ -6,7 +6,7 @@ Times are seconds since the epoch, so that a board can be kept in a file and rea
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
-from lowalt.common.progress import Progress
+from lowalt.machine.progress import Progress
 
 Reader = Callable[[str, float], Progress | None]
 """Reads from a job's log how much of the job is done; the log may still be that of a run before the job's start (s)."""

@@ -3,9 +3,9 @@
 import sys
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.shipped import located
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.shipped import located
+from lowalt.files.yaml_files import load_yaml
 
 
 def averages(path: str | Path) -> dict[tuple[str, str], float]:

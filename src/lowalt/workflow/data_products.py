@@ -5,7 +5,7 @@ Each method takes the wildcards of a job and can stand in a rule's `input:`. Not
 
 from typing import Any
 
-from lowalt.common.files import slug
+from lowalt.files.atomic import slug
 from lowalt.scene.lateness import timed
 from lowalt.spectra.catalogue import profiled
 from lowalt.targets.records import source_files

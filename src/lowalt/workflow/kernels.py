@@ -1,9 +1,9 @@
 """`python -m lowalt.workflow.kernels`: compile the machine code of data stages before their jobs ask for it.
 
-Machine code is compiled once on each machine (`lowalt.common.jit`), which takes most of a minute of processor time. The
-first jobs of the echo and tiles stages would compile it one stage after the other. Here two processes do so at the same
-time, with about as much work each: they run the stages' own commands on very small inputs. A job that starts meanwhile
-waits for them.
+Machine code is compiled once on each machine (`lowalt.machine.jit`), which takes most of a minute of processor time.
+The first jobs of the echo and tiles stages would compile it one stage after the other. Here two processes do so at the
+same time, with about as much work each: they run the stages' own commands on very small inputs. A job that starts
+meanwhile waits for them.
 """
 
 import json
@@ -15,10 +15,10 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.command import run
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
-from lowalt.common.network import masts_m, station_names
+from lowalt.config.command import run
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import masts_m, station_names
+from lowalt.files.errors import InputError
 
 CONFIGURATION = Path("config/default.yaml")
 STAGES = ("echo", "tiles", "tolerances")

@@ -9,7 +9,7 @@ import os
 from dataclasses import dataclass
 from typing import Any
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 
 
 @dataclass(frozen=True)

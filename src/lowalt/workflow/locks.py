@@ -18,8 +18,8 @@ from dataclasses import asdict, dataclass, field
 from itertools import count
 from pathlib import Path
 
-from lowalt.common.errors import InputError
-from lowalt.common.processes import state
+from lowalt.files.errors import InputError
+from lowalt.files.processes import state
 
 KINDS = ("input", "output")
 TOKEN = "LOWALT_RUN"

@@ -14,8 +14,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from lowalt.common.command import refusing
-from lowalt.common.errors import InputError
+from lowalt.config.command import refusing
+from lowalt.files.errors import InputError
 from lowalt.workflow.locks import TOKEN, Owner, drop, guarded, holders, refusal, take, take_over
 
 

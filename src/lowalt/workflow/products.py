@@ -8,9 +8,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from lowalt.common.errors import InputError
-from lowalt.common.shipped import shipped
-from lowalt.common.street import PACKAGE
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.files.street import PACKAGE
 from lowalt.report.inputs import KEPT
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near

@@ -7,13 +7,13 @@ Each function raises InputError that names key, value and what was expected. `Ru
 from collections.abc import Collection
 from pathlib import Path
 
-from lowalt.common.classes import AIRBORNE, CATEGORIES
-from lowalt.common.config import plain
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.network import SPEED_OF_LIGHT, masts_m, station_names
-from lowalt.common.shipped import SHIPPED, as_named
-from lowalt.common.yaml_files import load_yaml
+from lowalt.config.classes import AIRBORNE, CATEGORIES
+from lowalt.config.layers import plain
+from lowalt.config.network import SPEED_OF_LIGHT, masts_m, station_names
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED, as_named
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
 from lowalt.shards.clean import refuse

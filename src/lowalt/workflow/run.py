@@ -8,12 +8,12 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from lowalt.common.classes import classes_of
-from lowalt.common.config import check
-from lowalt.common.errors import InputError
-from lowalt.common.files import slug
-from lowalt.common.network import Network, station_names
-from lowalt.common.plan import Plan
+from lowalt.config.classes import classes_of
+from lowalt.config.layers import check
+from lowalt.config.network import Network, station_names
+from lowalt.config.plan import Plan
+from lowalt.files.atomic import slug
+from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra import Spectra

@@ -6,10 +6,10 @@ wildcards of a job and can stand in a rule's `params:`. A text is made once: Sna
 
 from typing import Any
 
-from lowalt.common.config import canonical
-from lowalt.common.network import as_far_as, masts_m
-from lowalt.common.plan import Chunk
-from lowalt.common.shipped import as_named
+from lowalt.config.layers import canonical
+from lowalt.config.network import as_far_as, masts_m
+from lowalt.config.plan import Chunk
+from lowalt.files.shipped import as_named
 from lowalt.motion.sample import masts_in_reach
 from lowalt.scene.lateness import timed
 from lowalt.scene.set_noise import in_all_cells

@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.common.errors import InputError, SpaceError
-from lowalt.common.files import free_bytes
-from lowalt.common.plan import Plan
-from lowalt.common.splits import FOLDS
+from lowalt.config.plan import Plan
+from lowalt.config.splits import FOLDS
+from lowalt.files.atomic import free_bytes
+from lowalt.files.errors import InputError, SpaceError
 from lowalt.spectra.catalogue import named
 
 VARIABLE = "LOWALT_SPACE"

@@ -10,9 +10,9 @@ import socket
 import time
 from pathlib import Path
 
-from lowalt.common import progress
-from lowalt.common.files import replacing
-from lowalt.common.processes import started
+from lowalt.files.atomic import replacing
+from lowalt.files.processes import started
+from lowalt.machine import progress
 from lowalt.workflow.board import Board, span
 
 FOLDER = Path(".snakemake/status")

@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.cell_kernel import PLACES, SIDE
 from lowalt.echo.fast.error_model import SINGLE_BLOCK
@@ -18,6 +17,7 @@ from lowalt.echo.fast.strip import STRIP, strip_size
 from lowalt.echo.fast.strongest_cell import CERTAIN, UNCERTAIN, certify
 from lowalt.echo.pointwise.reference_range import CELL, RANGE, REST
 from lowalt.echo.pointwise.terms import cell_phase
+from lowalt.machine.jit import INLINED, LEAN
 
 
 @INLINED

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
 from lowalt.echo.fast.strip import MULTIPLE, strip_size
 from lowalt.echo.scene import EchoScene
+from lowalt.machine.jit import LEAN
 
 
 class Layout(NamedTuple):

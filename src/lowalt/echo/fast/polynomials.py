@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from lowalt.common.jit import LEAN, VECTOR
+from lowalt.machine.jit import LEAN, VECTOR
 
 TOP = 40
 """Highest degree of any polynomial here; a stretch that would need more goes to the pointwise kernel."""

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
 from lowalt.echo.pointwise.reference_range import RANGE, X, Y, Z
+from lowalt.machine.jit import LEAN
 
 PSI, OMEGA, SPREAD, SIZE, MEAN = range(5)
 """Columns of the table of extents: direction cosines of the reference, and the largest distance of a point from the

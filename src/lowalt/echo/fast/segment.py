@@ -5,12 +5,12 @@ A segment is a number of successive symbols over which the array gains are short
 
 import numpy as np
 
-from lowalt.common.jit import INLINED
 from lowalt.echo.fast import vector_loops
 from lowalt.echo.fast.polynomials import TOP, degree_for, economised, tail
 from lowalt.echo.fast.range_bounds import OMEGA_CENTRE, OMEGA_HALF, PSI_CENTRE, PSI_HALF
 from lowalt.echo.fast.strip import Geometry, PartPose, Placing
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN, X, Y, Z
+from lowalt.machine.jit import INLINED
 
 
 @INLINED

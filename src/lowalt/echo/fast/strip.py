@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import LEAN
+from lowalt.machine.jit import LEAN
 
 STRIP = 256
 """Most points worked on at a time: a dozen arrays of 2 kB stay in the nearest cache."""

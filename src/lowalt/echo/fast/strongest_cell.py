@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INLINED, INNER_VECTOR, LEAN
 from lowalt.echo.fast.cell_kernel import SIDE
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
+from lowalt.machine.jit import INLINED, INNER_VECTOR, LEAN
 
 CERTAIN, UNCERTAIN = 0, 1
 """State of a symbol: its strongest cell is proved, or it must be computed again by the exact plan or pointwise."""

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR
 from lowalt.echo.fast.strip import MULTIPLE
+from lowalt.machine.jit import INNER_VECTOR
 
 
 @INNER_VECTOR

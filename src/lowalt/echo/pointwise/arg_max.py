@@ -5,7 +5,7 @@ Each kernel has its own bound for the cells that it did not compute.
 
 import math
 
-from lowalt.common.jit import INNER
+from lowalt.machine.jit import INNER
 
 NEAR_TIE = 1e-12
 """Relative gap below which the two strongest cells count as a near-tie."""

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import INNER_VECTOR, PLAIN
 from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.terms import cell_phase, cell_weight, sin_pi, terms
+from lowalt.machine.jit import INNER_VECTOR, PLAIN
 
 
 @INNER_VECTOR

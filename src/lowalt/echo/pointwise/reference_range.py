@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
-from lowalt.common import double_double
-from lowalt.common.jit import INNER, LEAN
 from lowalt.echo.radar import Radar
+from lowalt.machine.jit import INNER, LEAN
+from lowalt.numerics import double_double
 
 X, Y, Z, RANGE, TURN, CELL, REST = range(7)
 """Columns of the table of reference ranges: vector from the station (m), range (m), fraction of a turn of its phase,

@@ -8,10 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.jit import PLAIN
 from lowalt.echo.pointwise.arg_max import NEAR_TIE, strongest_of
 from lowalt.echo.pointwise.reference_range import CELL
 from lowalt.echo.pointwise.terms import cell_phase, cell_sum, terms
+from lowalt.machine.jit import PLAIN
 
 
 class Paths(NamedTuple):

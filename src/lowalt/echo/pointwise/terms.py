@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from lowalt.common.jit import LEAN, PLAIN
 from lowalt.echo.pointwise.reference_range import RANGE, REST, TURN
+from lowalt.machine.jit import LEAN, PLAIN
 
 
 @PLAIN

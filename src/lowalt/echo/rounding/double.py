@@ -7,11 +7,11 @@ to `share(points)` of its terms at a third of the time of `sums.cell_value`. Eve
 
 import numpy as np
 
-from lowalt.common.exact.arithmetic import scale
-from lowalt.common.exact.constants import taylor
-from lowalt.common.exact.sines import fraction, odd_sign
-from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.echo.rounding.sums import AMPLITUDE, CELL, TURN, constants_of, patterns, phase_of, seen
+from lowalt.machine.jit import INLINED, INNER, LEAN
+from lowalt.numerics.exact.arithmetic import scale
+from lowalt.numerics.exact.constants import taylor
+from lowalt.numerics.exact.sines import fraction, odd_sign
 
 LANES = 8
 """Sums that run side by side: point i is added to sum i modulo 8. The padding of points is a multiple of it."""

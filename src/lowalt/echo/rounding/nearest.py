@@ -9,8 +9,6 @@ from fractions import Fraction
 
 import numpy as np
 
-from lowalt.common.exact.arithmetic import two_sum
-from lowalt.common.jit import INLINED, LEAN
 from lowalt.echo.fast.layout import Layout
 from lowalt.echo.fast.workspace import Found
 from lowalt.echo.pointwise import sums as pointwise
@@ -18,6 +16,8 @@ from lowalt.echo.radar import Radar
 from lowalt.echo.rounding import double
 from lowalt.echo.rounding.sums import ROWS, cell_value
 from lowalt.echo.scene import EchoScene
+from lowalt.machine.jit import INLINED, LEAN
+from lowalt.numerics.exact.arithmetic import two_sum
 
 ERROR = 2.0**-64
 """Bound of a double-double cell's error relative to the sum of amplitudes."""

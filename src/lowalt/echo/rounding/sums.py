@@ -6,10 +6,10 @@ only the last loop adds over points, and it keeps their order.
 
 import numpy as np
 
-from lowalt.common.exact.arithmetic import add, divide, multiply, product, root, subtract, two_sum
-from lowalt.common.exact.sines import dirichlet, sine_cosine
-from lowalt.common.jit import INLINED, INNER, LEAN
 from lowalt.echo.radar import constants
+from lowalt.machine.jit import INLINED, INNER, LEAN
+from lowalt.numerics.exact.arithmetic import add, divide, multiply, product, root, subtract, two_sum
+from lowalt.numerics.exact.sines import dirichlet, sine_cosine
 
 constants_of = INLINED(constants)
 

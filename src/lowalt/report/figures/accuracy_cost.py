@@ -7,10 +7,10 @@ import argparse
 
 from matplotlib import pyplot as plt
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import read_csv
+from lowalt.files.errors import InputError
 from lowalt.report.figures.style import SNR_LABELS, png
 
 NEEDED = (

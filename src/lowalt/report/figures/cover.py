@@ -6,8 +6,8 @@ import sys
 import numpy as np
 from PIL import Image
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.errors import InputError
 from lowalt.report.figures.tiles import example_tiles
 from lowalt.shards import ShardSet
 

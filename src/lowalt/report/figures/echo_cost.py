@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from lowalt.common.command import run
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.files import replacing
-from lowalt.common.picture_layout import settle
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import read_csv
+from lowalt.numerics.picture_layout import settle
 
 DPI = 110
 """Dots per inch."""

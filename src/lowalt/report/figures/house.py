@@ -10,9 +10,9 @@ import textwrap
 
 from matplotlib import pyplot as plt
 
-from lowalt.common.command import run
-from lowalt.common.files import replacing
-from lowalt.common.street import PACKAGE, STREET, modules, purpose, rooms_imported
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.files.street import PACKAGE, STREET, modules, purpose, rooms_imported
 from lowalt.report.figures.style import png
 
 WIDTH = 60
@@ -46,16 +46,16 @@ def draw() -> bytes:
     """
     rows, columns = imports()
     count = len(STREET)
-    figure, panel = plt.subplots(figsize=(15, 0.62 * count + 1.2))
+    figure, panel = plt.subplots(figsize=(16, 0.62 * count + 1.2))
     for place, room in enumerate(STREET):
         panel.axhline(place + 0.5, color="0.9", lw=0.8)
-        panel.text(-7.4, place, room, fontsize=13, weight="bold", va="center", ha="right")
-        panel.text(-7.1, place, _words(room), fontsize=8.5, va="center", color="0.25", linespacing=1.3)
+        panel.text(-8.2, place, room, fontsize=13, weight="bold", va="center", ha="right")
+        panel.text(-7.9, place, _words(room), fontsize=8.5, va="center", color="0.25", linespacing=1.3)
         panel.add_patch(plt.Rectangle((place - 0.5, place - 0.5), 1, 1, color="0.92", zorder=0))
     for room, other in dict.fromkeys(zip(rows, columns, strict=True)):
         files = sum((room, other) == pair for pair in zip(rows, columns, strict=True))
         panel.scatter(STREET.index(other), STREET.index(room), s=18 * files, color="C0", alpha=0.8, linewidths=0)
-    panel.set(xlim=(-9.6, count - 0.5), ylim=(count - 0.5, -0.5))
+    panel.set(xlim=(-10.8, count - 0.5), ylim=(count - 0.5, -0.5))
     panel.xaxis.tick_top()
     panel.set_xticks(range(count), STREET, rotation=40, ha="left", fontsize=10)
     panel.set_yticks([])

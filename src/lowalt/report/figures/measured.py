@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
-from lowalt.common.errors import InputError
-from lowalt.common.files import existing
+from lowalt.files.atomic import existing
+from lowalt.files.errors import InputError
 from lowalt.report.figures.style import plt, png
 
 ROWS = {"measured": "measured", "simulated": "simulated", "before": "simulated, before the model was mended"}

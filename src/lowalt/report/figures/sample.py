@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.network import Station
+from lowalt.config.network import Station
 from lowalt.report.figures.style import plt, png
 from lowalt.spectra import spectrum
 from lowalt.spectra.interface import OfProfiles

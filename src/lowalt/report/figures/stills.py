@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.common.csv_tables import write_csv
-from lowalt.common.files import replacing
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import write_csv
 from lowalt.report.figures.motion_strip import strip_figure, strip_rows
 from lowalt.report.figures.style import embedded, svg
 from lowalt.targets.cloud import Cloud

@@ -6,7 +6,7 @@ import io
 import matplotlib
 from PIL import Image
 
-from lowalt.common.picture_layout import settle
+from lowalt.numerics.picture_layout import settle
 
 matplotlib.use("Agg")  # no screen on a cluster node
 from matplotlib import pyplot as plt

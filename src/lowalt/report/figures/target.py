@@ -8,14 +8,14 @@ import numpy as np
 from matplotlib import pyplot as plt
 from PIL import Image
 
-from lowalt.common.config import load_yaml
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network, masts_m
-from lowalt.common.shipped import SHIPPED
-from lowalt.common.streams import stream
+from lowalt.config.layers import load_yaml
+from lowalt.config.network import Network, masts_m
 from lowalt.echo import Rigid, echo_signal
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import SHIPPED
 from lowalt.motion import poses, positions
 from lowalt.motion.sample import draw, region_polygon
+from lowalt.numerics.streams import stream
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
 from lowalt.spectra import Spectra, spectrum

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from lowalt.common.csv_tables import read_csv
+from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.accuracy_plots import over_snr
 from lowalt.report.run import ReportedRun
 from lowalt.report.tables import by_scheme, macro_f1, spreads

@@ -5,9 +5,9 @@ from importlib.metadata import PackageNotFoundError, version
 
 import yaml
 
-from lowalt.common.hardware import describe
-from lowalt.common.shipped import as_named, shipped
-from lowalt.common.yaml_files import load_yaml
+from lowalt.files.shipped import as_named, shipped
+from lowalt.files.yaml_files import load_yaml
+from lowalt.machine.hardware import describe
 from lowalt.report.provenance import changes, checksums, code_sum, commands, revision
 from lowalt.report.run import ReportedRun
 

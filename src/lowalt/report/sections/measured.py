@@ -6,8 +6,8 @@ measured-NAME.png a pair of pictures. `make measured` writes them.
 
 from pathlib import Path
 
-from lowalt.common.classes import CATEGORIES
-from lowalt.common.csv_tables import read_csv
+from lowalt.config.classes import CATEGORIES
+from lowalt.files.csv_tables import read_csv
 from lowalt.report.figures.style import embedded
 from lowalt.report.run import ReportedRun
 

@@ -1,7 +1,7 @@
 """Section: what the run is, its accuracies beside the paper's in one sentence each, and three of its tiles."""
 
-from lowalt.common.csv_tables import read_csv
-from lowalt.common.hardware import describe
+from lowalt.files.csv_tables import read_csv
+from lowalt.machine.hardware import describe
 from lowalt.report.figures.style import embedded
 from lowalt.report.figures.tiles import example_tiles
 from lowalt.report.run import ReportedRun

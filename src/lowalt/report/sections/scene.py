@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.report.run import ReportedRun
 
 

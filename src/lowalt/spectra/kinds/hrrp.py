@@ -5,7 +5,7 @@ It is made of range profiles (`lowalt.echo.range_profile`), not of a station's s
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.spectra.settings import RangeCells as Settings
 
 TITLE = "range profile (HRRP)"

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
-from lowalt.common.portable import sine_cosine
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.numerics.portable import sine_cosine
 from lowalt.spectra.known_times import line_sums, shares
 from lowalt.spectra.segments import segments
 from lowalt.spectra.settings import Transfer

@@ -7,9 +7,9 @@ sight, whose rays the station sends and receives in the same directions. Nothing
 import numpy as np
 from scipy.special import gammaincinv
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Station
 from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
 from lowalt.scene.antenna import gain
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.crossing import toward

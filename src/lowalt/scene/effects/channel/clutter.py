@@ -11,9 +11,9 @@ from scipy import fft
 from scipy.signal import lfilter
 from scipy.special import gamma, gammaincinv, ndtr, ndtri
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
 from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene import land
 from lowalt.scene.antenna import gain

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.streams import stream
+from lowalt.files.errors import InputError
 from lowalt.motion.sample import AIRBORNE, draw_rates
 from lowalt.motion.table import NUMBERS
+from lowalt.numerics.streams import stream
 from lowalt.scene.checks import CheckedScene
 from lowalt.targets.cloud import Cloud
 

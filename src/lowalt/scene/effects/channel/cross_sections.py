@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.special import j1
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
 from lowalt.scene.view import View
 

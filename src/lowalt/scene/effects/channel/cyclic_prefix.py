@@ -9,7 +9,7 @@ point is cut at its direct delay, on the reflected paths too; other echoes are c
 import numpy as np
 from scipy import fft
 
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
 from lowalt.scene.prefix import length_s as length_s
 from lowalt.scene.prefix import turn as turn
 from lowalt.scene.view import View

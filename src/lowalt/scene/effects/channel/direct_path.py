@@ -7,7 +7,7 @@ names this effect, without loss or with it; everything physical that is not mode
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing
 from lowalt.scene.view import View

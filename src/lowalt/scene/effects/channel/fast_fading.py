@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 
 OFFSETS = np.repeat([0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551], 2)
 OFFSETS[1::2] *= -1

@@ -8,7 +8,7 @@ classes have.
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.target_classes import LARGE_UAV, LARGE_UAV_DBSM, VEHICLE, VEHICLE_DBSM, Lobe, large
 from lowalt.scene.view import View

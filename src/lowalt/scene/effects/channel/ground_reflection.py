@@ -7,9 +7,9 @@ back by either path gives four echoes; the response forms them. Points are taken
 import numpy as np
 from scipy.special import i0e
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene, above_ground
 from lowalt.scene.fresnel import fresnel

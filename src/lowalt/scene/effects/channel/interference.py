@@ -13,8 +13,8 @@ from functools import cache
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.files.errors import InputError
 from lowalt.scene import clocks, waveform
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.crossing import crossing

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.motion.cross_section import mean_cross_section
 from lowalt.scene.target_classes import (
     HUMAN_DBSM,

@@ -10,8 +10,8 @@ from collections.abc import Collection
 import numpy as np
 from scipy.special import fresnel
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
 from lowalt.scene.rays import hidden_by, hidden_by_bones
 from lowalt.scene.view import View
 from lowalt.targets.cloud import Cloud

@@ -8,7 +8,7 @@ end of its links.
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.view import Beams, View
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.catalogue import PLACES
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.response import ImagePath

@@ -5,7 +5,7 @@ Every time sample of a symbol sees the target where it then stands. The samples 
 
 import numpy as np
 
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.scene.response import chebyshev_points, interpolation, orders_of
 from lowalt.scene.view import View
 

@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.jit import VECTOR
 from lowalt.echo.radar import radar
+from lowalt.files.errors import InputError
+from lowalt.machine.jit import VECTOR
 from lowalt.scene import series
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.fresnel import fresnel

@@ -14,8 +14,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import eigh, toeplitz
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT, Network
+from lowalt.config.network import SPEED_OF_LIGHT, Network
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.channel.windblown import windblown
 from lowalt.scene.waveform import Look

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look
 

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.ndimage import convolve1d
 from scipy.optimize import brentq
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import SPEED_OF_LIGHT
+from lowalt.config.network import SPEED_OF_LIGHT
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look
 

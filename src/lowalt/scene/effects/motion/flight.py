@@ -2,8 +2,8 @@
 
 import math
 
-from lowalt.common.errors import InputError
-from lowalt.common.portable import log, power
+from lowalt.files.errors import InputError
+from lowalt.numerics.portable import log, power
 from lowalt.scene.target_classes import size_m
 from lowalt.targets.cloud import Cloud
 

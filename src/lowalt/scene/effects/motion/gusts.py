@@ -10,9 +10,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from lowalt.common import portable
 from lowalt.motion.poses import Perturbation
 from lowalt.motion.rotations import attitude
+from lowalt.numerics import portable
 from lowalt.scene.effects.motion import flight
 from lowalt.scene.effects.motion.markov import Steps, root_of, stationary, step_s, steps, walk
 from lowalt.targets.cloud import Cloud

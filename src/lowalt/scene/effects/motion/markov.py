@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lowalt.common import portable
-from lowalt.common.jit import PLAIN
+from lowalt.machine.jit import PLAIN
+from lowalt.numerics import portable
 
 _ORDER = 24
 """Orders of the exponential's Taylor series; of norms up to 2 the rest is below 2^25 / 25! = 2e-18."""

@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.set_noise import white
 from lowalt.scene.waveform import Look

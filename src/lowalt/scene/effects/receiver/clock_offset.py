@@ -8,7 +8,7 @@ import math
 import numpy as np
 from scipy import fft
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver import offsets
 from lowalt.scene.waveform import Look

@@ -6,7 +6,7 @@ from B to A the opposite. A station that receives its own signal has no offset.
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene import clocks
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver.offsets import delayed, risen

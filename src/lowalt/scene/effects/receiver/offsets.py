@@ -9,9 +9,9 @@ from statistics import NormalDist
 import numpy as np
 from scipy import fft
 
-from lowalt.common.errors import InputError
-from lowalt.common.jit import VECTOR
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
+from lowalt.machine.jit import VECTOR
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.phasor import phasor
 from lowalt.scene.waveform import Look

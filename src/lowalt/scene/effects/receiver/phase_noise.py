@@ -14,7 +14,7 @@ from numpy.polynomial import chebyshev
 from scipy import fft
 from scipy.linalg import toeplitz
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver.offsets import turned
 from lowalt.scene.waveform import Look

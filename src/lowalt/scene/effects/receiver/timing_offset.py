@@ -6,7 +6,7 @@ Past the prefix it would take in the neighbouring symbol, whose data no scene st
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.effects.receiver import offsets
 from lowalt.scene.waveform import Look

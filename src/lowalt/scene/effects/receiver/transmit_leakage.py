@@ -7,7 +7,7 @@ converter's quantisation noise, which follows the larger signal, stays.
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.waveform import Look, transmit
 

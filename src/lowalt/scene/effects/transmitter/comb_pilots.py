@@ -7,7 +7,7 @@ them. A cell is the mean of M / K subcarriers, so its noise is 10 lg K decibels 
 import numpy as np
 from scipy import fft
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 
 SOURCE = (

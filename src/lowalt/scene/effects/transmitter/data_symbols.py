@@ -6,7 +6,7 @@ A subcarrier that carried a symbol s has noise of 1 / |s|^2 times the receiver's
 
 import numpy as np
 
-from lowalt.common.errors import InputError
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 
 SOURCE = (

@@ -8,8 +8,8 @@ fold. The land and phase noise keep the nominal instants.
 
 import numpy as np
 
-from lowalt.common.errors import InputError
-from lowalt.common.network import Network
+from lowalt.config.network import Network
+from lowalt.files.errors import InputError
 from lowalt.scene.checks import CheckedScene
 from lowalt.scene.sampling import Sampling
 

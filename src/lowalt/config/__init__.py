@@ -1,0 +1,1 @@
+"""The configuration: its layers, schema, stations, classes, folds and plan of samples. No stage is known here."""

@@ -1,0 +1,148 @@
+"""Parts of all stages' command lines: the argument with the settings, errors in one line, the peak memory.
+
+A stage's settings arrive as one JSON object: `--settings '{"...": ...}'` or `--settings @file.json`.
+The workflow passes the object itself, so that Snakemake sees every change in it; a person passes a file.
+"""
+
+import argparse
+import contextlib
+import errno
+import functools
+import json
+import resource
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from lowalt.files.atomic import text_of
+from lowalt.files.errors import InputError, InputWarning
+from lowalt.machine.memory import keep_freed_memory
+
+
+def exit_status(code: int) -> int:
+    """Return the status of an ended process as shells give it: 128 and the signal's number where a signal ended it.
+
+    code: as `subprocess` gives it, a signal's number negative.
+    """
+    return code if code >= 0 else 128 - code
+
+
+def parser(module: str, description: str) -> argparse.ArgumentParser:
+    """Return an argument parser for `python -m {module}` that already has `--settings`."""
+    result = argparse.ArgumentParser(prog=f"python -m {module}", description=description)
+    result.add_argument("--settings", required=True, type=_argument, metavar="JSON|@FILE", help="settings object")
+    return result
+
+
+def name_backbone(line: argparse.ArgumentParser) -> None:
+    """Add the option with which a user names the code of a model's backbone, which the model's file may not choose."""
+    line.add_argument(
+        "--backbone", default="", metavar="FILE.py:FUNCTION", help="for a model on code of its maker's own: that code"
+    )
+
+
+def _argument(text: str) -> dict:
+    """Return `settings` of the text and keep its error message: argparse replaces the message of any ValueError."""
+    try:
+        return settings(text)
+    except InputError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def settings(text: str) -> dict:
+    """Return the settings object in `text`, a JSON object or `@` and the path of a file with one.
+
+    JSON has no infinity: the string "inf" stands for it wherever a number is expected.
+    Raises: InputError where the text is no JSON object.
+    """
+    source = text
+    if text.startswith("@"):
+        source = text_of(text[1:], "--settings")
+    try:
+        value = json.loads(source)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"--settings {text[:80]!r}: not JSON ({error})") from error
+    if not isinstance(value, dict):
+        raise InputError(f"--settings {text[:80]!r}: {type(value).__name__}, expected a JSON object")
+    return value
+
+
+def pick(block: dict, *keys: str) -> list:
+    """Return the values of exactly these keys of a settings block, in order.
+
+    Raises: InputError naming a missing or unknown key.
+    """
+    missing = [key for key in keys if key not in block]
+    unknown = [key for key in block if key not in keys]
+    if missing or unknown:
+        raise InputError(f"settings: missing {missing}, unknown {unknown}, expected exactly {sorted(keys)}")
+    return [block[key] for key in keys]
+
+
+def dispatch(module: str, commands: Mapping[str, Callable[[list[str]], None]], arguments: list[str]) -> None:
+    """Run the command that the first argument names, on the other arguments.
+
+    Raises: InputError naming the module's commands where the first argument is none of them.
+    """
+    if not arguments or arguments[0] not in commands:
+        raise InputError(f"{module}: {arguments[:1]}, expected one of {list(commands)}")
+    commands[arguments[0]](arguments[1:])
+
+
+REFUSED = (errno.EROFS, errno.EACCES, errno.EPERM, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG)
+"""Errors of the operating system that a path given by the user causes, such as a folder that may only be read."""
+
+
+def refusal(error: OSError) -> str:
+    """Return the sentence on a path that the operating system refuses. Raises: the error itself for any other one."""
+    if error.errno not in REFUSED or error.filename is None:
+        raise error
+    return f"{error.filename}: {error.strerror}, expected a file or folder that this user may read or write"
+
+
+@contextlib.contextmanager
+def refusing() -> Iterator[None]:
+    """Turn an InputError, or a path that the operating system refuses, into one line and exit status 2."""
+    try:
+        yield
+    except (InputError, OSError) as error:
+        print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
+        raise SystemExit(2) from None
+
+
+class Refusing:
+    """An object whose methods answer as `refusing` says: Snakemake would show what a rule's function raises as a
+    traceback."""
+
+    def __init__(self, held: object) -> None:
+        """Take the object."""
+        self._held = held
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(self._held, name)
+        if not callable(found):
+            return found
+
+        @functools.wraps(found)
+        def asked(*given: Any, **named: Any) -> Any:
+            """Answer, or end the process after one line."""
+            with refusing():
+                return found(*given, **named)
+
+        return asked
+
+
+def run(main: Callable[[list[str]], None]) -> None:
+    """Run a stage's `main` on the process's arguments, as `refusing` says; an InputWarning becomes one line."""
+    keep_freed_memory()
+    usual = warnings.formatwarning
+    warnings.formatwarning = lambda message, category, *place, **more: (
+        f"warning: {message}\n" if issubclass(category, InputWarning) else usual(message, category, *place, **more)
+    )
+    with refusing():
+        main(sys.argv[1:])
+    # ru_maxrss includes short peaks that sampling misses; it is in KiB on Linux.
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{Path(sys.argv[0]).parent.name}: done, peak memory {peak:.0f} MiB", file=sys.stderr)

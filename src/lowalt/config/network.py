@@ -1,0 +1,177 @@
+"""The network of base stations: carrier, subcarriers, symbols, arrays and where each station stands.
+
+This module states facts about the radar; `lowalt.echo` computes its signals.
+Axes: x and y horizontal, z up, metres, global frame. Angles in degrees only in the configuration.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from lowalt.files.errors import InputError
+from lowalt.numerics import portable
+
+SPEED_OF_LIGHT = 299_792_458.0
+"""Speed of light in m/s (exact by definition of the metre)."""
+
+
+def _positive(name: str, value: float, *, whole: bool = False) -> None:
+    """Raise InputError unless the value is a positive finite number, an integer where `whole` is set."""
+    good = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    good = good and math.isfinite(value) and value > 0 and (not whole or float(value).is_integer())
+    if not good:
+        raise InputError(f"network: {name} is {value!r}, expected a positive {'integer' if whole else 'finite number'}")
+
+
+@dataclass(frozen=True)
+class Station:
+    """One base station: `position_m` (x, y, z) of its arrays, `normal_rad` Theta_k, lowest subcarrier f_k (Hz)."""
+
+    name: str
+    position_m: tuple[float, float, float]
+    normal_rad: float
+    frequency_hz: float
+    transmitter: "Station | None" = None
+    receiver: "Station | None" = None
+    """The two stations of a link, which has the receiver's place and the transmitter's frequency; else None."""
+
+    @property
+    def horizontal(self) -> np.ndarray:
+        """Unit vector y'_k along the array's horizontal axis, shape (3,)."""
+        sine, cosine = portable.sine_cosine(self.normal_rad)
+        return np.array([-sine, cosine, 0.0])
+
+
+def _link(name: str, place: dict, known: dict[str, Station]) -> Station:
+    """The station `place["receive"]` as the receiver of what `place["transmit"]` sends."""
+    ends = [place["transmit"], place["receive"]]
+    if not set(ends) <= set(known) or ends[0] == ends[1]:
+        raise InputError(f"network: stations.{name}: from {ends[0]!r} to {ends[1]!r}, expected two of {sorted(known)}")
+    sends, hears = (known[end] for end in ends)
+    return Station(name, hears.position_m, hears.normal_rad, sends.frequency_hz, sends, hears)
+
+
+def station_names(block: dict) -> list[str]:
+    """Return the names of the stations of a `network` block in their one order, the alphabetical one.
+
+    Settings travel as JSON with sorted keys, so no other order would reach every stage.
+    """
+    return sorted(block["stations"])
+
+
+def as_far_as(block: dict, name: str) -> dict:
+    """Return a `network` block with only those stations on which the echo at the station `name` depends.
+
+    The number of stations before it decides its sub-band; a link needs the two stations that it connects.
+    """
+    stations = block["stations"]
+    last = max(name, *(stations[name].get(end, name) for end in ("transmit", "receive")))
+    kept = {
+        other: place
+        for other, place in stations.items()
+        if other == name or (other <= last and "transmit" not in place)
+    }
+    return {**block, "stations": kept}
+
+
+def masts_m(block: dict) -> list[list[float]]:
+    """Return the places [x, y] (m) of the stations of a `network` block, in its order; links have none."""
+    return [place["position_m"][:2] for place in block["stations"].values() if "position_m" in place]
+
+
+@dataclass(frozen=True)
+class Network:
+    """The stations and the signal they share.
+
+    `transmit` and `receive` are (horizontal, vertical) element counts; `power` is rho P, the power
+    that each subcarrier carries for sensing (W, 1 by default); a symbol carries `subcarriers` times as much.
+    Source: paper, section II-A and V-A.
+    """
+
+    carrier_hz: float
+    subcarrier_spacing_hz: float
+    subcarriers: int
+    guard_subcarriers: int
+    symbol_interval_s: float
+    symbols: int
+    transmit: tuple[int, int]
+    receive: tuple[int, int]
+    power: float
+    stations: tuple[Station, ...]
+
+    def __post_init__(self) -> None:
+        for name in ("carrier_hz", "subcarrier_spacing_hz", "symbol_interval_s", "power"):
+            _positive(name, getattr(self, name))
+        for name in ("subcarriers", "symbols"):
+            _positive(name, getattr(self, name), whole=True)
+        for array in ("transmit", "receive"):
+            for count in getattr(self, array):
+                _positive(f"array {array}", count, whole=True)
+        if not self.stations:
+            raise InputError("network: stations is empty, expected at least one")
+
+    @classmethod
+    def from_settings(cls, block: dict) -> "Network":
+        """Build the network from the configuration's `network` block.
+
+        Sub-bands follow each other in the alphabetical order of the stations: f_{k+1} = f_k + (M - 1 + guard) df.
+        A link {transmit, receive} between two stations has the sub-band of the one that sends.
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        keys = {
+            "carrier_hz", "subcarrier_spacing_hz", "subcarriers", "guard_subcarriers", "symbol_interval_s",
+            "symbols", "transmit_array", "receive_array", "power_w", "stations",
+        }  # fmt: skip
+        if set(block) != keys:
+            raise InputError(f"network: keys {sorted(set(block) ^ keys)} missing or unknown")
+        step = (block["subcarriers"] - 1 + block["guard_subcarriers"]) * block["subcarrier_spacing_hz"]
+        if step < 0:
+            raise InputError(
+                f"network: guard_subcarriers is {block['guard_subcarriers']}, expected at least "
+                f"{1 - block['subcarriers']}, at which all stations share one sub-band"
+            )
+        stations = []
+        names = station_names(block)
+        for index, name in enumerate(name for name in names if "transmit" not in block["stations"][name]):
+            place = block["stations"][name]
+            position = tuple(float(value) for value in place["position_m"])
+            if len(position) != 3 or not all(map(math.isfinite, position)):
+                raise InputError(f"network: stations.{name}.position_m is {position}, expected three finite metres")
+            normal = math.radians(place["normal_deg"])
+            stations.append(Station(name, position, normal, block["carrier_hz"] + index * step))
+        known = {station.name: station for station in stations}
+        stations += [_link(name, block["stations"][name], known) for name in names if name not in known]
+        stations.sort(key=lambda station: station.name)
+        return cls(
+            carrier_hz=block["carrier_hz"],
+            subcarrier_spacing_hz=block["subcarrier_spacing_hz"],
+            subcarriers=block["subcarriers"],
+            guard_subcarriers=block["guard_subcarriers"],
+            symbol_interval_s=block["symbol_interval_s"],
+            symbols=block["symbols"],
+            transmit=tuple(block["transmit_array"]),
+            receive=tuple(block["receive_array"]),
+            power=block["power_w"],
+            stations=tuple(stations),
+        )
+
+    def station(self, name: str) -> Station:
+        """Return the station called `name`.
+
+        Raises: InputError naming the stations there are.
+        """
+        for station in self.stations:
+            if station.name == name:
+                return station
+        raise InputError(f"station {name!r}: not in the network, which has {[s.name for s in self.stations]}")
+
+    @property
+    def times_s(self) -> np.ndarray:
+        """Symbol times n T_r (s), shape (symbols,)."""
+        return np.arange(self.symbols) * self.symbol_interval_s
+
+    @property
+    def cell_m(self) -> float:
+        """Length of a range cell, c / (2 M df) (m)."""
+        return SPEED_OF_LIGHT / (2 * self.subcarriers * self.subcarrier_spacing_hz)

@@ -1,0 +1,155 @@
+"""The plan of a run: its subtypes, chunks and shards, all known from the configuration before any job starts.
+
+A data set can grow without being made again: subtypes and SNRs that the configuration names under `added` get chunks of
+their own. The step t (1, 2, ...) of that list that adds subtypes makes chunks {group}-{part}t{t} with motion models of
+these alone; a step that adds SNRs makes a chunk {chunk}s{t} for every earlier one, with the same motion models and
+echoes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from lowalt.config.splits import FOLDS, fold
+from lowalt.files.errors import InputError, instead
+
+GROUPS = ("seen", "unseen")
+PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
+"""Regular expression of a chunk's part."""
+
+
+def snrs_of(config: dict) -> tuple[float, ...]:
+    """Return all SNRs (dB) of a configuration, those added later last.
+
+    Raises: InputError where an SNR stands twice.
+    """
+    steps = [config["noise"], *config.get("added", [])]
+    snrs = tuple(float(snr) for step in steps for snr in step.get("snr_db", []))
+    if len(set(snrs)) < len(snrs):
+        raise InputError(f"noise.snr_db: value {list(snrs)}, expected every SNR once")
+    return snrs
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Motion models of some subtypes at some SNRs (dB); `source` is the chunk whose motion and echoes it shares."""
+
+    name: str
+    source: str
+    members: tuple[str, ...]
+    snrs: tuple[float, ...]
+    first: int
+    count: int
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
+
+    groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them.
+    """
+
+    groups: dict[str, tuple[str, ...]]
+    models: int
+    models_per_chunk: int
+    snrs: tuple[float, ...]
+    split: dict
+    seed: int
+    steps: tuple[tuple[tuple[str, ...], tuple[float, ...]], ...]
+
+    @classmethod
+    def of(cls, config: dict, published: dict[str, dict]) -> "Plan":
+        """Return the plan of a checked configuration; `published` maps every subtype to its row of the table.
+
+        Raises: InputError for a selected subtype the table lacks, one that is selected and added, or a chunk that
+        breaks the blocks of the split.
+        """
+        select, motion, split = config["targets"]["select"], config["motion"], config["split"]
+        later = [tuple(step.get("subtypes", [])) for step in config.get("added", [])]
+        more = [name for step in later for name in step]
+        unknown = [name for name in (*select, *more) if name not in published]
+        if unknown:
+            otherwise = f"names of the table, such as {next(iter(published))!r}"
+            raise InputError(f"targets.select: {unknown}, expected {instead(unknown, published, otherwise)}")
+        twice = sorted({name for name in more if more.count(name) > 1 or name in select})
+        if twice:
+            raise InputError(f"added: subtypes {twice}, expected each once, either selected or added")
+        names = [name for name in published if not select or name in (*select, *more)]
+        block = sum(split[name] for name in FOLDS)
+        if motion["models_per_chunk"] % block:
+            raise InputError(
+                f"motion.models_per_chunk: value {motion['models_per_chunk']}, expected a multiple of {block}, "
+                "the block of split (train + val + test), so that every chunk has its exact share of every fold"
+            )
+        groups = {
+            group: tuple(name for name in names if published[name]["unseen_protocol"] == group) for group in GROUPS
+        }
+        groups = {group: members for group, members in groups.items() if members}
+        levels = [tuple(map(float, step.get("snr_db", []))) for step in (config["noise"], *config.get("added", []))]
+        subtypes = [tuple(name for name in names if name not in more), *later]
+        steps = tuple(zip(subtypes, levels, strict=True))
+        return cls(groups, motion["models"], motion["models_per_chunk"], snrs_of(config), split, config["seed"], steps)
+
+    @cached_property
+    def _chunks(self) -> dict[str, Chunk]:
+        """All chunks by name, step by step: subtypes of a step at all SNRs so far, then its SNRs for all chunks."""
+        found: dict[str, Chunk] = {}
+        known: tuple[float, ...] = ()
+        for step, (subtypes, snrs) in enumerate(self.steps):
+            earlier = [chunk for chunk in found.values() if chunk.name == chunk.source]
+            if snrs and step:
+                for chunk in earlier:
+                    name = f"{chunk.name}s{step}"
+                    found[name] = Chunk(name, chunk.name, chunk.members, snrs, chunk.first, chunk.count)
+            known += snrs
+            for group, part in ((group, part) for group in self.groups for part in range(self._parts)):
+                members = tuple(name for name in self.groups[group] if name in subtypes)
+                name, first = f"{group}-{part:05d}{f't{step}' if step else ''}", part * self.models_per_chunk
+                count = min(self.models_per_chunk, self.models - first)
+                if members:
+                    found[name] = Chunk(name, name, members, known, first, count)
+        return found
+
+    @property
+    def _parts(self) -> int:
+        """Number of chunks that hold the motion models of one group, the last one possibly smaller."""
+        return -(-self.models // self.models_per_chunk)
+
+    @property
+    def chunks(self) -> list[str]:
+        """Names {group}-{part} of all chunks."""
+        return list(self._chunks)
+
+    @property
+    def sources(self) -> list[str]:
+        """Names of the chunks with motion models of their own."""
+        return [name for name, chunk in self._chunks.items() if chunk.source == name]
+
+    def chunk(self, name: str) -> Chunk:
+        """A chunk by its name."""
+        return self._chunks[name]
+
+    def span(self, chunk: str) -> tuple[int, int]:
+        """First model number and count of models of each subtype in a chunk."""
+        return self._chunks[chunk].first, self._chunks[chunk].count
+
+    def folds(self, chunk: str) -> list[str]:
+        """Folds that have a sample in this chunk; each becomes one shard."""
+        held = self._chunks[chunk]
+        if held.count % sum(self.split[name] for name in FOLDS) == 0:
+            return [name for name in FOLDS if self.split[name]]
+        found = {
+            fold(self.split, self.seed, subtype, model, snr)
+            for subtype in held.members
+            for model in range(held.first, held.first + held.count)
+            for snr in held.snrs
+        }
+        return [name for name in FOLDS if name in found]
+
+    @property
+    def shards(self) -> list[str]:
+        """Names {group}-{fold}-{part} of all shards."""
+        return [
+            f"{group}-{name}-{part}"
+            for group, part in (chunk.split("-") for chunk in self.chunks)
+            for name in self.folds(f"{group}-{part}")
+        ]

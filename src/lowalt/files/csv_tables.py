@@ -1,0 +1,58 @@
+"""Tables as CSV files: the only place that writes one, and the reader of tables whose cells stay text.
+
+Lines end with a single newline on every system, and equal rows give equal bytes.
+"""
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from lowalt.files.atomic import replacing, text_file
+from lowalt.files.errors import InputError
+
+
+def read_csv(path: str | Path, *needed: str, what: str = "table") -> list[dict[str, str]]:
+    """Return a CSV file's rows as dicts of text; what: the file in words, for errors.
+
+    Raises: InputError naming the file and the columns it lacks, or the line that has not a cell for every column.
+    """
+    with text_file(path, what) as file:
+        reader = csv.reader(file)
+        columns = next(reader, [])
+        missing = set(needed) - set(columns)
+        if missing:
+            raise InputError(f"{path}: lacks the columns {sorted(missing)}, has {columns}")
+        rows = []
+        for cells in filter(None, reader):
+            if len(cells) != len(columns):
+                raise InputError(f"{path} line {reader.line_num}: {len(cells)} cells, expected {len(columns)}")
+            rows.append(dict(zip(columns, cells, strict=True)))
+        return rows
+
+
+def write_csv(path: str | Path, columns: Sequence[str], rows: Iterable[Mapping | Sequence]) -> None:
+    """Write a header of `columns` and the rows: sequences of cells, or dicts, whose missing keys become empty cells.
+
+    Cells are written as `str` gives them, None as an empty cell. The file is there only once it is whole.
+    Raises: InputError naming the file and the keys of a dict that are no columns.
+    """
+    with replacing(path) as temporary, temporary.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in rows:
+            writer.writerow(_cells(path, columns, row) if isinstance(row, Mapping) else row)
+
+
+def _cells(path: str | Path, columns: Sequence[str], row: Mapping) -> list:
+    """Cells of a row given as a dict, in the order of the columns."""
+    unknown = [key for key in row if key not in columns]
+    if unknown:
+        raise InputError(f"{path}: keys {unknown}, expected only the columns {list(columns)}")
+    return [row.get(name, "") for name in columns]
+
+
+def short(value: object) -> object:
+    """Return a float as text with six digits, None as an empty cell, and anything else as it is."""
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else value

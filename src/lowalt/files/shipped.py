@@ -1,0 +1,76 @@
+"""The place of the files that come with the package: Snakefile, rules, schema, configurations, profiles.
+
+In a checkout they stand at its root. An installation from a wheel has them inside the package.
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from lowalt.files.street import PACKAGE
+
+SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else PACKAGE.parents[1]
+"""The folder that holds `Snakefile`, `config/`, `workflow/` and `profiles/`."""
+
+KEYS = (
+    ("targets", "table"), ("targets", "records"), ("targets", "own"),
+    ("recognition", "table"), ("report", "published"),
+    ("report", "accuracy"),
+)  # fmt: skip
+"""Block and key of every file, or list or mapping of files, that a configuration names and the package brings."""
+
+
+def shipped(name: str | Path) -> Path:
+    """Return `name` where the working directory has it, else the package's file of this name, if there is one."""
+    found = SHIPPED / name
+    return found if found.exists() and not Path(name).exists() else Path(name)
+
+
+def located(config: dict, folder: Path = SHIPPED) -> dict:
+    """Return the configuration with each file that only `folder` has named by its path there.
+
+    A run in another folder, or another workflow that uses this one as a module, finds config/targets.csv that way.
+    """
+
+    def found(name: str) -> str:
+        """The path in `folder` of a file that only it has, else the name."""
+        return str(folder / name) if not Path(name).exists() and (folder / name).exists() else name
+
+    return _renamed(config, found)
+
+
+def as_named(config: dict, folder: Path = SHIPPED) -> dict:
+    """Return the configuration with each file of `folder` named relative to it: what `located` undoes.
+
+    Files that a run keeps or shares are then the same wherever the package is installed. A file whose relative name
+    means another one in the working directory keeps its path.
+    """
+
+    def named(name: str) -> str:
+        """The name relative to `folder` of a file there, unless it means another file here."""
+        path = Path(name)
+        if not path.is_absolute() or not path.is_relative_to(folder):
+            return name
+        relative = path.relative_to(folder)
+        return name if relative.exists() and not relative.samefile(path) else str(relative)
+
+    return _renamed(config, named)
+
+
+def _renamed(config: dict, rename: Callable[[str], str]) -> dict:
+    """The configuration with the names under KEYS changed by `rename`."""
+    result = dict(config)
+    for block, key in KEYS:
+        held = result.get(block)
+        if isinstance(held, dict) and key in held:
+            result[block] = {**held, key: _each(held[key], rename)}
+    return result
+
+
+def _each(value: Any, rename: Callable[[str], str]) -> Any:
+    """The value with every text in it changed by `rename`."""
+    if isinstance(value, dict):
+        return {name: _each(item, rename) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_each(item, rename) for item in value]
+    return rename(value) if isinstance(value, str) else value

@@ -1,0 +1,43 @@
+"""The plan of the package: its rooms in the order in which data passes them, and which room imports which.
+
+A room imports only rooms that stand before it: `tests/test_house.py` checks this, and `lowalt.report.figures.house`
+draws it.
+"""
+
+import ast
+from functools import cache
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1]
+STREET = (
+    "files", "machine", "numerics", "config", "targets", "motion", "echo", "scene", "noise", "spectra", "tiles",
+    "shards", "recognition", "recordings", "measure", "report", "workflow", "commands",
+)  # fmt: skip
+
+
+def modules(room: str) -> list[Path]:
+    """Return the Python files of a room, those of its inner rooms included, sorted."""
+    return sorted((PACKAGE / room).rglob("*.py"))
+
+
+@cache
+def rooms_imported(path: Path) -> frozenset[str]:
+    """Return the rooms that the imports of one file name; its own room is one of them if it imports from there.
+
+    A file is read once in a process.
+    """
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module == PACKAGE.name:
+            names += [f"{PACKAGE.name}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names.append(node.module)
+    parts = [name.split(".") for name in names]
+    return frozenset(part[1] for part in parts if part[0] == PACKAGE.name and len(part) > 1 and part[1] in STREET)
+
+
+def purpose(path: Path) -> str:
+    """Return the first line of a file's docstring without its full stop."""
+    return (ast.get_docstring(ast.parse(path.read_text())) or "").partition("\n")[0].rstrip(".")

@@ -1,0 +1,92 @@
+"""YAML files read strictly: a mapping in which every key stands once. Configuration and records share it."""
+
+from pathlib import Path
+
+import yaml
+
+from lowalt.files.atomic import text_of
+from lowalt.files.errors import InputError, in_one_line
+
+
+class _UniqueKeys:
+    """Safe YAML in which a key given twice is an error, not a silent overwrite; `name` is the file's in messages."""
+
+    name: str
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
+        """Return the mapping as the library does.
+
+        Raises: InputError naming the line where a key stands twice.
+        """
+        # A list, not a set: for a key that cannot be hashed, YAML has its own message.
+        seen = []
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=True)  # type: ignore[attr-defined]
+            if key in seen:
+                raise InputError(f"{self.name}: key {key!r} stands twice (line {key_node.start_mark.line + 1})")
+            seen.append(key)
+        return super().construct_mapping(node, deep)  # type: ignore[misc]
+
+
+class _Loader(_UniqueKeys, yaml.SafeLoader):
+    """The library's own parser, in Python: it ends in an error where values stand in each other too deeply."""
+
+
+class _FastLoader(_UniqueKeys, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+    """libyaml's parser, seven times as fast. It calls itself for each level: a million of them end the process."""
+
+
+DEEPEST = 10_000
+"""Signs that can begin a level of nesting; a text with more of them is read by the parser in Python."""
+
+
+MOST_NODES = 1_000_000
+"""Values that a file may hold, counted as often as anchors repeat them: ten lines can stand for billions."""
+
+TEMPLATE = "__use_yte__"
+"""The key with which a configuration asks Snakemake's reader to run the Python expressions in it."""
+
+
+def _check_size(root: yaml.Node | None, path: str | Path) -> None:
+    """Refuse a document whose anchors make more than MOST_NODES values, or make a value contain itself."""
+    sizes: dict[int, int] = {}
+
+    def size(node: yaml.Node | None) -> int:
+        """Number of values in a node, counted as often as anchors repeat them; it stops beyond MOST_NODES."""
+        if not isinstance(node, yaml.CollectionNode):
+            return 1
+        if id(node) not in sizes:
+            sizes[id(node)] = MOST_NODES + 1  # until the node is counted; a node inside itself is endless
+            pairs = node.value if isinstance(node, yaml.MappingNode) else [(entry,) for entry in node.value]
+            sizes[id(node)] = 1 + sum(size(entry) for pair in pairs for entry in pair)
+        return sizes[id(node)]
+
+    if size(root) > MOST_NODES:
+        raise InputError(f"{path}: its anchors make more than {MOST_NODES} values of it, expected a plain document")
+
+
+def load_yaml(path: str | Path, what: str = "configuration", holds: str = "keys") -> dict:
+    """Return the mapping in a YAML file; `what` and `holds` name the file and its entries in messages.
+
+    Raises: InputError naming the file where it is missing, not YAML, no mapping, a template, or has a key twice.
+    """
+    text = text_of(path, what)
+    try:
+        levels = sum(map(text.count, "[{-:?"))
+        loader = (_Loader if levels > DEEPEST else _FastLoader)(text)
+        loader.name = str(path)
+        root = loader.get_single_node()
+        _check_size(root, path)
+        value = None if root is None else loader.construct_document(root)
+    except InputError:
+        raise
+    # The library also raises errors of its converters, as for a date of month 99 or a number of 5000 digits.
+    except (yaml.YAMLError, ValueError, TypeError, AttributeError, OverflowError) as error:
+        raise InputError(f"{path}: not YAML ({in_one_line(error)})") from error
+    except RecursionError:
+        raise InputError(f"{path}: mappings and lists stand in each other too deeply, expected a few levels") from None
+    if not isinstance(value, dict):
+        raise InputError(f"{path}: {type(value).__name__}, expected a mapping of {holds}")
+    if TEMPLATE in value:
+        raise InputError(f"{path}: key {TEMPLATE!r} makes Snakemake run code in it, expected a plain document")
+    return value

@@ -1,0 +1,32 @@
+"""Calls that do not depend on each other, several at a time, each in a process of its own."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_all_start_methods, get_context
+from typing import Any
+
+from lowalt.files.errors import InputError, SpaceError
+
+
+def together(calls: Sequence[Callable[[], Any]], jobs: int, start: str = "fork") -> list[Any]:
+    """Return what every call returns, in their order, `jobs` of them at a time.
+
+    Calls and results are pickled. One job makes the calls in this process, one after the other. start: how a process
+    begins; "fork" has this one's modules already, which take seconds to import, "spawn" is for calls that use torch.
+    Raises: what the first call that fails raises, after the calls that had begun; InputError for fewer than one job;
+    SpaceError where a process was killed.
+    """
+    if jobs < 1:
+        raise InputError(f"jobs: {jobs}, expected 1 or more")
+    if jobs == 1 or start not in get_all_start_methods():
+        return [call() for call in calls]
+    with ProcessPoolExecutor(min(jobs, max(len(calls), 1)), get_context(start)) as pool:
+        begun = [pool.submit(call) for call in calls]
+        try:
+            return [future.result() for future in begun]
+        except BrokenProcessPool as error:
+            raise SpaceError("a process was killed before it had its result, for lack of memory perhaps") from error
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise

@@ -1,0 +1,1 @@
+"""Numbers whose bits are the same on every processor: elementary functions, exact sums, random draws."""

@@ -1,0 +1,45 @@
+"""Matrices 3 x 3: the axis along which vectors spread least, and the nearest rotations, in portable operations."""
+
+import numpy as np
+
+from lowalt.numerics.portable import dot, product, total
+
+
+def thinnest(vectors: np.ndarray) -> np.ndarray:
+    """Return the unit vector (3,) along which vectors (N, 3) of zero mean spread least; its largest part is positive.
+
+    Source: Jacobi's rotations of the 3 x 3 matrix of second moments.
+    """
+    columns = np.asarray(vectors, np.float64).T
+    moments = np.array([[total(a * b) for b in columns] for a in columns])
+    axes = np.eye(3)
+    # Each sweep squares the relative size of the elements off the diagonal.
+    for _ in range(12):
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            if abs(moments[p, q]) <= 1e-30 * np.diagonal(moments).max():
+                continue
+            slope = (moments[q, q] - moments[p, p]) / (2 * moments[p, q])
+            tangent = (1.0 if slope >= 0 else -1.0) / (abs(slope) + np.sqrt(slope * slope + 1))
+            cosine = 1 / np.sqrt(tangent * tangent + 1)
+            turn = np.eye(3)
+            turn[p, p] = turn[q, q] = cosine
+            turn[p, q], turn[q, p] = tangent * cosine, -tangent * cosine
+            moments = product(product(turn.T, moments), turn)
+            moments[p, q] = moments[q, p] = 0.0
+            axes = product(axes, turn)
+    axis = axes[:, np.argmin(np.diagonal(moments))]
+    return axis * np.sign(axis[np.argmax(np.abs(axis))]) + 0.0
+
+
+def nearest_rotations(matrices: np.ndarray) -> np.ndarray:
+    """Return the rotations (..., 3, 3) nearest to matrices (..., 3, 3) of positive determinant.
+
+    Source: Newton's iteration for the polar decomposition, Higham 1986.
+    """
+    result = np.asarray(matrices, np.float64)
+    # Each step squares the error; blends of similar rotations need five steps.
+    for _ in range(10):
+        rows = [np.cross(result[..., (i + 1) % 3, :], result[..., (i + 2) % 3, :]) for i in range(3)]
+        cofactors = np.stack(rows, axis=-2)
+        result = 0.5 * (result + cofactors / dot(result[..., 0, :], cofactors[..., 0, :])[..., None, None])
+    return result

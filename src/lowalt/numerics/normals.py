@@ -1,0 +1,139 @@
+"""Complex normal numbers from raw random words, compiled: the bits of `lowalt.numerics.draws` in less time.
+
+Only additions, products, divisions, square roots and comparisons of float64 in one written order, never fused. No
+divisor can be zero, and without a check for it these loops become vector instructions.
+"""
+
+import numpy as np
+
+from lowalt.machine.jit import INNER, LEAN
+from lowalt.machine.memory import aligned
+from lowalt.numerics.portable import COSINE, LN2, LOGARITHM, SINE
+
+_L1, _L2, _L3, _L4, _L5, _L6, _L7 = LOGARITHM
+_S1, _S2, _S3, _S4, _S5, _S6 = SINE
+_C1, _C2, _C3, _C4, _C5, _C6 = COSINE
+_LN2_HIGH, _LN2_LOW = LN2
+_MANTISSA, _ONE = np.int64(0x000FFFFFFFFFFFFF), np.int64(0x3FF0000000000000)
+_WHOLE, _EXPONENT = np.int64(0x4330000000000000), np.int64(52)
+"""Bits of 2^52, whose sum with a small whole number holds that number as its lowest bits."""
+_BIASED = 2.0**52 + 1022.0
+_LOWER, _UPPER, _HALF = np.uint64(11), np.uint64(43), np.uint64(0xFFFFFFFF)
+_LARGE, _SMALL, _BOTH = np.uint64(0x4530000000000000), np.uint64(0x4330000000000000), 2.0**84 + 2.0**52
+"""Bits of 2^84 and of 2^52, whose sums with 32-bit numbers hold these as their lowest bits; the sum of both."""
+_STEP = 2.0**-53
+_TURN = 2 * np.pi
+_TWO, _NEXT = np.uint64(2), np.uint64(1)
+BLOCK = 256
+"""Complex numbers made together; all their steps stay in the nearest cache."""
+
+
+@INNER
+def _block(words, scale, real, imaginary, twos, lower):
+    """Fill real and imaginary (K,) as `fill` does; twos, lower: (K,) work space."""
+    count = np.uint64(len(real))
+    # A conversion of 64-bit whole numbers is a vector instruction on few processors. So bits are set, and both halves
+    # of a word's upper 53 bits are added as float64, without rounding.
+    x, x_low, y, y_low = real.view(np.uint64), twos.view(np.uint64), imaginary.view(np.uint64), lower.view(np.uint64)
+    for i in range(count):
+        one, other = words[_TWO * i], words[_TWO * i + _NEXT]
+        x[i], x_low[i] = (one >> _UPPER) | _LARGE, ((one >> _LOWER) & _HALF) | _SMALL
+        y[i], y_low[i] = (other >> _UPPER) | _LARGE, ((other >> _LOWER) & _HALF) | _SMALL
+    for i in range(count):
+        real[i] = (((real[i] - _BOTH) + twos[i]) + 1.0) * _STEP
+        imaginary[i] = ((imaginary[i] - _BOTH) + lower[i]) * _STEP
+    bits, exponents = real.view(np.int64), twos.view(np.int64)
+    for i in range(count):
+        exponents[i] = (bits[i] >> _EXPONENT) | _WHOLE
+        bits[i] = (bits[i] & _MANTISSA) | _ONE
+    for i in range(count):
+        # In [1, 2), and then f in [sqrt(1/2) - 1, sqrt(2) - 1].
+        mantissa, k = 0.5 * real[i], twos[i] - _BIASED
+        small = mantissa < 0.70710678118654752440
+        f = (real[i] if small else mantissa) - 1.0
+        k = k - 1.0 if small else k
+        s = f / (2.0 + f)
+        z = s * s
+        rest = z * (_L1 + z * (_L2 + z * (_L3 + z * (_L4 + z * (_L5 + z * (_L6 + z * _L7))))))
+        half = 0.5 * f * f
+        real[i] = -(k * _LN2_HIGH - ((half - (s * (half + rest) + k * _LN2_LOW)) - f))
+    for i in range(count):
+        turns = imaginary[i]
+        quarter = np.rint(4.0 * turns)
+        angle = (turns - 0.25 * quarter) * _TURN
+        z = angle * angle
+        cube = z * angle
+        rest = _S2 + z * (_S3 + z * (_S4 + z * (_S5 + z * _S6)))
+        sine = angle - ((z * (0.0 - cube * rest) - 0.0) - cube * _S1)
+        rest = z * (_C1 + z * (_C2 + z * (_C3 + z * (_C4 + z * (_C5 + z * _C6)))))
+        half = 0.5 * z
+        one = 1.0 - half
+        cosine = one + (((1.0 - one) - half) + z * rest)
+        radius = np.sqrt(2.0 * real[i])
+        # Of the quarters 0 to 4, 1 and 3 swap both; 1 and 2 are left of the origin, 2 and 3 below it.
+        swapped, left, below = abs(quarter - 2.0) == 1.0, abs(quarter - 1.5) < 1.0, abs(quarter - 2.5) < 1.0
+        x = sine if swapped else cosine
+        y = cosine if swapped else sine
+        real[i] = scale * (radius * (-x if left else x))
+        imaginary[i] = scale * (radius * (-y if below else y))
+
+
+@LEAN
+def fill(words, scale, work, out):
+    """Fill out (2, N) with scale times the real and imaginary parts of N complex normals from words (2 N,) uint64.
+
+    work: (2, BLOCK).
+    """
+    for first in range(0, out.shape[1], BLOCK):
+        last = min(first + BLOCK, out.shape[1])
+        more, lower = work[0, : last - first], work[1, : last - first]
+        _block(words[2 * first :], scale, out[0, first:last], out[1, first:last], more, lower)
+
+
+@LEAN
+def _fill_pairs(words, work, out):
+    """Fill out (N, 2) with the real and imaginary parts of N complex normals from words (2 N,); work: (4, BLOCK)."""
+    for first in range(0, len(out), BLOCK):
+        size = min(BLOCK, len(out) - first)
+        real, imaginary, some = work[0, :size], work[1, :size], out[first : first + size]
+        _block(words[2 * first :], 1.0, real, imaginary, work[2, :size], work[3, :size])
+        for i in range(np.uint64(size)):
+            some[i, 0], some[i, 1] = real[i], imaginary[i]
+
+
+@LEAN
+def _fill_apart(words, count, work, real, imaginary):
+    """Fill real and imaginary as `apart` does; work: (2, BLOCK)."""
+    for n in range(len(real)):
+        own, other = real[n, real.shape[1] - count :], imaginary[n, imaginary.shape[1] - count :]
+        for first in range(0, count, BLOCK):
+            last = min(first + BLOCK, count)
+            more, lower = work[0, : last - first], work[1, : last - first]
+            _block(words[2 * (n * count + first) :], 1.0, own[first:last], other[first:last], more, lower)
+
+
+def apart(words: np.ndarray, real: np.ndarray, imaginary: np.ndarray) -> None:
+    """Fill the last K columns of real (N, K or more) and imaginary (N, K or more) float64, row by row.
+
+    They become the parts of N K complex normals: draws 2 k and 2 k + 1 of `interleaved`; words: (2 N K,) uint64.
+    """
+    _fill_apart(words, len(words) // (2 * len(real)), aligned(2, BLOCK), real, imaginary)
+
+
+def interleaved(words: np.ndarray) -> np.ndarray:
+    """Return what `Draws.standard_normal` makes of raw words (2 N,) uint64: 2 N float64, real parts at even places."""
+    out = np.empty((len(words) // 2, 2))
+    # Loops over contiguous real parts become vector instructions; loops over alternating parts do not.
+    _fill_pairs(words, aligned(4, BLOCK), out)
+    return out.ravel()
+
+
+def circular(words: np.ndarray, scale: float = 1.0) -> np.ndarray:
+    """Return complex normals from raw words (2 N,) uint64 as (2, N) float64, real and imaginary parts.
+
+    Each part has mean 0 and standard deviation `scale`; the k-th number is `scale` times draws 2 k and 2 k + 1 of
+    `Draws.standard_normal` on the same words.
+    """
+    out = np.empty((2, len(words) // 2))
+    fill(words, scale, aligned(2, BLOCK), out)
+    return out
