@@ -39,20 +39,19 @@ def arriving(
     of a view; symbols: subcarriers (N, M) on the air of each symbol and of the one before it.
     """
     count = view.network.subcarriers
-    delays_s, weights = np.zeros(1), np.ones((1, count))
+    moved, weights = view, np.ones((1, count))
     if physics.symbol_motion is not None:
         delays_s, weights = physics.symbol_motion.module.instants(physics.symbol_motion.settings, view)
-    late, turn = None, np.ones(count)
-    if physics.cyclic_prefix is not None:
+        # The instants of a symbol stand together, as symbols of their own.
+        moved = view.at((view.times_s[:, None] + delays_s).reshape(-1))
+    factor, *symbols = (np.repeat(each, len(weights), axis=-2) for each in (factor, *symbols))
+    paths = paths_of(moved)
+    if physics.cyclic_prefix is None:
+        samples = transmit(physics.response(moved, paths, factor), symbols[0])
+    else:
         prefix, settings = physics.cyclic_prefix.module, physics.cyclic_prefix.settings
-        late, turn = prefix.late_samples(settings, view), prefix.turn(settings, view.network)
-    samples = np.zeros((len(view.times_s), count), np.complex128)
-    for delay_s, weight in zip(delays_s, weights, strict=True):
-        moved = view if delay_s == 0.0 else view.at(view.times_s + delay_s)
-        paths = paths_of(moved)
-        if late is None:
-            samples += weight * transmit(physics.response(moved, paths, factor), symbols[0])
-            continue
+        late = np.repeat(prefix.late_samples(settings, view), len(weights), axis=0)
+        samples = np.zeros((len(late), count), np.complex128)
         # Points that lose equally many samples of the window share one response.
         for lost in np.unique(late):
             rows = np.flatnonzero((late == lost).any(axis=1))
@@ -60,9 +59,10 @@ def arriving(
             echo = physics.response(moved.at_rows(rows), some, (factor * (late == lost))[..., rows, :])
             now = transmit(echo, symbols[0][rows])
             if lost:
-                now[:, :lost] = transmit(echo * turn, symbols[1][rows])[:, :lost]
-            samples[rows] += weight * now
-    return samples
+                before = transmit(echo * prefix.turn(settings, view.network), symbols[1][rows])
+                now[:, :lost] = before[:, :lost]
+            samples[rows] += now
+    return np.einsum("nqm,qm->nm", samples.reshape(len(view.times_s), len(weights), count), weights)
 
 
 def _at_rows(path: ImagePath, rows: np.ndarray) -> ImagePath:

@@ -13,7 +13,7 @@ from lowalt.machine.jit import INNER_VECTOR
 from lowalt.scene.phasor import phasor
 from lowalt.scene.response_loops import CHUNK, LOOPS, End
 
-SYMBOLS = 100
+SYMBOLS = 600
 """Symbols that share a box."""
 
 
@@ -42,18 +42,16 @@ def gains(end: End, error: float) -> np.ndarray:
             values = np.empty((1, len(end.kappas), grid.shape[1]), np.complex128)
             _sums(end, first, grid[None], values)
             terms = values.reshape(-1, *counts)
-            for axis, count in enumerate(terms.shape):
+            for axis, count in enumerate(counts, 1):
                 terms = np.moveaxis(np.tensordot(_coefficients(count), terms, (1, axis)), 0, axis)
-            # Terms that are small together are left out; most have few orders in frequency.
-            order = np.argsort(abs(terms), axis=None)
-            kept = order[np.cumsum(abs(terms).ravel()[order]) > error * np.prod(end.counts)]
-            # Terms of the same place in the box stand together.
-            kept = kept[np.argsort(kept % np.prod(counts), kind="stable")]
-            powers = np.stack(np.unravel_index(kept, terms.shape), axis=1)
-            places = np.pi * (np.arange(len(terms)) + 0.5) / len(terms)
-            mix = np.cos(np.outer(places, np.arange(powers[:, 0].max(initial=0) + 1)))
-            chosen = terms.ravel()[kept]
-            _polynomials(at, (middle, half), counts, powers, chosen, mix, out)
+            terms = terms.reshape(len(terms), -1)
+            # Terms that are small together at every frequency are left out.
+            size = abs(terms).max(axis=0)
+            order = np.argsort(size)
+            kept = order[np.cumsum(size[order]) > error * np.prod(end.counts)]
+            powers = np.stack(np.unravel_index(kept, counts), axis=1)
+            parts = np.concatenate([terms[:, kept].real, terms[:, kept].imag])
+            _polynomials(at, (middle, half), counts, powers, parts, out)
     return result
 
 
@@ -145,43 +143,27 @@ def _scaled(values, middle, half, table):
             new[i] = 2.0 * linear[i] * old[i] - older[i]
 
 
-@INNER_VECTOR
-def _add(share, values, result):
-    """Add share times values (L,) to result (L,)."""
-    for i in range(np.uint64(len(values))):
-        result[i] += share * values[i]
-
-
 @LOOPS
-def _polynomials(at, box, counts, powers, terms, mix, result):
-    """Fill result (K, Q, L) with sums of terms (T,), each times the polynomials of its powers (T, 4).
+def _polynomials(at, box, counts, powers, terms, result):
+    """Fill result (K, Q, L) with sums of polynomials of directions and inverse ranges at (K, 3, L), powers (T, 3).
 
-    Powers are those of frequency and of the directions; mix: (Q, K) values of the former at the frequencies.
+    terms: (2 Q, T), the factors' real parts at every frequency, then their imaginary parts.
     """
-    count, (middle, half) = min(at.shape[2], CHUNK), box
-    across, up, near = np.empty((counts[0], count)), np.empty((counts[1], count)), np.empty((counts[2], count))
-    orders, term, sums = np.empty((mix.shape[1], 2, count)), np.empty(count), np.empty((2, count))
-    across[:], up[:], near[:] = 0.0, 0.0, 0.0
+    size, (middle, half) = min(at.shape[2], CHUNK), box
+    across, up, near = np.zeros((counts[0], size)), np.zeros((counts[1], size)), np.zeros((counts[2], size))
+    table, sums = np.empty((len(powers), size)), np.empty((len(terms), size))
     for n in range(len(at)):
-        for first in range(0, at.shape[2], CHUNK):
-            last = min(first + CHUNK, at.shape[2])
+        for first in range(0, at.shape[2], size):
+            last = min(first + size, at.shape[2])
             _scaled(at[n, 0, first:last], middle[0], half[0], across)
             _scaled(at[n, 1, first:last], middle[1], half[1], up)
             _scaled(at[n, 2, first:last], middle[2], half[2], near)
-            orders[:] = 0.0
-            for t in range(len(terms)):
-                k, a, b, c = powers[t]
-                if t == 0 or a != powers[t - 1, 1] or b != powers[t - 1, 2] or c != powers[t - 1, 3]:
-                    one, two, three = across[a], up[b], near[c]
-                    for i in range(np.uint64(count)):
-                        term[i] = one[i] * two[i] * three[i]
-                _add(terms[t].real, term, orders[k, 0])
-                _add(terms[t].imag, term, orders[k, 1])
-            for q in range(len(mix)):
-                row, column = sums[0], sums[1]
-                row[:], column[:] = 0.0, 0.0
-                for k in range(mix.shape[1]):
-                    _add(mix[q, k], orders[k, 0], row)
-                    _add(mix[q, k], orders[k, 1], column)
+            for t in range(len(powers)):
+                x, y, z, term = across[powers[t, 0]], up[powers[t, 1]], near[powers[t, 2]], table[t]
+                for i in range(np.uint64(size)):
+                    term[i] = x[i] * y[i] * z[i]
+            np.dot(terms, table, sums)
+            for q in range(result.shape[1]):
+                real, imag, out = sums[q], sums[q + result.shape[1]], result[n, q]
                 for i in range(last - first):
-                    result[n, q, first + i] = complex(row[i], column[i])
+                    out[first + i] = complex(real[i], imag[i])
