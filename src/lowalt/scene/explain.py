@@ -17,10 +17,11 @@ from lowalt.files.errors import InputError
 from lowalt.motion.sample import draw, region_polygon
 from lowalt.numerics.streams import stream
 from lowalt.scene.catalogue import PLACES, NamedEffect, called
-from lowalt.scene.chain import SceneSample
+from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.checks import check
 from lowalt.scene.levels import Level, levels
 from lowalt.scene.observe import Scene
+from lowalt.targets import occluders
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
@@ -39,7 +40,7 @@ class ExplainedSample(NamedTuple):
 
     cloud: Cloud
     row: dict
-    occluders: dict | None
+    occluders: dict
 
 
 class Finding(NamedTuple):
@@ -66,7 +67,7 @@ class Change(NamedTuple):
 
     signal: root mean square of the signal's change over the signal's; cells: share of symbols with another range cell;
     more: what the caller's function says of the signals (images, answers); ms: processor time that the effect takes a
-    sample and station; refused: why the effect cannot be added, empty where it was.
+    sample and station; also: what else had to change for the scene to fit; refused: why the effect was not tried.
     """
 
     effect: str
@@ -76,7 +77,8 @@ class Change(NamedTuple):
     cells: float
     more: dict[str, float]
     ms: float
-    refused: str
+    also: str = ""
+    refused: str = ""
 
 
 def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> list[ExplainedSample]:
@@ -104,13 +106,9 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
         cloud = make(record, inputs, config["seed"])
         rng = stream(config["seed"], "motion", name, model)
         row = draw(rng, cloud, record["published"], masts, corners, config["motion"])
-        occluders = None
-        if "occlusion" in config["effects"]:
-            from lowalt.targets import occluders as surfaces
-
-            occluders = surfaces.make(record, inputs, config["seed"]) | {"subtype": name}
+        surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
         row = {**row, "group": record["published"]["unseen_protocol"], "model": model}
-        result.append(ExplainedSample(cloud, row, occluders))
+        result.append(ExplainedSample(cloud, row, surfaces))
     return result
 
 
@@ -183,20 +181,42 @@ def changes(
     result = []
     for name in [*names, *(name for name in PLACES if name not in config["effects"])]:
         named = name in names
-        block = {key: value for key, value in config["effects"].items() if key != name}
         try:
-            other = scene_of(config | {"effects": block if named else block | {name: {}}})
-            if name == "occlusion" and not named:
-                raise InputError("effects.occlusion: surfaces are made where a scene names it")
-            after, taken = _timed(other, stations, chosen, clouds)
+            changed, also = _changed(config, name)
+            after, taken = _timed(scene_of(changed), stations, chosen, clouds)
         except InputError as error:
-            result.append(Change(name, PLACES[name], named, np.nan, np.nan, {}, np.nan, str(error)))
+            result.append(Change(name, PLACES[name], named, np.nan, np.nan, {}, np.nan, refused=str(error)))
             continue
         moved = np.linalg.norm(after[0] - before[0], axis=2) / np.linalg.norm(before[0], axis=2)
         cells, more = float(np.mean(before[1] != after[1])), compare(before[0], after[0])
         cost = ms - taken if named else taken - ms
-        result.append(Change(name, PLACES[name], named, float(np.mean(moved)), cells, more, cost, ""))
+        result.append(Change(name, PLACES[name], named, float(np.mean(moved)), cells, more, cost, also))
     return result
+
+
+def _changed(config: dict, name: str) -> tuple[dict, str]:
+    """The configuration without an effect that it names, or with one more, and what else had to change with it.
+
+    Raises: InputError where no single further change makes the scene fit.
+    """
+    effects = config["effects"]
+    if name in effects:
+        rest = {key: value for key, value in effects.items() if key != name}
+        choices = [(config | {"effects": rest}, "")]
+        for other in rest:
+            fewer = {key: value for key, value in rest.items() if key != other}
+            choices.append((config | {"effects": fewer}, f"and without {other}"))
+    else:
+        added = config | {"effects": effects | {name: {}}}
+        choices = [(added, ""), (added | {"noise": config["noise"] | {"snr_db": [np.inf]}}, "at no set SNR")]
+    faults = []
+    for changed, also in choices:
+        try:
+            check(changed)
+            return changed, also
+        except InputError as error:
+            faults.append(error)
+    raise faults[0]
 
 
 def _timed(
@@ -204,11 +224,9 @@ def _timed(
 ) -> tuple[tuple[np.ndarray, np.ndarray], float]:
     """Signals and cells (K, stations, N) of the chosen samples, and one's mean processor time (ms)."""
     # The first call compiles and fills tables.
-    SceneSample(scene, stations[0], *chosen[0], clouds).received()
+    received_signal(scene, stations[0], *chosen[0], clouds)
     start = time.process_time()
-    received = [[SceneSample(scene, end, *explained, clouds).received() for end in stations] for explained in chosen]
+    received = [[received_signal(scene, end, *explained, clouds) for end in stations] for explained in chosen]
     ms = 1e3 * (time.process_time() - start) / (len(chosen) * len(stations))
-    signals, cells = (
-        np.array([[getattr(one, name) for one in row] for row in received]) for name in ("signal", "cell")
-    )
-    return (signals, cells), ms
+    signals = np.array([[each.signal for each in row] for row in received])
+    return (signals, np.array([[each.cell for each in row] for row in received])), ms

@@ -48,7 +48,8 @@ def effects_table(changes: Sequence[Change], sources: bool) -> list[str]:
             lines.append(f"{head}not tried: {change.refused}")
             continue
         shares = "".join(f"{change.more.get(key, math.nan):>9.1%}" for key in more)
-        lines.append(f"{head}{change.signal:>8.1%} {change.cells:>7.1%} {shares}{change.ms:>9.1f}")
+        cells = f"{change.signal:>8.1%} {change.cells:>7.1%} {shares}{change.ms:>9.1f}"
+        lines.append(f"{head}{cells}  {change.also}".rstrip())
     lines.append(
         "named: without it; added: with it and its defaults. Shares of the signal's rms, of symbols, of pixels."
     )
