@@ -14,12 +14,12 @@ import json
 from collections import defaultdict
 from pathlib import Path
 
+from lowalt.config.plan import sample_bytes
 from lowalt.files.atomic import existing
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.machine.hardware import describe
 from lowalt.shards.index import load
-from lowalt.shards.size import sample_bytes
 
 WHOLE = 1_440_000
 STAGES = ("cloud", "motion", "echo", "noise", "tiles", "shard", "index")
@@ -66,10 +66,7 @@ def main() -> None:
         )  # fmt: skip
     for row in rows:
         row["share_percent"] = 100 * row["wall_s"] / sum(other["wall_s"] for other in rows)
-    stations = index["render"]["network"]["stations"]
-    size = {
-        kind: sample_bytes(kind, len(stations), index["render"]["network"]["symbols"]) for kind in ("image", "signal")
-    }
+    size = {kind: sample_bytes({**index["render"], "shards": {"kind": kind}}) for kind in ("image", "signal")}
     size[index["kind"]] = index["bytes"] / samples
     for kind in ("image", "signal"):
         kept = [row for row in rows if kind == "image" or row["stage"] != "tiles"]

@@ -46,7 +46,6 @@ shards.recipe pack: --run, --out
 shards.recipe unpack: recipe, --out
 shards.recipe: command
 shards.sigmf: --index, --out
-shards.size: --config, --subtypes
 shards.upload: --index, --repository
 targets.__main__: --settings, --out
 targets.dimensions: --table, --records, --out

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import math
 import pickle
 import tarfile
 
@@ -12,16 +13,17 @@ import webdataset
 from PIL import Image
 
 from dataset import SEED, SNRS, SPLIT, TARGETS, build, motion_rows, write_settings
+from lowalt.config.network import Network
+from lowalt.config.plan import sample_bytes
 from lowalt.config.splits import fold
 from lowalt.files.errors import InputError
 from lowalt.motion import write_table
 from lowalt.shards import ShardSet
 from lowalt.shards.__main__ import main
 from lowalt.shards.read import complex_signals
-from lowalt.shards.record import row_of
-from lowalt.shards.size import main as size_main
-from lowalt.shards.size import models_per_chunk, sample_bytes
-from lowalt.shards.table import map_samples
+from lowalt.shards.record import npy, row_of
+from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.tiles import decode, resize, split
 from pictures import NETWORK, echoes
 
@@ -190,23 +192,33 @@ def test_stations_and_views_are_selected_alike_from_both_kinds(images, signals):
             shards.images(3, stations=["D"])
 
 
-def test_chunks_are_sized_for_their_shards(images, signals, tmp_path, capsys):
-    """The promised space of a sample holds, and the number of models makes the train shard nearest the target."""
+def test_a_sample_takes_the_promised_space(images, signals):
     for folder, kind in ((images, "image"), (signals, "signal")):
-        promised = sample_bytes(kind, 3, 400)
+        index = json.loads((folder / "index.json").read_text())
+        promised = sample_bytes({**index["render"], "shards": {"kind": kind}})
         found = map_samples(folder / "seen-train-00000.npz")["size"].mean()
         assert found <= 1.3 * promised and promised <= 1.3 * found
     # Two headers, a record, and 128 bytes before three stations' 401 numbers of 8 bytes, filled up to whole blocks.
-    assert sample_bytes("signal", 3, 401) == 2 * 512 + 2048 + 20 * 512
-    assert sample_bytes("recipe", 3, 401, 4) == sample_bytes("signal", 3, 401) // 4
-    split = {"by": "motion", "train": 8, "val": 1, "test": 1}
-    models = models_per_chunk(1e9, 300_000, subtypes=20, snrs=6, split=split)
-    assert models % 10 == 0 and abs(models * 0.8 * 20 * 6 * 300_000 - 1e9) <= 0.5 * 8 * 20 * 6 * 300_000
-    assert models_per_chunk(1, 300_000, 20, 6, split) == 10
-    with pytest.raises(InputError, match="target"):
-        models_per_chunk(0, 300_000, 20, 6, split)
-    block = {"network": NETWORK, "noise": {"snr_db": SNRS}, "split": split, "shards": {"kind": "signal"}}
-    (tmp_path / "config.yaml").write_text(json.dumps(block))
-    for given, target in ((["--target-mb", "40"], 40e6), ([], 1e9)):
-        size_main(["--config", str(tmp_path / "config.yaml"), "--subtypes", "20", *given])
-        assert int(capsys.readouterr().out) == models_per_chunk(target, sample_bytes("signal", 3, 400), 20, 2, split)
+    block = {"network": {**NETWORK, "symbols": 401}, "noise": {"snr_db": [3, 8, 13, math.inf]}}
+    assert sample_bytes({**block, "shards": {"kind": "signal"}}) == 2 * 512 + 2048 + 20 * 512
+    assert sample_bytes({**block, "shards": {"kind": "recipe"}}) == (2 * 512 + 2048 + 20 * 512) // 4
+
+
+@pytest.mark.parametrize("kind", ["signal", "recipe"])
+def test_a_fold_in_several_shards_holds_each_sample_once_and_every_class_in_each(kind, tmp_path):
+    rows, network = motion_rows("seen", 24), Network.from_settings(NETWORK)
+    samples = ChunkSamples(rows, [3.0, math.inf], {"by": "motion", "train": 1, "val": 0, "test": 0}, 7, network)
+    data = npy(np.ones((3, 400), np.complex64))
+    whole = write_shard(tmp_path / "whole.tar", samples, "train", kind, lambda number, level: data)
+    tables = []
+    for number in range(3):
+        path = tmp_path / f"part{number}.tar"
+        write_shard(path, samples, "train", kind, lambda number, level: data, (number, 3))
+        tables.append(map_samples(table_path(path)))
+    keys = np.concatenate([table["key"] for table in tables])
+    assert len(keys) == whole["samples"] and set(keys) == set(map_samples(tmp_path / "whole.npz")["key"])
+    assert {len(table) for table in tables} == {whole["samples"] // 3}
+    assert all(set(table["label"]) == set(map_samples(tmp_path / "whole.npz")["label"]) for table in tables)
+    # All SNRs of a motion model lie in one shard.
+    models = [{key.rpartition(b"-")[0] for key in table["key"].tolist()} for table in tables]
+    assert sum(map(len, models)) == len(set().union(*models))

@@ -3,6 +3,7 @@
 import csv
 import hashlib
 import json
+import math
 import shutil
 
 import pytest
@@ -66,7 +67,7 @@ def test_samples_are_all_listed(published):
         }
         assert (int(row["label"]), int(row["model"])) == (entry["label"], entry["model"])
         assert (entry["snr_db"], entry["noise"]) == (
-            (300.0, False) if row["snr_db"] == "inf" else (float(row["snr_db"]), True)
+            (math.inf, False) if row["snr_db"] == "inf" else (float(row["snr_db"]), True)
         )
         assert row["key"].encode() in (published / row["shard"]).read_bytes()
 
@@ -107,7 +108,7 @@ def test_mlcroissant_validates_and_loads(published, mlcroissant):
     assert [row["samples/key"] for row in rows] == shards.keys.tolist()
     assert [row["samples/label"] for row in rows] == shards.labels.tolist()
     if shards.kind == "image":
-        assert next(iter(data.records("members")))["members/content"].size == (768, 768)
+        assert next(iter(data.records("labelled")))["labelled/content"].size == (768, 768)
 
 
 def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):

@@ -22,7 +22,7 @@ def test_record_tells_motion_geometry_and_versions():
     network = Network.from_settings(NETWORK)
     entry = json.loads(record(row, math.inf, "val", SEED, network))
     assert entry["key"] == "dji-mavic-3-000000-snrinf"
-    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (0, "UAV", 300.0, False)
+    assert (entry["label"], entry["category"], entry["snr_db"], entry["noise"]) == (0, "UAV", math.inf, False)
     assert entry["motion"]["rate_hz"] == row["rate_hz"] and entry["motion"]["phase_0_rad"] == 0.0
     assert entry["seed"] == SEED
     seen = entry["geometry"]["A"]

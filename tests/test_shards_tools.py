@@ -40,6 +40,7 @@ def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, 
     for protocol, expected in counts.items():
         found = loaded(published, tmp_path, monkeypatch, str(published), protocol)
         assert {split: len(rows) for split, rows in found.items()} == expected
+        assert found["test"].features["json"]["label"].names == list(shards.classes)
         for row in found["test"]:
             number = numbers[row["__key__"]]
             assert row["json"] == shards.record(number)
@@ -65,6 +66,13 @@ def test_croissant_is_of_version_1_1_and_has_no_fault(published, mlcroissant):
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors and not data.metadata.issues.warnings
     assert len(list(data.records("samples"))) == 24
+    shards = ShardSet(published / "index.json")
+    labels = dict(zip((key.decode() for key in shards.keys.tolist()), shards.labels.tolist(), strict=True))
+    rows = list(data.records("labelled"))
+    assert {row["labelled/key"].decode(): row["labelled/label"] for row in rows} == labels
+    for row in rows if shards.kind == "image" else []:
+        number = shards.keys.tolist().index(row["labelled/key"])
+        assert (np.asarray(row["labelled/content"]) == shards.tile(number)).all()
 
 
 def test_zenodo_takes_the_metadata(published):

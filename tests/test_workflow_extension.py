@@ -39,7 +39,7 @@ def base(tmp_path_factory):
 
 def extended(base, folder, change):
     """A copy of the finished workplace, run again with an overlay; the rules that it ran, and what it made."""
-    shutil.copytree(base, folder, dirs_exist_ok=True)
+    shutil.copytree(base, folder, dirs_exist_ok=True, symlinks=True)
     before = checksums(folder)
     times = {name: (folder / "results/test" / name).stat().st_mtime_ns for name in before}
     (folder / "change.yaml").write_text(yaml.safe_dump(change))

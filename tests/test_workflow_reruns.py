@@ -90,7 +90,9 @@ CHANGES = {
     "training steps": Change(TRAIN, overlay=TRAINING),
     "network": Change(TRAIN, overlay={"recognition": {"network": {"heads": 2}}}),
     "augmentation": Change(TRAIN, overlay={"recognition": {"augmentation": {"mirror": 0.0}}}),
-    "nodes": Change(TRAIN, ("lowalt.recognition.nodes 2 1",), overlay={"recognition": {"processes": 2, "nodes": 2}}),
+    "nodes": Change(
+        TRAIN, ("'lowalt.recognition.nodes', '2', '1'",), overlay={"recognition": {"processes": 2, "nodes": 2}}
+    ),
     "evaluation batch": Change(EVALUATE, overlay={"recognition": {"evaluation": {"batch": 32}}}),
     "protocol": Change(
         TABLES | MANIFEST, ("Set of input files has changed",), overlay={"recognition": {"protocols": ["unseen"]}}
@@ -233,7 +235,7 @@ def test_a_change_re_runs_the_jobs_that_it_touches_and_names_the_reason(dry_runs
     # A job that follows from another names that one's files; the others must name the change itself.
     followers = with_what_follows({after for job in change.jobs for after in next_jobs(job)})
     reasons = [found[job] for job in change.jobs - followers - TILES - SETTINGS - MANIFEST]
-    assert all(any(word in reason for word in change.reasons) for reason in reasons), reasons
+    assert all(any(word in reason for word in change.reasons) for reason in reasons), "\n".join(reasons)
     assert all(any(word in reason for reason in found.values()) for word in change.reasons)
 
 

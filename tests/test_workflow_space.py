@@ -27,9 +27,9 @@ MODELS, SNRS, SYMBOLS, STATIONS = 50 * 2, 6, 400, 3
     ("echo", {"station": "A"}, "image", 8 * MODELS * SYMBOLS),
     ("echo_in_scene", {}, "image", 8 * MODELS * SYMBOLS * STATIONS),
     ("noise", {}, "image", 8 * MODELS * SNRS * SYMBOLS * STATIONS),
-    ("shard", {"fold": "train"}, "image", 0.5 * 0.8 * MODELS * SNRS * 768**2),
-    ("shard", {"fold": "val"}, "signal", 8 * 0.1 * MODELS * SNRS * SYMBOLS * STATIONS),
-    ("shard", {"fold": "val"}, "recipe", 8 * 0.1 * MODELS * SYMBOLS * STATIONS),
+    ("shard", {"fold": "train"}, "image", 0.8 * MODELS * SNRS * (2 * 512 + 2048 + 768**2 // 2)),
+    ("shard", {"fold": "val"}, "signal", 0.1 * MODELS * SNRS * (2 * 512 + 2048 + 19 * 512)),
+    ("shard", {"fold": "val"}, "recipe", 0.1 * MODELS * SNRS * ((2 * 512 + 2048 + 19 * 512) // SNRS)),
     ("views", {"fold": "val", "size": "24"}, "image", 0.1 * MODELS * SNRS * 9 * 24**2),
     ("tiles", {}, "image", 0), ("motion", {}, "image", 0),
 ])  # fmt: skip

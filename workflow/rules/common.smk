@@ -6,7 +6,7 @@ from pathlib import Path
 
 from lowalt.config.command import Refusing, refusing
 from lowalt.machine.environment import prepare
-from lowalt.config.plan import PART
+from lowalt.config.plan import PART, PIECE
 from lowalt.scene.catalogue import dotted
 from lowalt.workflow import mends, options, space
 from lowalt.files.shipped import located
@@ -38,6 +38,7 @@ wildcard_constraints:
     subtype="|".join(RUN.subtypes),
     group="|".join(RUN.plan.groups),
     part=PART,
+    piece=PIECE,
     station="|".join(RUN.stations),
     fold="train|val|test",
     protocol="seen|unseen",

@@ -10,13 +10,13 @@ rule views:
         code=code("lowalt.recognition", "lowalt.recognition.views"),
         # All that is read of the index follows from the shard and from `render`; it grows where chunks are added.
         index=ancient("results/{run}/shards/index.json"),
-        shard="results/{run}/shards/{group}-{fold}-{part}.tar",
+        shard="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",
     output:
-        "results/{run}/views/{size}/{group}-{fold}-{part}.npz",
+        "results/{run}/views/{size}/{group}-{fold}-{part}{piece}.npz",
     log:
-        "results/{run}/logs/views/{size}/{group}-{fold}-{part}.log",
+        "results/{run}/logs/views/{size}/{group}-{fold}-{part}{piece}.log",
     benchmark:
-        "results/{run}/benchmarks/views/{size}/{group}-{fold}-{part}.jsonl"
+        "results/{run}/benchmarks/views/{size}/{group}-{fold}-{part}{piece}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
@@ -25,7 +25,7 @@ rule views:
         reduced=options.reduced_chunk,
     shell:
         "python -m lowalt.recognition views --settings {params.settings:q} --index {input.index:q}"
-        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
+        " --shard {wildcards.group:q}-{wildcards.fold:q}-{wildcards.part:q}{wildcards.piece:q}.tar {params.reduced:q} --out {output:q} 2> {log:q}"
 
 
 rule freeze:

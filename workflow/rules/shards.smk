@@ -1,6 +1,6 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to it, and one index.
 # REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals, or its clean echoes
-# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}.tar and .npz, results/{run}/shards/index.json,
+# OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz, results/{run}/shards/index.json,
 #          and next to them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
 #          SHA256SUMS
 
@@ -11,20 +11,21 @@ rule shard:
         code=code("lowalt.shards"),
         motion=products.motion,
     output:
-        tar="results/{run}/shards/{group}-{fold}-{part}.tar",
-        table="results/{run}/shards/{group}-{fold}-{part}.npz",
+        tar="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",
+        table="results/{run}/shards/{group}-{fold}-{part}{piece}.npz",
     log:
-        "results/{run}/logs/shard/{group}-{fold}-{part}.log",
+        "results/{run}/logs/shard/{group}-{fold}-{part}{piece}.log",
     benchmark:
-        "results/{run}/benchmarks/shard/{group}-{fold}-{part}.jsonl"
+        "results/{run}/benchmarks/shard/{group}-{fold}-{part}{piece}.jsonl"
     conda:
         "../../envs/environment.yaml"
     params:
         settings=settings.shard,
         content=options.content,
+        piece=products.piece,
     shell:
         "python -m lowalt.shards write --settings {params.settings:q} --motion {input.motion:q}"
-        " {params.content:q} --fold {wildcards.fold:q} --out {output.tar:q} 2> {log:q}"
+        " {params.content:q} --fold {wildcards.fold:q} {params.piece:q} --out {output.tar:q} 2> {log:q}"
 
 
 rule index:

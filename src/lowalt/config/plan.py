@@ -6,6 +6,7 @@ these alone; a step that adds SNRs makes a chunk {chunk}s{t} for every earlier o
 echoes.
 """
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,6 +16,14 @@ from lowalt.files.errors import InputError, instead
 GROUPS = ("seen", "unseen")
 PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
+PIECE = r"(?:p\d+)?"
+"""Regular expression of a shard's piece, where a fold of a chunk is packed in several shards."""
+BLOCK = 512
+"""Bytes by which the parts of a tar are rounded up."""
+RECORD_BYTES = 2048
+"""Space of a sample's JSON record in the tar, padded."""
+PIXEL_BYTES = 0.5
+"""Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
 
 
 def snrs_of(config: dict) -> tuple[float, ...]:
@@ -27,6 +36,18 @@ def snrs_of(config: dict) -> tuple[float, ...]:
     if len(set(snrs)) < len(snrs):
         raise InputError(f"noise.snr_db: value {list(snrs)}, expected every SNR once")
     return snrs
+
+
+def sample_bytes(config: dict) -> int:
+    """Return the approximate bytes of a sample in a shard, padding included, by its kind; of recipes, its share."""
+    kind, stations = config["shards"]["kind"], len(config["network"]["stations"])
+    if kind == "image":
+        spectra = sum(isinstance(block, dict) for block in config["spectra"].values())
+        data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
+    else:
+        data = 128 + 8 * stations * config["network"]["symbols"]
+    whole = 2 * BLOCK + RECORD_BYTES + data + -data % BLOCK
+    return whole // len(snrs_of(config)) if kind == "recipe" else whole
 
 
 @dataclass(frozen=True)
@@ -45,7 +66,8 @@ class Chunk:
 class Plan:
     """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
 
-    groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them.
+    groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them;
+    largest: samples that a shard holds.
     """
 
     groups: dict[str, tuple[str, ...]]
@@ -55,6 +77,7 @@ class Plan:
     split: dict
     seed: int
     steps: tuple[tuple[tuple[str, ...], tuple[float, ...]], ...]
+    largest: float = float("inf")
 
     @classmethod
     def of(cls, config: dict, published: dict[str, dict]) -> "Plan":
@@ -87,7 +110,11 @@ class Plan:
         levels = [tuple(map(float, step.get("snr_db", []))) for step in (config["noise"], *config.get("added", []))]
         subtypes = [tuple(name for name in names if name not in more), *later]
         steps = tuple(zip(subtypes, levels, strict=True))
-        return cls(groups, motion["models"], motion["models_per_chunk"], snrs_of(config), split, config["seed"], steps)
+        largest = float("inf")
+        if config.get("shards", {}).get("largest_mb"):
+            largest = max(1, 1e6 * config["shards"]["largest_mb"] // sample_bytes(config))
+        numbers = motion["models"], motion["models_per_chunk"], snrs_of(config), split, config["seed"]
+        return cls(groups, *numbers, steps, largest)
 
     @cached_property
     def _chunks(self) -> dict[str, Chunk]:
@@ -145,11 +172,20 @@ class Plan:
         }
         return [name for name in FOLDS if name in found]
 
+    def pieces(self, chunk: str, fold: str) -> list[str]:
+        """Return what the names of a chunk's shards of one fold end on: nothing, or p0, p1, ... for several."""
+        held = self._chunks[chunk]
+        models = held.count * len(held.members) * self.split[fold] / sum(self.split[name] for name in FOLDS)
+        # The samples of a motion model stay together.
+        count = math.ceil(models / max(1, self.largest // len(held.snrs)))
+        return [f"p{number}" for number in range(count)] if count > 1 else [""]
+
     @property
     def shards(self) -> list[str]:
-        """Names {group}-{fold}-{part} of all shards."""
+        """Names {group}-{fold}-{part}{piece} of all shards."""
         return [
-            f"{group}-{name}-{part}"
+            f"{group}-{name}-{part}{piece}"
             for group, part in (chunk.split("-") for chunk in self.chunks)
             for name in self.folds(f"{group}-{part}")
+            for piece in self.pieces(f"{group}-{part}", name)
         ]

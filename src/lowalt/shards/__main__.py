@@ -33,13 +33,17 @@ def write(arguments: list[str]) -> None:
         "--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station; recipe shards"
     )
     options.add_argument("--fold", required=True, help="train, val or test")
+    options.add_argument("--piece", nargs=2, type=int, default=(0, 1), metavar=("NUMBER", "COUNT"),
+                         help="the shard's place among the shards of the fold")  # fmt: skip
     options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz next to it")
     given = options.parse_args(arguments)
     classes = _classes(given.settings)
     canceller = given.settings.pop("canceller", None)
     added = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
-    (kind,) = pick(shards, "kind")
+    kind, _ = pick({"largest_mb": None, **shards}, "kind", "largest_mb")
+    if not 0 <= given.piece[0] < given.piece[1]:
+        raise InputError(f"--piece: {given.piece}, expected 0 <= NUMBER < COUNT")
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
     rows = [accompanied(row, added, seed) for row in read_table(given.motion)]
@@ -49,7 +53,7 @@ def write(arguments: list[str]) -> None:
     else:
         content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
     samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
-    write_shard(given.out, samples, given.fold, kind, content)
+    write_shard(given.out, samples, given.fold, kind, content, tuple(given.piece))
 
 
 def _classes(settings: dict) -> tuple[str, ...]:

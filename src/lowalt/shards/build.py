@@ -81,8 +81,10 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     samples = ChunkSamples(rows, list(levels), plan.split, plan.seed, maker.network, dataset.classes, powers, canceller)
     paths = []
     for name in plan.folds(chunk):
-        paths.append(folder / "shards" / f"{group}-{name}-{part}.tar")
-        write_shard(paths[-1], samples, name, kind, content)
+        pieces = plan.pieces(chunk, name)
+        for number, piece in enumerate(pieces):
+            paths.append(folder / "shards" / f"{group}-{name}-{part}{piece}.tar")
+            write_shard(paths[-1], samples, name, kind, content, (number, len(pieces)))
     return paths
 
 

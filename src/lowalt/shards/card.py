@@ -24,6 +24,7 @@ from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.hub import TAGS, front
 from lowalt.shards.read import ShardSet
+from lowalt.shards.table import EXTENSIONS
 
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
@@ -112,7 +113,8 @@ def write_samples(shards: ShardSet, path: Path) -> None:
             for key, label, model, snr_db in zip(*columns, strict=True):
                 record = records[_slug(key.decode())]
                 row = (key.decode(), label, record["category"], record["subtype"], entry["group"], entry["fold"])
-                yield (*row, model, f"{snr_db:g}", entry["name"])
+                name = key.decode().rpartition("-")[0] if shards.kind == "recipe" else key.decode()
+                yield (*row, model, f"{snr_db:g}", entry["name"], f"{name}.{EXTENSIONS[shards.kind]}")
 
     write_csv(path, tuple(FIELDS), rows())
 

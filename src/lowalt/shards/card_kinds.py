@@ -33,8 +33,8 @@ READING = {
 Each shard is a plain tar in the WebDataset layout. A motion model, with the samples of all its SNRs, has two members:
 
 - `KEY.clean.npy`: its echoes without noise, float32 (stations, symbols, 2: real and imaginary part);
-- `KEY.json`: class, subtype, motion parameters, what each station sees, the SNRs (where `noise` is false, 300 stands
-  for no noise), seed, versions.
+- `KEY.json`: class, subtype, motion parameters, what each station sees, the SNRs (infinite where `noise` is
+  false), seed, versions.
 
 The noise of a sample follows from seed, subtype, motion model, station and SNR. lowalt adds it while it reads:
 `ShardSet` below gives the signals and images of the other kinds of shards, equal in every byte, and

@@ -17,7 +17,7 @@ import numpy as np
 from lowalt.files.errors import InputError
 from lowalt.noise.chunk import noisy_signals
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
-from lowalt.shards.record import NO_NOISE_DB, sample_key
+from lowalt.shards.record import encoded, sample_key
 
 POWER = "power_w"
 """Field of the record for the power (W) that SNRs refer to, a number a station; absent where it is the echoes' own."""
@@ -46,13 +46,13 @@ def packed(
     """
     snrs = [float(snr) for snr in snrs_db]
     entry = json.loads(record)
-    entry |= {"key": key, "snr_db": [NO_NOISE_DB if math.isinf(snr) else snr for snr in snrs]}
+    entry |= {"key": key, "snr_db": snrs}
     entry["noise"] = [not math.isinf(snr) for snr in snrs]
     if power_w is not None:
         entry[POWER] = [float(power) for power in power_w]
     if canceller is not None:
         entry[CANCELLER] = json.dumps(canceller, sort_keys=True)
-    return json.dumps(entry, separators=(",", ":"), allow_nan=False).encode()
+    return encoded(entry)
 
 
 def sample_snrs(entry: dict) -> list[float]:
@@ -74,8 +74,8 @@ def unpacked(entry: dict, snr_db: float) -> bytes:
         raise InputError(f"record of {entry['key']}: SNRs {sample_snrs(entry)} dB, expected {snr_db} dB among them")
     kept = {name: value for name, value in entry.items() if name not in (POWER, CANCELLER)}
     kept |= {"key": sample_key(entry["subtype"], entry["model"], snr_db), "noise": not math.isinf(snr_db)}
-    kept["snr_db"] = NO_NOISE_DB if math.isinf(snr_db) else snr_db
-    return json.dumps(kept, separators=(",", ":"), allow_nan=False).encode()
+    kept["snr_db"] = snr_db
+    return encoded(kept)
 
 
 def noisy(entry: dict, clean: np.ndarray, stations: list[str], snr_db: float) -> np.ndarray:

@@ -62,6 +62,7 @@ FIELDS = {
     "model": ("sc:Integer", "Number of the motion model within its subtype."),
     "snr_db": ("sc:Float", "Signal-to-noise ratio in dB, or inf."),
     "shard": ("sc:Text", "Shard that holds the sample's members KEY.json and its image or signal."),
+    "file": ("sc:Text", "Name of the sample's image or signal in the shard."),
 }
 """Columns of the table of all samples: data type and meaning; the label's meaning names the classes."""
 
@@ -114,7 +115,7 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
         "conformsTo": "http://mlcommons.org/croissant/1.1",
         "isLiveDataset": False,
         "distribution": files + sets,
-        "recordSet": [_samples(table["path"], stated(index)), _media(kind, data_type, meaning)],
+        "recordSet": [_samples(table["path"], stated(index)), _labelled(kind, table["path"], data_type, meaning)],
     }
 
 
@@ -151,19 +152,31 @@ def _samples(path: str, classes: tuple[str, ...]) -> dict:
     }  # fmt: skip
 
 
-def _media(kind: str, data_type: str, meaning: str) -> dict:
-    """The record set with one row for each member: its name and the member itself."""
+def _labelled(kind: str, path: str, data_type: str, meaning: str) -> dict:
+    """The record set with one row for each sample: its image, signal or echo next to what the table says of it."""
     name = f"{kind}s"
-    parts = {"file": ("sc:Text", "filename", "Name of the member: KEY and its extension."),
-             "content": (data_type, "content", meaning)}  # fmt: skip
+
+    def field(part: str, what: str, text: str, source: dict) -> dict:
+        """One field of the set."""
+        return {
+            "@type": "cr:Field", "@id": f"labelled/{part}", "name": part, "description": text, "dataType": what,
+            "source": source,
+        }  # fmt: skip
+
+    def table(part: str) -> dict:
+        """A column of the table of samples."""
+        return {"fileObject": {"@id": path}, "extract": {"column": part}}
+
+    def member(part: str) -> dict:
+        """A property of a member of the shards."""
+        return {"fileSet": {"@id": name}, "extract": {"fileProperty": part}}
+
     fields = [
-        {
-            "@type": "cr:Field", "@id": f"members/{part}", "name": part, "description": text, "dataType": what,
-            "source": {"fileSet": {"@id": name}, "extract": {"fileProperty": property_name}},
-        }
-        for part, (what, property_name, text) in parts.items()
-    ]  # fmt: skip
+        field("file", *FIELDS["file"], member("filename")) | {"references": table("file")},
+        *(field(part, *FIELDS[part], table(part)) for part in ("key", "label", "category", "snr_db")),
+        field("content", data_type, meaning, member("content")),
+    ]
     return {
-        "@type": "cr:RecordSet", "@id": "members", "name": "members",
-        "description": f"The {kind} of every {OF[kind]}, from the shards.", "field": fields,
+        "@type": "cr:RecordSet", "@id": "labelled", "name": "labelled",
+        "description": f"The {kind} of every sample with its label.", "field": fields,
     }  # fmt: skip

@@ -1,9 +1,11 @@
 """The metadata block at the head of a data card, as dataset hubs read it: licence, size, protocols and their shards."""
 
+import json
 from fnmatch import fnmatchcase
 
 from lowalt.config.splits import FOLDS
 from lowalt.shards.read import ShardSet
+from lowalt.shards.table import EXTENSIONS
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
 
@@ -52,11 +54,38 @@ def configs(shards: ShardSet) -> list[dict]:
     return result
 
 
+DTYPES = {bool: "bool", int: "int64", float: "float64", str: "string", type(None): "float64"}
+"""The hub's names of the types of a record's values; a number that is unknown is null."""
+
+
+def features(shards: ShardSet) -> list[dict]:
+    """Return the columns of the data set as the hub's library `datasets` types them, the label's with its classes."""
+    if not len(shards):
+        return []
+    names = {"class_label": {"names": {str(number): name for number, name in enumerate(shards.classes)}}}
+
+    def typed(name: str, value: object) -> dict:
+        """The type of one value of a record."""
+        if name == "label":
+            return {"name": name, "dtype": names}
+        if isinstance(value, dict):
+            return {"name": name, "struct": [typed(*item) for item in value.items()]}
+        if isinstance(value, list):
+            return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
+        return {"name": name, "dtype": DTYPES[type(value)]}
+
+    data = {"list": {"list": {"list": "float32"}}} if shards.kind != "image" else {"dtype": "image"}
+    record = typed("json", json.loads(shards.stored(0, "record")))
+    return [typed("__key__", ""), typed("__url__", ""), record, {"name": EXTENSIONS[shards.kind], **data}]
+
+
 def front(shards: ShardSet, name: str, license_name: str) -> dict:
     """Return the metadata block at the head of the data card, as dataset hubs read it."""
+    protocols = configs(shards)
     return {
         "pretty_name": name, "license": license_name.lower(), "language": ["en"],
         "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
-        "configs": configs(shards),
+        "configs": protocols,
+        "dataset_info": [{"config_name": each["config_name"], "features": features(shards)} for each in protocols],
         "tags": TAGS,
     }  # fmt: skip

@@ -93,8 +93,11 @@ class ShardSet:
         shard = int(np.searchsorted(self._ends, number, side="right")) - 1
         return shard, number - int(self._ends[shard])
 
-    def _bytes(self, number: int, member: str) -> bytes:
-        """The bytes of a member of a sample, after the sample's check."""
+    def stored(self, number: int, member: str) -> bytes:
+        """Return the bytes of a member of a sample, "record" or "data", after the sample's check.
+
+        Raises: InputError naming shard and sample where it is damaged.
+        """
         shard, place = self._locate(number)
         row, path = self._table(shard)[place], existing(self._path(shard), "shard")
         first, length = int(row[f"{member}_offset"]), int(row[f"{member}_size"])
@@ -156,7 +159,7 @@ class ShardSet:
         """
         if self.kind == "recipe":
             return self._record(number), npy(self.signal(number))
-        return self._bytes(number, "record"), self._bytes(number, "data")
+        return self.stored(number, "record"), self.stored(number, "data")
 
     def _snr_db(self, number: int) -> float:
         """SNR of a sample (dB)."""
@@ -165,7 +168,7 @@ class ShardSet:
 
     def _record(self, number: int) -> bytes:
         """The JSON record of a sample."""
-        stored = self._bytes(number, "record")
+        stored = self.stored(number, "record")
         return unpacked(json.loads(stored), self._snr_db(number)) if self.kind == "recipe" else stored
 
     def record(self, number: int) -> dict:
@@ -181,7 +184,7 @@ class ShardSet:
         Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
         """
         self._need("image")
-        return self._bytes(number, "data")
+        return self.stored(number, "data")
 
     def signal(self, number: int) -> np.ndarray:
         """Return the signals of a sample of a signal or recipe shard, (stations, symbols) complex64.
@@ -189,11 +192,11 @@ class ShardSet:
         Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
         """
         self._need("signal", "recipe")
-        stored = complex_signals(np.lib.format.read_array(io.BytesIO(self._bytes(number, "data"))))
+        stored = complex_signals(np.lib.format.read_array(io.BytesIO(self.stored(number, "data"))))
         if self.kind == "signal":
             return stored
         stations = station_names(self.index["render"]["network"])
-        return noisy(json.loads(self._bytes(number, "record")), stored, stations, self._snr_db(number))
+        return noisy(json.loads(self.stored(number, "record")), stored, stations, self._snr_db(number))
 
     def late(self, number: int) -> np.ndarray | None:
         """Return how late the symbols of a sample are, (stations, symbols) intervals; None where images do not ask."""

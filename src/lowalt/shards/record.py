@@ -43,8 +43,18 @@ def rank(seed: int, subtype: str, model: int, snr_db: float) -> bytes:
     return digest(seed, "order", subtype, model, "inf" if math.isinf(snr_db) else float(snr_db))
 
 
-NO_NOISE_DB = 300.0
-"""The SNR (dB) in records of samples without noise: noise at 300 dB would be far below complex64's rounding."""
+def encoded(content: dict) -> bytes:
+    """Return a record as JSON; an SNR of infinity is 1e999, a number by JSON's grammar that readers take as infinity.
+
+    Raises: ValueError for any other number that is not finite.
+    """
+    snrs = content["snr_db"] if isinstance(content["snr_db"], list) else [content["snr_db"]]
+    texts = ["1e999" if snr == math.inf else json.dumps(snr, allow_nan=False) for snr in snrs]
+    said = f"[{','.join(texts)}]" if isinstance(content["snr_db"], list) else texts[0]
+    names = [json.dumps(name) + ":" for name in content]
+    values = [said if name == "snr_db" else json.dumps(value, separators=(",", ":"), allow_nan=False)
+              for name, value in content.items()]  # fmt: skip
+    return ("{" + ",".join(map(str.__add__, names, values)) + "}").encode()
 
 
 def versions() -> dict[str, str]:
@@ -89,7 +99,7 @@ def record(
     """Return the JSON record of one sample: name, class, motion, geometry for each station, seed and versions.
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
-    whether noise was added; where none was, `snr_db` is NO_NOISE_DB. Numbers that are unknown are null, as for a
+    whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
     targets in the beam, the record has it too; the label is the row's own target's. classes: in the order of their
     labels. Raises: InputError where the row's category is no class.
@@ -104,7 +114,7 @@ def record(
         **{name: row[name] for name in names},
         **added,
         "fold": fold,
-        "snr_db": NO_NOISE_DB if math.isinf(snr_db) else float(snr_db),
+        "snr_db": float(snr_db),
         "noise": not math.isinf(snr_db),
         "seed": seed,
         "motion": {name: blank if math.isnan(value) else float(value) for name, value in motion.items()},
@@ -114,7 +124,7 @@ def record(
         },
         "versions": versions(),
     }
-    return json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+    return encoded(content)
 
 
 def accompanied(row: dict, effects: dict, seed: int) -> dict:

@@ -40,7 +40,8 @@ def metadata(shards: ShardSet, network: Network, place: int, digest: str) -> dic
             "core:sample_count": network.symbols,
             "core:label": entry["category"],
             "core:comment": f"{entry['subtype']}, motion model {entry['model']}",
-            **{f"lowalt:{name}": entry[name] for name in KEPT},
+            # JSON has no infinity: without noise the annotation names no SNR.
+            **{f"lowalt:{name}": entry[name] for name in KEPT if name != "snr_db" or entry["noise"]},
             "lowalt:geometry": entry["geometry"][station.name],
         })  # fmt: skip
     return {

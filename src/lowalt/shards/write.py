@@ -55,13 +55,15 @@ def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tupl
 
 
 def write_shard(
-    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Callable[[int, int], bytes]
-) -> dict:
+    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Callable[[int, int], bytes],
+    piece: tuple[int, int] = (0, 1),
+) -> dict:  # fmt: skip
     """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
 
     content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy (kind
     "signal"), or of the row's clean echoes (kind "recipe"). A recipe shard holds each motion model once, at the place
-    of its first sample; all its samples point there.
+    of its first sample; all its samples point there. piece: number and count of the pieces that the fold is packed in;
+    the samples of a motion model stay together.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:
@@ -70,7 +72,10 @@ def write_shard(
     groups = sorted({row["group"] for row in rows})
     if len(groups) != 1:
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
-    chosen = select(rows, snrs, split, seed, wanted)
+    chosen, turns = select(rows, snrs, split, seed, wanted), {}
+    for row, _ in chosen:
+        turns.setdefault(row, len(turns) % piece[1])
+    chosen = [(row, level) for row, level in chosen if turns[row] == piece[0]]
     table = np.zeros(len(chosen), SAMPLE)
     levels: dict[int, list[float]] = {}
     for number, level in chosen:

@@ -84,6 +84,11 @@ class DataProducts:
             first.setdefault(record["published"]["category"], name)
         return [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in first.values()]
 
+    def piece(self, wildcards: Any) -> list[str]:
+        """The place of a shard among those of its chunk's fold, as words of the stage's command line; none if alone."""
+        pieces = self._run.plan.pieces(f"{wildcards.group}-{wildcards.part}", wildcards.fold)
+        return ["--piece", str(pieces.index(wildcards.piece)), str(len(pieces))] if len(pieces) > 1 else []
+
     def listening(self, wildcards: Any) -> list[str]:
         """Names of the stations whose signals one echo job makes."""
         return [wildcards.station] if self._run.echo_per_station else self._run.stations

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.config.plan import Plan
+from lowalt.config.plan import Plan, sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import free_bytes
 from lowalt.files.errors import InputError, SpaceError
@@ -20,8 +20,6 @@ FULL_BYTES = 1 << 20
 TRIAL_BYTES = 1 << 16
 SIGNAL_BYTES = 8
 """Bytes of a complex value of a signal, complex64."""
-TILE_BYTES = 0.5
-"""Bytes that a shard holds for each pixel of its tiles, their signals with them: at most so many were measured."""
 
 
 def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -> float:
@@ -38,13 +36,10 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
     if rule not in ("shard", "views"):
         return 0.0
     share = plan.split[wildcards["fold"]] / sum(plan.split[fold] for fold in FOLDS)
-    images = share * models * len(chunk.snrs) * stations * len(named(config["spectra"]))
+    samples = share * models * len(chunk.snrs) / len(plan.pieces(chunk.name, wildcards["fold"]))
     if rule == "views":
-        return images * int(wildcards["size"]) ** 2
-    kind = config["shards"]["kind"]
-    if kind == "image":
-        return TILE_BYTES * images * config["images"]["size"] ** 2
-    return SIGNAL_BYTES * share * values * (len(chunk.snrs) if kind == "signal" else 1)
+        return samples * stations * len(named(config["spectra"])) * int(wildcards["size"]) ** 2
+    return samples * sample_bytes(config)
 
 
 def check(needed: float, folder: Path) -> None:
