@@ -35,10 +35,10 @@ def test_compare_says_what_differs_and_by_how_much(tmp_path, capsys):
   seed  1 | 2
 
 accuracy percent: {one} | {other}
-  seen A:VT  81.00 | 82.00   +1.00
+  seen A:VT  81 | 82   +1
 
 processor s: {one} | {other}
-  echo  5.00 | 2.50   -2.50
+  echo  5 | 2.5   -2.5 (-50.0%)
 
 data: {one} | {other}
   samples  30 | -

@@ -6,11 +6,23 @@ One folder a stage, in pipeline order: targets, motion, echo, noise, spectra, ti
 __version__ = "0.2.0"
 
 
+__all__ = ["Dataset", "Endless", "evaluate", "train"]
+
+
 def __getattr__(name: str):
-    """Import `Dataset` or `Endless` when it is first asked for."""
+    """Import `Dataset`, `Endless`, `train` or `evaluate` when it is first asked for."""
     # A stage's command line must not wait for the import of all other stages.
     if name in ("Dataset", "Endless"):
         from lowalt.shards import dataset
 
         return getattr(dataset, name)
+    if name in ("train", "evaluate"):
+        from lowalt.recognition import one_call
+
+        return getattr(one_call, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The names that programs use, for completion."""
+    return sorted([*globals(), *__all__])

@@ -86,8 +86,16 @@ def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
 
 
 def _cell(value: object) -> str:
-    """A value as text; a dash for None."""
-    return "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
+    """A value as text, a number with four digits; a dash for None."""
+    return "-" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _change(part: str, first: object, second: object) -> str:
+    """The difference of two measured numbers; of times and sizes as a share of the first too."""
+    if part == "configuration" or None in (first, second):
+        return ""
+    share = f" ({second / first - 1:+.1%})" if part != "accuracy_percent" and first else ""
+    return f"   {second - first:+.4g}{share}"
 
 
 def run(given: argparse.Namespace) -> str:
@@ -105,6 +113,5 @@ def run(given: argparse.Namespace) -> str:
         lines += ["", f"{part.replace('_', ' ')}: {given.runs[0]} | {given.runs[1]}"]
         wide = max(map(len, rows))
         for name, (first, second) in rows.items():
-            change = f"   {second - first:+.2f}" if isinstance(first, float) and isinstance(second, float) else ""
-            lines.append(f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{change}")
+            lines.append(f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}")
     return "\n".join(lines[1:])

@@ -7,6 +7,8 @@ rest from the data set. Probabilities are not negative and sum to one within 1e-
     subtype, group, fold, model, snr_db, label    as in the sample's record ("inf" for no noise)
     range_m        distance of the nearest station the model used, aspect_deg the aspect seen from it; may be empty
     p_uav, p_bird, p_vehicle, p_pedestrian        class probabilities, by the names and in the order of the classes
+    part           of the protocol that the network was trained in: "test" rows are those whose accuracy counts; others
+                   are "validation" and, of the protocol unseen, "seen_test"; may be left out
 """
 
 import csv
@@ -21,6 +23,7 @@ from lowalt.config.classes import CATEGORIES, word
 from lowalt.files.atomic import existing, text_file, text_of
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
+from lowalt.recognition.protocols import FOLDS
 from lowalt.recognition.samples import Facts
 
 COLUMNS = ("key", "subtype", "group", "fold", "model", "snr_db", "label", "range_m", "aspect_deg")
@@ -106,17 +109,22 @@ def _number(value: float) -> str:
     return "" if math.isnan(value) else repr(float(value))
 
 
-def write(path: str | Path, found: Predictions, classes: tuple[str, ...] = CATEGORIES) -> None:
-    """Write a prediction file; equal predictions give equal bytes."""
+def write(
+    path: str | Path, found: Predictions, classes: tuple[str, ...] = CATEGORIES, protocol: str | None = None
+) -> None:
+    """Write a prediction file, with the column `part` where a protocol is named; equal predictions give equal bytes."""
+    parts = {pair: part for part, pairs in (FOLDS[protocol].items() if protocol else ()) for pair in pairs}
+    more = ("part",) if protocol else ()
     rows = (
         [
             found.key[row], found.subtype[row], found.group[row], found.fold[row], int(found.model[row]),
             _number(found.snr_db[row]), int(found.label[row]), _number(found.range_m[row]),
             _number(found.aspect_deg[row]), *(repr(float(value)) for value in found.probabilities[row]),
+            *(parts[found.group[row], found.fold[row]] for _ in more),
         ]
         for row in range(len(found))
     )  # fmt: skip
-    write_csv(path, (*COLUMNS, *probability_columns(classes)), rows)
+    write_csv(path, (*COLUMNS, *probability_columns(classes), *more), rows)
 
 
 def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions:
@@ -127,7 +135,7 @@ def read(path: str | Path, classes: tuple[str, ...] = CATEGORIES) -> Predictions
     rows, shares = [], probability_columns(classes)
     with text_file(path, "predictions") as file:
         reader = csv.DictReader(file)
-        if tuple(reader.fieldnames or ()) != (*COLUMNS, *shares):
+        if tuple(name for name in reader.fieldnames or () if name != "part") != (*COLUMNS, *shares):
             raise InputError(f"{path}: columns {reader.fieldnames}, expected {[*COLUMNS, *shares]}")
         for line, row in enumerate(reader, start=2):
             try:

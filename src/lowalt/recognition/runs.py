@@ -190,7 +190,7 @@ def evaluate(
     if machine.rank:
         return
     told = predictions.from_facts(samples.facts, trained.scheme.stations, found)
-    predictions.write(out, told, trained.classes)
+    predictions.write(out, told, trained.classes, trained.protocol)
     side = trained.path.with_name("run.json")
     known = json.loads(side.read_text()) if side.exists() else {}
     _record(Path(out).with_suffix(".json"), {

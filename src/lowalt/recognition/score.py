@@ -8,6 +8,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.recognition.predictions import probability_columns
 from lowalt.recognition.protocols import folds
+from lowalt.recognition.samples import Facts
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
 from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
@@ -44,14 +45,21 @@ def score(path: str | Path, index: str | Path, protocol: str) -> dict:
     if missing:
         raise InputError(f"{path}: {len(missing)} test samples have no prediction, the first is {missing[0]!r}")
     probabilities = np.array([given[key] for key in facts.key.tolist()])
+    return {"protocol": protocol, **scores(facts, probabilities)}
+
+
+def scores(facts: Facts, probabilities: np.ndarray) -> dict:
+    """Return accuracies (the mean over the SNRs, and by SNR and subtype), confusion and calibration of predictions.
+
+    probabilities: (samples, classes), in the order of `facts`.
+    """
     correct = probabilities.argmax(1) == facts.label
     by_snr = accuracy_by(facts.snr_db, correct)
     return {
-        "protocol": protocol,
         "samples": len(facts),
         "accuracy_percent": 100 * float(np.mean([share for share, _ in by_snr.values()])),
         "by_snr_percent": {f"{snr:g}": 100 * share for snr, (share, _) in by_snr.items()},
         "by_subtype_percent": {name: 100 * share for name, (share, _) in accuracy_by(facts.subtype, correct).items()},
-        "confusion": confusion(facts.label, probabilities.argmax(1), len(shards.classes)).tolist(),
+        "confusion": confusion(facts.label, probabilities.argmax(1), probabilities.shape[1]).tolist(),
         **calibration(probabilities, facts.label),
     }

@@ -1,0 +1,59 @@
+"""Training and evaluation in one call each: the model file and the accuracies that the commands give."""
+
+import json
+
+import pytest
+import yaml
+
+import lowalt
+from lowalt.config.layers import merge
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.recognition import checkpoint, score
+from lowalt.recognition.__main__ import main
+from lowalt.shards.build import write_run
+
+CHANGES = {
+    "run": "small",
+    "targets": {"select": ["DJI Mini 2", "Crow", "AITO M9 2024", "Walking Pedestrian 1"]},
+    "motion": {"models": 4, "models_per_chunk": 4},
+    "split": {"train": 2, "val": 1, "test": 1},
+    "noise": {"snr_db": [8, float("inf")]},
+    "images": {"size": 32},
+    "recognition": {"training": {"steps": 6, "batch": 4, "validate_every": 3, "compile": False}},
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("one call")
+    config = merge(load_yaml("config/default.yaml"), CHANGES)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config))
+    write_run(lowalt.Dataset(config), folder, "image")
+    return folder
+
+
+def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path):
+    trained = lowalt.train(run, "A:VRP+TRP+VT", "seen", out=tmp_path / "model", steps=3)
+    history = (tmp_path / "model/history.csv").read_text()
+    assert checkpoint.model(tmp_path / "model/model.pt")[1]["protocol"] == "seen" and "\n3," in history
+    found = lowalt.evaluate(trained, run)
+    block = json.dumps(yaml.safe_load((run / "config.yaml").read_text())["recognition"]["evaluation"])
+    index, table = str(run / "shards/index.json"), str(tmp_path / "p.csv")
+    main(
+        ["evaluate", "--settings", block, "--index", index, "--model", str(tmp_path / "model/model.pt"), "--out", table]
+    )
+    assert found == score.score(table, index, "seen") == lowalt.evaluate(tmp_path / "model/model.pt", run)
+    parts = [line.rpartition(",")[2] for line in (tmp_path / "p.csv").read_text().splitlines()]
+    assert parts[0] == "part" and parts.count("test") == found["samples"] and set(parts[1:]) == {"test", "validation"}
+
+
+def test_a_folder_that_is_no_run_and_a_setting_that_is_none_are_refused(run, tmp_path):
+    with pytest.raises(InputError, match="expected the folder of a finished run"):
+        lowalt.evaluate("default-seen", tmp_path)
+    with pytest.raises(InputError, match="stepps"):
+        lowalt.train(run, "A:VRP+TRP+VT", out=tmp_path / "model", stepps=3)
+
+
+def test_the_package_lists_the_names_that_programs_use():
+    assert {"Dataset", "Endless", "train", "evaluate"} <= set(dir(lowalt))
