@@ -3,13 +3,18 @@
 Files of the public sets that came later, and folders that are no set yet, go through without a change of the code.
 """
 
+import json
+import re
+
 import numpy as np
 import pytest
 import yaml
 from scipy.io import wavfile
 
+from lowalt.__main__ import main as lowalt
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
 from lowalt.recordings.__main__ import main
 from lowalt.recordings.library import Library
 from lowalt.recordings.sets import measured_intervals, recordings, usable
@@ -47,28 +52,47 @@ def test_a_wav_and_five_lines_become_spectra_and_tiles(tmp_path, rate, stereo):
     assert set(spectra) == {"vrp", "trp", "vt"} and all(np.isfinite(spectra[name]).all() for name in spectra)
 
 
-def test_a_prediction_names_every_window_and_says_which_hold_a_target(tmp_path):
-    from lowalt.recognition.checkpoint import save
-    from lowalt.recordings.recognise import recogniser, settings
+@pytest.fixture(scope="module")
+def network(tmp_path_factory):
+    """A network of the 24 GHz radar, trained for two steps on its twin and kept as the zoo keeps its own."""
+    folder = tmp_path_factory.mktemp("network")
+    (folder / "inputs/vehicle_24ghz").mkdir(parents=True)
+    drive(folder / "inputs/vehicle_24ghz", 22050, True, label="Vehicle")
+    block = load_yaml("config/measured/recognition.yaml")
+    block |= {"size": 24, "echoes": {"train": 2, "validation": 1}, "receivers": 1, "seeds": [0]}
+    block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
+    (folder / "recognition.yaml").write_text(yaml.safe_dump(block))
+    shared = ["--recognition", str(folder / "recognition.yaml"), "--models", str(folder / "models"), "--out"]
+    main(["recognise", "--inputs", str(folder / "inputs"), *shared, str(folder), "--jobs", "1"])
+    assert [row["file"] for row in read_csv(folder / "measured-recognition.csv")] == ["drive.wav"] * 2
+    main(["keep", *shared, str(folder / "zoo")])
+    assert [path.name for path in sorted((folder / "zoo").iterdir())] == ["cw_24ghz.md", "cw_24ghz.safetensors"]
+    return folder / "zoo/cw_24ghz.safetensors"
 
-    model, _ = recogniser(settings("config/measured/recognition.yaml"))
-    save(tmp_path / "model.pt", "made here", {"twin": "cw_24ghz", "weights": model.state_dict()})
+
+def test_a_prediction_names_every_window_and_says_which_hold_a_target(network, tmp_path, capsys):
     path = drive(tmp_path, 44100, True)
-    call = ["predict", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out"), "--model"]
-    main([*call, str(tmp_path / "model.pt"), str(tmp_path / "model.pt")])
-    rows = read_csv(tmp_path / "out/predictions.csv")
-    assert [row["start_s"] for row in rows] == ["0", "0.4", "0.8"]
-    assert {row["target"] for row in rows} == {"yes"}
+    assert lowalt(["predict", str(network), str(path), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["start_s"] for row in rows] == pytest.approx([0, 0.4, 0.8])
     for row in rows:
-        shares = [float(row[name]) for name in ("UAV", "Bird", "Vehicle", "Pedestrian")]
-        assert sum(shares) == pytest.approx(1, abs=1e-3)
+        shares = {name: row[name] for name in ("UAV", "Bird", "Vehicle", "Pedestrian")}
+        assert row["target"] and sum(shares.values()) == pytest.approx(1)
+        assert row["class"] == max(shares, key=shares.__getitem__)
+    assert lowalt(["predict", str(network), str(path)]) == 0
+    assert "3 of 3 windows hold a target: " in capsys.readouterr().out
 
 
-def test_a_recording_at_another_band_is_refused_with_the_radar_that_suits_it(tmp_path):
-    path = drive(tmp_path, 22050, True, carrier_hz=3.4e9)
-    call = ["predict", "--record", str(path), "--radar", "cw_24ghz", "--out", str(tmp_path / "out")]
-    with pytest.raises(InputError, match=r"carrier_hz is 3.4e\+09, .* expected --radar uav_3ghz"):
-        main([*call, "--model", "none.pt"])
+@pytest.mark.parametrize("model, file, changes, words", [
+    ("", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected the network uav_3ghz"),
+    ("", "signals.npy", {}, "knows recordings, expected the record of one"),
+    ("default-seen", "drive.yaml", {}, "knows no recordings, expected a network of a radar"),
+])  # fmt: skip
+def test_what_a_network_does_not_know_is_refused(network, tmp_path, capsys, model, file, changes, words):
+    drive(tmp_path, 22050, True, **changes)
+    np.save(tmp_path / "signals.npy", np.ones((1, 1200), np.complex64))
+    assert lowalt(["predict", model or str(network), str(tmp_path / file)]) == 2
+    assert re.search(words.replace("+", r"\+"), capsys.readouterr().err)
 
 
 def test_swapped_channels_are_refused_where_the_direction_is_known(tmp_path):

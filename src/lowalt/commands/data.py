@@ -2,6 +2,9 @@
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
 
 from lowalt.commands.for_programs import acts, as_json
 from lowalt.config.command import name_backbone
@@ -9,6 +12,9 @@ from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.shards.verify import faults, frozen
+
+if TYPE_CHECKING:
+    from lowalt.recognition.runs import Trained
 
 
 def add_to(commands: argparse._SubParsersAction) -> None:
@@ -31,11 +37,15 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
     predict = commands.add_parser(
-        "predict", help="class probabilities of a tile or of signals by a trained model",
+        "predict", help="class probabilities of a tile, of signals or of a recording by a trained model",
         epilog="example: lowalt predict default-seen sample.npy",
     )  # fmt: skip
     predict.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
-    predict.add_argument("input", type=Path, help="tile (.png), or signals (stations, symbols) complex (.npy)")
+    predict.add_argument(
+        "input",
+        type=Path,
+        help="tile (.png), signals (stations, symbols) complex (.npy), or a recording's record (.yaml)",
+    )
     name_backbone(predict)
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
     acts(predict, predicted)
@@ -95,11 +105,15 @@ def predicted(given: argparse.Namespace) -> str:
     from lowalt.recognition.one_sample import predict
     from lowalt.recognition.zoo import opened
 
-    if given.input.suffix not in (".png", ".npy"):
-        raise InputError(f"{given.input}: expected a tile (.png) or signals (.npy)")
+    if given.input.suffix not in (".png", ".npy", ".yaml"):
+        raise InputError(f"{given.input}: expected a tile (.png), signals (.npy) or the record of a recording (.yaml)")
     config = overlaid(given.overlay) if given.overlay else {}
     own = given.backbone or (config["recognition"]["network"]["backbone"] if config else "")
     model, settings = opened(given.model, own=own)
+    if given.input.suffix == ".yaml":
+        return _recording(model, settings, given)
+    if "radar" in settings and given.input.suffix == ".npy":
+        raise InputError(f"{given.input}: {given.model} knows recordings, expected the record of one (.yaml)")
     if config or not settings:
         config = config or overlaid([])
         settings = {key: config[key] for key in ("network", "spectra", "images")}
@@ -107,3 +121,24 @@ def predicted(given: argparse.Namespace) -> str:
     if given.json:
         return as_json(found)
     return "\n".join(f"{100 * value:6.2f} %  {name}" for name, value in sorted(found.items(), key=lambda p: -p[1]))
+
+
+def _recording(model: "Trained", settings: dict, given: argparse.Namespace) -> str:
+    """The class of every window of a recording, one line each, and how many windows of each class there are."""
+    from lowalt.recordings.answers import answers
+    from lowalt.recordings.record import read_record
+
+    found = answers(model, settings, read_record(given.input), str(given.input))
+    names = np.array(model.classes)[found.probabilities.argmax(1)]
+    rows = list(zip(found.starts_s.tolist(), found.present.tolist(), names, found.probabilities.tolist(), strict=True))
+    if given.json:
+        return as_json([
+            {"start_s": start, "target": target, "class": str(name), **dict(zip(model.classes, shares, strict=True))}
+            for start, target, name, shares in rows
+        ])  # fmt: skip
+    lines = [
+        f"{start:8.2f} s  " + (f"{100 * max(shares):6.2f} %  {name}" if target else "no target")
+        for start, target, name, shares in rows
+    ]
+    counts = [f"{category} {int((names[found.present] == category).sum())}" for category in model.classes]
+    return "\n".join([*lines, f"{found.present.sum()} of {len(names)} windows hold a target: {', '.join(counts)}"])

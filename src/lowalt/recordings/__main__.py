@@ -1,17 +1,17 @@
-"""`python -m lowalt.recordings import | predict | pairs | compare | recognise | ablate`.
+"""`python -m lowalt.recordings import | pairs | compare | recognise | ablate | keep`.
 
-`import` and `predict` read one recording of a user. The other commands read the folder of measured sets and compare the
-recordings with the simulated twins of their radars.
+`import` reads one recording of a user. The other commands read the folder of measured sets and compare the recordings
+with the simulated twins of their radars; `keep` puts the networks that `recognise` trained into the zoo.
 """
 
 import argparse
 import os
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import dispatch, run
 from lowalt.config.layers import load_yaml
 from lowalt.files.atomic import replacing
@@ -21,21 +21,16 @@ from lowalt.machine.side_by_side import together
 from lowalt.recordings import compare, samples
 from lowalt.recordings.library import Library
 from lowalt.recordings.pairs import pair_of
-from lowalt.recordings.presence import present
 from lowalt.recordings.recognise import settings
-from lowalt.recordings.record import Record, read_record
-from lowalt.recordings.sets import HALVES, Measured, at_carrier, recordings, usable
+from lowalt.recordings.record import read_record
+from lowalt.recordings.sets import HALVES, Measured, recordings, usable
 from lowalt.targets.records import load_records
 
 FOLDER = "config/measured"
 
 
-TRAINED_RATIO = 1.25
-"""Largest ratio of a recording's carrier and the twin's: speeds in a spectrum scale with it."""
-
-
-def _line(name: str, description: str, *, inputs: bool = False) -> argparse.ArgumentParser:
-    """A parser with the arguments that all commands share, and with those of the measured sets where `inputs`."""
+def _line(name: str, description: str, *, inputs: bool = False, record: bool = True) -> argparse.ArgumentParser:
+    """A parser with the arguments that all commands share, and with those of the measured sets or of one record."""
     options = argparse.ArgumentParser(prog=f"python -m lowalt.recordings {name}", description=description)
     options.add_argument("--twins", type=shipped, default=f"{FOLDER}/twins.yaml", help="radars and scenes")
     options.add_argument(
@@ -47,7 +42,7 @@ def _line(name: str, description: str, *, inputs: bool = False) -> argparse.Argu
         options.add_argument("--sets", type=shipped, default=f"{FOLDER}/sets.yaml")
         options.add_argument("--split", type=shipped, default=f"{FOLDER}/split.yaml")
         options.add_argument("--pairs", type=shipped, default=f"{FOLDER}/pictures.yaml")
-    else:
+    elif record:
         options.add_argument("--record", required=True, type=Path, help="record of the recording (.yaml)")
         options.add_argument("--radar", required=True, help="the twin whose symbol rate the signals get")
     return options
@@ -66,55 +61,12 @@ def _twin(library: Library, name: str):
     return library.twins[name]
 
 
-def _trained(library: Library, name: str, record: Record, path: Path):
-    """The radar of this name at the recording's carrier, whose networks know recordings like it.
-
-    Raises: InputError where the recording's carrier lies outside those that the networks were trained for.
-    """
-    twin = _twin(library, name)
-    ratio = record.carrier_hz / twin.carrier_hz
-    if not 1 / TRAINED_RATIO <= ratio <= TRAINED_RATIO:
-        near = min(library.twins, key=lambda other: abs(np.log(record.carrier_hz / library.twins[other].carrier_hz)))
-        raise InputError(
-            f"{path}: carrier_hz is {record.carrier_hz:.3g}, and those of --radar {name} know {twin.carrier_hz:.3g}, "
-            f"expected --radar {near} ({library.twins[near].carrier_hz:.3g}), or a twin of your own (--twins)"
-        )
-    return at_carrier(twin, record.carrier_hz)
-
-
 def import_(arguments: list[str]) -> None:
     """Turn one recording into signals, spectra, tiles and, with a label, a shard and its index."""
     given = _line("import", import_.__doc__).parse_args(arguments)
     library, record = Library.read(given.twins), read_record(given.record)
     count = samples.write(record, _twin(library, given.radar), settings(given.recognition)["images"], given.out)
     print(f"{given.out}: {count} windows of {record.file.name}")
-
-
-def predict(arguments: list[str]) -> None:
-    """Name the class of every window of one recording by networks of `recognise`, into predictions.csv."""
-    options = _line("predict", predict.__doc__)
-    options.add_argument("--model", required=True, type=Path, nargs="+",
-                         help="networks that were trained on the radar's twin (.pt), whose mean counts")  # fmt: skip
-    given = options.parse_args(arguments)
-    from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered
-    from lowalt.tiles.settings import Images
-
-    library, record, block = Library.read(given.twins), read_record(given.record), settings(given.recognition)
-    twin = _trained(library, given.radar, record, given.record)
-    intervals = samples.signals(record, twin)
-    images, count = rendered(intervals, twin, Images.from_settings(block["images"]), block["size"]), len(intervals)
-    told = facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), "test")
-    models = [load_model(path, given.radar, block) for path in given.model]
-    found = np.mean([guesses(model, Windows(images, told), block) for model in models], axis=0)
-    starts = np.arange(count) * twin.symbols * twin.symbol_interval_s
-    seen = present(intervals, twin)
-    rows = samples.predictions(found, starts, seen)
-    samples.write_table(given.out / "predictions.csv", ("start_s", "target", "class", *CATEGORIES), rows)
-    named = np.bincount(found[seen].argmax(1), minlength=len(CATEGORIES))
-    print(
-        f"{seen.sum()} of {count} windows hold a target: "
-        + ", ".join(f"{category} {share}" for category, share in zip(CATEGORIES, named, strict=True))
-    )
 
 
 def pairs(arguments: list[str]) -> None:
@@ -199,9 +151,32 @@ def ablate(arguments: list[str]) -> None:
     samples.write_table(given.out / "measured-ablation.csv", ABLATION, rows)
 
 
+def keep(arguments: list[str]) -> None:
+    """Keep the first network of every radar in the zoo, in 8 bits, held against the simulated validation windows."""
+    options = _line("keep", keep.__doc__, record=False)
+    options.add_argument("--models", required=True, type=Path, help="folder of the networks of `recognise`")
+    given = options.parse_args(arguments)
+    from lowalt.recognition import zoo
+    from lowalt.recognition.model_file import of_run
+    from lowalt.recordings.recognise import simulated
+
+    library, block = Library.read(given.twins), settings(given.recognition)
+    paths = {name: given.models / f"{name}-{block['seeds'][0]}/model.pt" for name in library.twins}
+    if not any(path.is_file() for path in paths.values()):
+        raise InputError(f"--models {given.models}: none of {sorted(map(str, paths.values()))} is there")
+    for name, path in paths.items():
+        if not path.is_file():
+            continue
+        twin = library.twins[name]
+        told = {"network": samples.block(twin), "spectra": samples.spectra_block(twin), "images": block["images"]}
+        content = replace(of_run(path), input={**told, "radar": asdict(twin)})
+        measured = zoo.kept(content, path, simulated(library, name, block, "validation"), name, given.out)
+        print(f"{name}: {measured['percent']:.2f} % of {measured['samples']} simulated windows right")
+
+
 COMMANDS = {
-    "import": import_, "predict": predict, "pairs": pairs, "compare": compare_, "recognise": recognise,
-    "ablate": ablate,
+    "import": import_, "pairs": pairs, "compare": compare_, "recognise": recognise,
+    "ablate": ablate, "keep": keep,
 }  # fmt: skip
 
 

@@ -5,14 +5,13 @@ its training are those of `lowalt.recognition`. Recordings are never trained or 
 """
 
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.layers import load_yaml, merge
 from lowalt.files.errors import InputError
-from lowalt.recognition.samples import Facts
+from lowalt.recognition.samples import Facts, Samples
 from lowalt.recognition.schemes import SPECTRA, named
 from lowalt.recordings.library import Library
 from lowalt.recordings.twin import Twin
@@ -21,13 +20,14 @@ from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
 
 
-class Windows(NamedTuple):
+class Windows(Samples):
     """Samples in memory, as a trainer reads them: images (n, 3, size, size) uint8, and the facts of each."""
 
-    images: np.ndarray
-    facts: Facts
+    def __init__(self, images: np.ndarray, facts: Facts) -> None:
+        """Keep the images and their facts."""
+        self.images, self.facts, self.size = images, facts, images.shape[-1]
 
-    def inputs(self, numbers: np.ndarray) -> np.ndarray:
+    def views(self, numbers: np.ndarray) -> np.ndarray:
         """Index images (len(numbers), 3, size, size) uint8 of the samples `numbers`."""
         return self.images[numbers]
 
@@ -115,7 +115,10 @@ def train(block: dict, windows: dict[str, Windows], name: str, seed: int, folder
     trainer = Trainer(model, windows, scheme.columns, own, keys, run, folder, machine)
     trainer.fit()
     weights = trainer.best_weights
-    trainer.finish({"twin": name})
+    trainer.finish({
+        "scheme": scheme.record, "protocol": "seen", "network": block["network"], "size": block["size"], "seed": seed,
+        "colour_map": block["images"]["colour_map"], "classes": list(CATEGORIES), "twin": name,
+    })  # fmt: skip
     model.load_state_dict(weights)
     return model.eval()
 

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.config.classes import CATEGORIES
 from lowalt.files.atomic import replacing
 from lowalt.files.csv_tables import write_csv
 from lowalt.motion.table import NUMBERS
@@ -107,14 +106,3 @@ def _cell(value: object) -> object:
     if isinstance(value, float):
         return "" if math.isnan(value) else f"{value:.5g}"
     return value
-
-
-def predictions(probabilities: np.ndarray, starts_s: np.ndarray, seen: np.ndarray) -> list[list]:
-    """Return one row a window: its start (s), whether it holds a target (`presence.present`), class and four
-    probabilities.
-
-    The class of a window without a target means nothing."""
-    return [
-        [float(start), "yes" if target else "no", CATEGORIES[int(row.argmax())], *map(float, row)]
-        for start, target, row in zip(starts_s, seen, probabilities, strict=True)
-    ]

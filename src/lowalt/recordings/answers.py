@@ -1,0 +1,57 @@
+"""What a network of a measured radar's twin says of every window of a recording."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lowalt.files.errors import InputError
+from lowalt.files.shipped import shipped
+from lowalt.recognition.inference import Machine, probabilities
+from lowalt.recognition.runs import Trained
+from lowalt.recordings import samples
+from lowalt.recordings.library import Library
+from lowalt.recordings.presence import present
+from lowalt.recordings.recognise import Windows, facts, rendered
+from lowalt.recordings.record import Record
+from lowalt.recordings.sets import at_carrier
+from lowalt.recordings.twin import Twin
+from lowalt.tiles.settings import Images
+
+TWINS = "config/measured/twins.yaml"
+TRAINED_RATIO = 1.25
+"""Largest ratio of a recording's carrier and the radar's: speeds in a spectrum scale with it."""
+
+
+class Answers(NamedTuple):
+    """Of n windows: their starts (n,) s, whether each holds a target (n,) bool, class probabilities (n, classes)."""
+
+    starts_s: np.ndarray
+    present: np.ndarray
+    probabilities: np.ndarray
+
+
+def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
+    """Return what a network says of every window of a recording.
+
+    settings: how the network's images are made of signals (`zoo.opened`), with the block `radar`; where: the record's
+    path. Raises: InputError where the network knows no recordings, the recording's carrier or channel is not the
+    radar's, or the file cannot be read.
+    """
+    radars = Library.read(shipped(TWINS)).twins
+    if "radar" not in settings:
+        raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(radars)}")
+    known = Twin.from_settings(settings["radar"])
+    ratio = record.carrier_hz / known.carrier_hz
+    if not 1 / TRAINED_RATIO <= ratio <= TRAINED_RATIO:
+        near = min(radars, key=lambda name: abs(np.log(record.carrier_hz / radars[name].carrier_hz)))
+        raise InputError(
+            f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {known.carrier_hz:.3g}, "
+            f"expected the network {near} ({radars[near].carrier_hz:.3g}), or one of a twin of your own"
+        )
+    twin = at_carrier(known, record.carrier_hz)
+    intervals = samples.signals(record, twin)
+    images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)
+    count = len(intervals)
+    windows = Windows(images, facts(np.zeros(count, int), [record.name] * count, np.arange(count), np.zeros(count), ""))
+    found = probabilities(trained.model, windows, np.arange(count), Machine.here("fp32"), 64)
+    return Answers(np.arange(count) * twin.symbols * twin.symbol_interval_s, present(intervals, twin), found)
