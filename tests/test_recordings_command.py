@@ -16,7 +16,7 @@ def test_the_last_radar_begins_first_and_rows_keep_the_library_s_order(tmp_path,
         begun.append((at_a_time, start))
         return [call() for call in calls]
 
-    def radar(name, found, library, block, models, reuse):
+    def radar(name, found, library, block, models, out, reuse):
         begun.append(name)
         return [{"radar": name, "part": part, "seen": found, "reuse": reuse} for part in (1, 2)]
 

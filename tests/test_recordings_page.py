@@ -65,6 +65,15 @@ def test_pictures_and_page_show_what_was_computed(tmp_path):
     measured.main(arguments)
     page = (tmp_path / "page.html").read_text()
     assert "Held against measurement" in page and "2.31" in page and page.count("data:image/png") == 1
+    answered = {"seed": "mean", "set": "birds", "label": "Bird"}
+    write_csv(tmp_path / "measured-recognition.csv", RECOGNITION, [
+        [{**answered, "file": name, "right_percent": right}.get(column, "7") for column in RECOGNITION]
+        for name, right in (("good.csv", "96"), ("bad.csv", "12"))
+    ])  # fmt: skip
+    (tmp_path / "spectra-birds-bad.csv.png").write_bytes((tmp_path / "measured-bird.png").read_bytes())
+    measured.main(arguments)
+    page = (tmp_path / "page.html").read_text()
+    assert page.index("<td>bad.csv") < page.index("<td>good.csv") and "spectra of bad.csv" in page
     first = (tmp_path / "measured-bird.png").read_bytes()
     assert Image.open(tmp_path / "measured-overview.png").width > 200
     measured.main(arguments)
@@ -75,7 +84,8 @@ def test_pictures_and_page_show_what_was_computed(tmp_path):
     measured.main(arguments)
     page = (tmp_path / "page.html").read_text()
     assert "What each randomisation adds" in page and "antenna beam" in page and "-8.7539" in page
-    (tmp_path / "pair-bird.npz").unlink()
+    for name in ("pair-bird.npz", "spectra-birds-bad.csv.png"):
+        (tmp_path / name).unlink()
     (tmp_path / "measured-bird.png").unlink()
     measured.main(arguments)
     assert (

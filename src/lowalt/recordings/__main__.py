@@ -129,7 +129,8 @@ def recognise(arguments: list[str]) -> None:
     names = list(library.twins)
     # The radars do not depend on each other, so neither their order nor the number of processes changes a result. The
     # last radar takes longest, so it starts first.
-    calls = [partial(radar, name, found, library, block, given.models, given.reuse) for name in reversed(names)]
+    shared = found, library, block, given.models, given.out, given.reuse
+    calls = [partial(radar, name, *shared) for name in reversed(names)]
     rows = [row for rows in reversed(together(calls, given.jobs, "spawn")) for row in rows]
     samples.write_table(given.out / "measured-recognition.csv", RECOGNITION, rows)
     samples.write_table(given.out / "measured-accuracy.csv", ACCURACY, accuracy(rows, block["seed"]))

@@ -11,15 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.config.classes import CATEGORIES
+from lowalt.files.atomic import replacing
 from lowalt.numerics.streams import stream
 from lowalt.recordings.library import Library
 from lowalt.recordings.recognise import Windows, facts, guesses, load_model, rendered, simulated, train
 from lowalt.recordings.sets import HALVES, Measured, at_carrier, measured_intervals
+from lowalt.tiles import join
+from lowalt.tiles.png import encode
 from lowalt.tiles.settings import Images
 
 RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
 ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
 REPEATS = 4000
+PIXELS = 3
+"""Side of a network's pixel in a picture."""
 
 
 def windows_of(one: Measured, library: Library, block: dict) -> Windows:
@@ -29,6 +34,15 @@ def windows_of(one: Measured, library: Library, block: dict) -> Windows:
     count, label = len(images), CATEGORIES.index(one.record.label)
     told = facts(np.full(count, label), [one.name] * count, np.arange(count), np.zeros(count), "test")
     return Windows(images, told)
+
+
+def picture(one: Measured, windows: Windows, block: dict, folder: Path) -> None:
+    """Write the three spectra of a recording's middle window, as the network sees them, into `folder` as PNG."""
+    views = windows.images[len(windows.images) // 2]
+    tile = encode(np.kron(join(views, len(views)), np.ones((PIXELS, PIXELS), np.uint8)),
+                  Images.from_settings(block["images"]).palette)  # fmt: skip
+    with replacing(folder / f"spectra-{one.set}-{one.name}.png") as temporary:
+        temporary.write_bytes(tile)
 
 
 def tested(name: str, measured: list[tuple[Measured, Windows]], models: dict, block: dict) -> list[list]:
@@ -49,18 +63,20 @@ def tested(name: str, measured: list[tuple[Measured, Windows]], models: dict, bl
 
 
 def radar(
-    name: str, found: list[Measured], library: Library, block: dict, folder: Path, reuse: bool = False
+    name: str, found: list[Measured], library: Library, block: dict, folder: Path, out: Path, reuse: bool = False
 ) -> list[list]:
     """Train one network a seed on the twin `name` and return the rows of `RECOGNITION` of its recordings.
 
-    folder: where the networks go, one folder a seed; reuse: take the networks that are there and train none. Recordings
-    without any window that holds a target are left out.
+    folder: where the networks go, one folder a seed; out: where a picture of every recording's spectra goes; reuse:
+    take the networks that are there and train none. Recordings without any window that holds a target are left out.
     """
     mine = [one for one in found if one.like in library.sets[name]]
     if not mine:
         return []
     measured = [(one, windows_of(one, library, block)) for one in mine]
     measured = [(one, windows) for one, windows in measured if len(windows.images)]
+    for one, windows in measured:
+        picture(one, windows, block, out)
     if reuse:
         models = {seed: load_model(folder / f"{name}-{seed}/model.pt", name, block) for seed in block["seeds"]}
         return tested(name, measured, models, block)

@@ -19,7 +19,7 @@ DISTANCES = (
     "radar", "label", "figure", "unit", "files", "windows", "floor", "before", "distance", "low", "high", "tuning",
     "test", "learnt", "ceiling", "ceiling_class",
 )  # fmt: skip
-RECOGNITION = ("radar", "seed", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
+RECOGNITION = ("radar", "seed", "set", "half", "file", "label", "windows", *CATEGORIES, "right_percent")
 ACCURACY = ("radar", "half", "class", "files", "windows", "accuracy_percent", "low", "high", "chance_percent")
 
 ABLATION = (
@@ -32,7 +32,9 @@ def held(folder: str | Path) -> dict:
     """Return the section's values from a folder of reference tables and pictures.
 
     classes: one entry a category that was measured, with its pictures (name, address), and its rows of the tables;
-    accuracy: the rows over whole radars; ablation: those of measured-ablation.csv, none where it was not computed.
+    answers: every recording's row by all networks together, the least right first, and the address of the picture of
+    its spectra ("" for none); accuracy: the rows over whole radars; ablation: those of measured-ablation.csv, none
+    where it was not computed.
     Raises: InputError for another table that is missing, or one that lacks a column.
     """
     folder = Path(folder)
@@ -58,7 +60,11 @@ def held(folder: str | Path) -> dict:
                 "accuracy": [row for row in accuracy if row["class"] == label],
             }
         )
-    return {"classes": classes, "accuracy": [row for row in accuracy if row["class"] == "balanced"],
+    mean = sorted((row for row in recognition if row["seed"] == "mean"), key=lambda row: float(row["right_percent"]))
+    spectra = [folder / f"spectra-{row['set']}-{row['file']}.png" for row in mean]
+    addresses = [embedded(path.read_bytes()) if path.is_file() else "" for path in spectra]
+    answers = list(zip(mean, addresses, strict=True))
+    return {"classes": classes, "answers": answers, "accuracy": [row for row in accuracy if row["class"] == "balanced"],
             "ablation": read_csv(without, *ABLATION) if without.is_file() else [],
             "categories": CATEGORIES}  # fmt: skip
 
