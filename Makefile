@@ -150,9 +150,8 @@ reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs, an
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png
 
-# The page of keys is made of the schema, and the picture of a sample by the command that it shows.
+# The picture of a sample is made by the command that its page shows.
 docs: $(DOCS)  ## the site of documents, site/index.html; a warning or a dead link is an error
-	$(BIN)/python -m lowalt.config.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
 	$(BIN)/lowalt sample 'DJI Mini 2' 0 --out site/sample && cp site/sample/*-axes.png docs/pictures/sample.png
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
 

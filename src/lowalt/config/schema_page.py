@@ -1,24 +1,19 @@
 """The page of keys: a Markdown table for each block of the configuration, written from its schema.
 
-python -m lowalt.config.schema_page workflow/schemas/config.schema.yaml docs/reference/configuration.md
+`docs/site_pages.py` makes it as the site is built.
 """
 
-import argparse
 from collections.abc import Iterator
-from pathlib import Path
 
-from lowalt.config.command import run
-from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
-from lowalt.files.yaml_files import load_yaml
 
 HEAD = """\
 # Keys of the configuration
 
-Written from `workflow/schemas/config.schema.yaml` by `make docs`; do not edit it by hand. The values of the
-embedded default stand in [`config/default.yaml`](../../config/default.yaml). An unknown key, a wrong type and a value
-out of its range are refused before any job starts. In an overlay, null takes out what a lower layer has, such as a
-station, a spectrum or an effect, wherever the key may be left out.
+Made from `workflow/schemas/config.schema.yaml`. The values of the embedded default stand in
+[`config/default.yaml`](../../config/default.yaml). An unknown key, a wrong type and a value out of its range are
+refused before any job starts. In an overlay, null takes out what a lower layer has, such as a station, a spectrum or
+an effect, wherever the key may be left out.
 """
 LIMITS = {"minimum": "at least", "exclusiveMinimum": "above", "maximum": "at most", "exclusiveMaximum": "below"}
 
@@ -80,17 +75,3 @@ def page(schema: dict) -> str:
             about = cell(value.get("description", ""))
             blocks += f"\n## {key}\n\n{about[:1].upper()}{about[1:]}.\n\n{title}{table}"
     return f"{HEAD}\n{single}{blocks}"
-
-
-def main(arguments: list[str]) -> None:
-    """Write the page of a schema."""
-    line = argparse.ArgumentParser(prog="python -m lowalt.config.schema_page", description=__doc__)
-    line.add_argument("schema", type=Path, help="the configuration's schema")
-    line.add_argument("page", type=Path, help="Markdown file to write")
-    given = line.parse_args(arguments)
-    with replacing(given.page) as temporary:
-        temporary.write_text(page(load_yaml(given.schema)))
-
-
-if __name__ == "__main__":
-    run(main)
