@@ -140,12 +140,11 @@ check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/r
 		$(BIN)/python -m lowalt.shards.manifest check --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 
 # Of runs that are finished: tables, manifests and pictures. What changed, git shows.
-reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs, and write the tables into the documents
+reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	for run in default real; do for table in $(TABLES); do cp results/$$run/$$table results/reference/$$run-$$table 2>/dev/null || true; done; done
 	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end 2>/dev/null || true; done
 	for run in default tiny; do test ! -e results/$$run/shards || \
 		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
-	$(BIN)/python -m lowalt.report.documents design/recognition.md cost=results/reference/default-
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \
 		--schema workflow/schemas/config.schema.yaml --base config/default.yaml --overlays config/workstation.yaml config/paper.yaml --out results/reference/scale.csv
 	$(BIN)/python -m lowalt.report.figures.cover results/default/shards/index.json design/pictures/tiles.png

@@ -2,8 +2,8 @@
 
     python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
 
-replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes` (accuracy of every scheme
-next to the paper's, and which orderings hold) or `cost` (accuracy and its times).
+replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes`: accuracy of every scheme
+next to the paper's, and which orderings hold.
 """
 
 from pathlib import Path
@@ -52,26 +52,7 @@ def schemes(prefix: str) -> str:
     return text + f"\nMeasured on {rows[0]['hardware']}.\n"
 
 
-def cost(prefix: str) -> str:
-    """Return the table of accuracy and its times from {prefix}accuracy_cost.csv, averages over the SNRs."""
-    names = ("scheme", "kind", "pixels", "seen_percent", "unseen_percent", "difference_points", "low", "high",
-             "inference_ms_1", "inference_ms_64", "train_ms", "core_s_training", "front", "hardware")  # fmt: skip
-    rows = [row for row in read_csv(f"{prefix}accuracy_cost.csv", *names) if row["snr_db"] == "avg"]
-    head = ["row", "seen, %", "unseen, %", "unseen, points (95 %)", "inference, ms (batch 1)", "ms (batch 64)",
-            "training, ms", "training, core-s", "front"]  # fmt: skip
-    text = _head(head)
-    for row in rows:
-        number = lambda name, form, row=row: format(float(row[name]), form) if row[name] else ""  # noqa: E731
-        points = number("difference_points", "+.1f")
-        points += f" ({number('low', '+.1f')} to {number('high', '+.1f')})" if points else ""
-        trained = number("core_s_training", ".0f") + (" (extrapolated)" if row["kind"] == "timed" else "")
-        percent = [number(f"{part}_percent", ".1f") for part in ("seen", "unseen")]
-        times = [number("inference_ms_1", ".1f"), number("inference_ms_64", ".2f"), number("train_ms", ".2f"), trained]
-        text += _line([row["scheme"], *percent, points, *times, row["front"]])
-    return text + f"\nMeasured on {rows[0]['hardware']}.\n"
-
-
-MAKERS = {"schemes": schemes, "cost": cost}
+MAKERS = {"schemes": schemes}
 
 
 def fill(document: str, name: str, table: str) -> str:
