@@ -2,8 +2,8 @@
 
 A file of docs/ has its path below docs/ in the site; every other file keeps its path in the repository. Markdown files
 of the navigation become pages. Any other file that a page links to is added to the site as it is. So the links that
-work in the repository work in the site, and every text stands once. The page of keys is made of the configuration's
-schema as the site is built: links to the schema lead to it.
+work in the repository work in the site, and every text stands once. Pages of keys are made of the schemas as the site
+is built: links to a schema lead to its page.
 """
 
 import posixpath
@@ -14,23 +14,25 @@ from mkdocs.structure.files import File
 
 from lowalt.config import schema_page
 from lowalt.files.yaml_files import load_yaml
+from lowalt.targets import document
 
 ROOT = Path(__file__).parents[1]
 DOCS = "docs/"
-SCHEMA, KEYS = "workflow/schemas/config.schema.yaml", "reference/configuration.md"
-"""The configuration's schema in the repository, and the page of the site that is made of it."""
+CONFIGURATION, RECORDS = "workflow/schemas/config.schema.yaml", "src/lowalt/targets/records.schema.yaml"
+KEYS = {CONFIGURATION: "reference/configuration.md", RECORDS: "reference/records.md"}
+"""Schemas in the repository, and the pages of the site that are made of them."""
 LINK = re.compile(r"\]\(([^)#\s:]+)((?:#[^)\s]*)?)\)")
 """A link or picture to a file, and its anchor; addresses with a scheme have a colon."""
 
 
 def in_repository(uri: str) -> str:
     """Return the path in the repository of a file of the site."""
-    return DOCS + uri if uri == KEYS or (ROOT / DOCS / uri).is_file() else uri
+    return DOCS + uri if uri in KEYS.values() or (ROOT / DOCS / uri).is_file() else uri
 
 
 def in_site(path: str) -> str:
     """Return the path in the site of a file of the repository."""
-    return KEYS if path == SCHEMA else path.removeprefix(DOCS)
+    return KEYS.get(path, path.removeprefix(DOCS))
 
 
 def relinked(text: str, path: str) -> str:
@@ -70,8 +72,10 @@ def pages(nav: list | dict | str) -> list[str]:
 
 def on_files(files, config):
     """Add the navigation's pages that lie outside docs/, and the files to which any page links."""
-    files.append(File.generated(config, KEYS, content=schema_page.page(load_yaml(ROOT / SCHEMA))))
-    named = [in_repository(uri) for uri in pages(config.nav) if uri != KEYS]
+    made = {CONFIGURATION: schema_page.page(load_yaml(ROOT / CONFIGURATION)), RECORDS: document.page()}
+    for schema, text in made.items():
+        files.append(File.generated(config, KEYS[schema], content=text))
+    named = [in_repository(uri) for uri in pages(config.nav) if uri not in KEYS.values()]
     wanted = set(named)
     for name in named:
         wanted |= {path for path in linked((ROOT / name).read_text(), name) if path in named or path[-3:] != ".md"}

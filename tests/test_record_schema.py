@@ -1,4 +1,4 @@
-"""The schema of records: it knows the keys that the code knows, describes each, and design/targets.md shows them."""
+"""The schema of records: it knows the keys that the code knows, describes each, and the page of keys shows them."""
 
 from pathlib import Path
 
@@ -30,9 +30,8 @@ def test_sections_are_the_sources_and_their_keys_those_of_the_code():
     assert all(size in words["size_is"]["description"] for size in uav.SIZES)
 
 
-def test_the_page_holds_the_tables_of_the_schema():
-    page = (ROOT / "design/targets.md").read_text()
-    assert document.rewritten(page) == page, "run: python -m lowalt.targets.document design/targets.md"
+def test_the_page_of_keys_describes_every_key():
+    page = document.page()
     for section in SCHEMA["sources"].values():
         for name, key in section["properties"].items():
             assert f"| `{name}`" in page and key["description"] in page
@@ -48,13 +47,11 @@ def test_pictures_and_files_that_the_page_names_are_there():
         assert (ROOT / name).is_file(), name
 
 
-def test_a_page_without_marks_and_a_key_without_meaning_are_refused(monkeypatch):
-    with pytest.raises(InputError, match="expected the marks"):
-        document.rewritten("no marks")
+def test_a_key_without_meaning_is_refused(monkeypatch):
     bare = {"$defs": SCHEMA["$defs"], "sources": {"gait": {"properties": {"gait": {"type": "string"}}}}}
     monkeypatch.setattr(document, "schema", lambda: bare)
     with pytest.raises(InputError, match="gait has no description"):
-        document.tables()
+        document.page()
 
 
 @pytest.mark.parametrize(
