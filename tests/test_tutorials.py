@@ -23,6 +23,8 @@ FOLDER = ROOT / "docs/tutorials"
 FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.DOTALL | re.MULTILINE)
 NEEDS = {"pytorch": "timm", "hugging_face": "datasets"}
 SHARDS = ("pytorch", "hugging_face")
+LOOP = "torch.Size([2, 9, 64, 64]) ('UAV', 'Bird', 'Vehicle', 'Pedestrian') 8\n"
+"""What `loop.py` of the tutorial on PyTorch prints on the small data set of these tests."""
 SCHEMA = "workflow/schemas/config.schema.yaml"
 
 
@@ -151,9 +153,26 @@ def test_shards_in_other_tools(page, checkout, shards, capsys, monkeypatch):
     printed, names = followed(page, checkout, monkeypatch)
     if page == "pytorch":
         assert re.search(r"loss \d+\.\d+ after 2 steps, \d+\.\d % of 6 validation samples", printed)
+        runpy.run_path("loop.py", run_name="__main__")
+        assert capsys.readouterr().out == LOOP
     else:
         assert {name: len(rows) for name, rows in names["seen"].items()} == {"train": 12, "validation": 6, "test": 6}
         assert names["images"].shape[:2] == (3, 3)
+
+
+# Three processes that import torch.
+@pytest.mark.slow
+def test_the_loop_works_with_spawned_workers(checkout, shards):
+    pytest.importorskip("torch")
+    (checkout / "results/default").mkdir(parents=True)
+    shutil.copytree(shards, checkout / "results/default/shards")
+    (text,) = (text for _, title, text in FENCE.findall((FOLDER / "pytorch.md").read_text()) if title == "loop.py")
+    (checkout / "loop.py").write_text(text)
+    # As elsewhere than on Linux: a worker imports the file again.
+    (checkout / "sitecustomize.py").write_text("import multiprocessing\nmultiprocessing.set_start_method('spawn')\n")
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(checkout), str(ROOT / "src")])}
+    run = subprocess.run([sys.executable, "loop.py"], capture_output=True, text=True, env=environment)
+    assert run.stdout == LOOP, run.stderr
 
 
 def test_a_recording(checkout, monkeypatch):
