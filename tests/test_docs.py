@@ -14,6 +14,7 @@ import yaml
 
 from lowalt.__main__ import main
 from lowalt.config import schema_page
+from lowalt.config.layers import load
 from lowalt.files.errors import InputError
 from lowalt.scene.catalogue import PLACES
 
@@ -127,6 +128,16 @@ def test_every_effect_and_every_equation_stands_on_the_page_of_physics():
             ends = [int(number) for number in part.split("to")]
             numbers |= set(range(ends[0], ends[-1] + 1))
     assert numbers == set(range(1, 42))
+
+
+def test_every_overlay_that_a_document_shows_is_a_configuration_s(tmp_path):
+    text = "".join(page.read_text() for page in PAGES)
+    shown = {overlay for some in re.findall(r"overlay with ((?:`[^`]+`(?:, | and )?)+)", text)
+             for overlay in re.findall(r"`([a-z]+: \{[^`]+)`", some)}  # fmt: skip
+    assert len(shown) > 12
+    for overlay in sorted(shown):
+        (tmp_path / "mine.yaml").write_text(f"run: mine\n{overlay}\n")
+        load([ROOT / "config/default.yaml", tmp_path / "mine.yaml"], ROOT / "workflow/schemas/config.schema.yaml")
 
 
 def test_every_effect_stands_on_the_page_of_scenes():
