@@ -149,9 +149,9 @@ def test_the_page_of_keys_says_type_range_and_meaning_of_inner_keys():
     inner = {"type": ["number", "null"], "minimum": 2, "description": "a | b"}
     block = {"type": "object", "description": "things", "additionalProperties": {"properties": {"far_m": inner}}}
     text = schema_page.page({"properties": {"seed": {"type": "integer", "description": "root"}, "sites": block}})
-    assert "| `seed` | integer |  | root |\n" in text
+    assert "| `seed` | integer | root |\n" in text
     assert "## sites\n\nThings.\n" in text
-    assert "| `NAME.far_m` | number or null | at least 2 | a \\| b |\n" in text
+    assert "| `NAME.far_m` | number or null, at least 2 | a \\| b |\n" in text
     with pytest.raises(InputError, match="properties"):
         schema_page.page({"type": "object"})
 

@@ -33,21 +33,21 @@ def kind(entry: dict) -> str:
     return text
 
 
-def bounds(entry: dict) -> str:
-    """Return the range of a number in words, an empty text if it has none."""
-    return ", ".join(f"{word} {entry[key]:g}" for key, word in LIMITS.items() if key in entry)
+def value(entry: dict) -> str:
+    """Return the type of a key and the range of a number in words, such as `number, at least 0`."""
+    return ", ".join([kind(entry), *(f"{word} {entry[key]:g}" for key, word in LIMITS.items() if key in entry)])
 
 
-def rows(entry: dict, prefix: str = "") -> Iterator[tuple[str, str, str, str]]:
-    """Yield (key, type, range, meaning) of every key below an entry; keys of inner blocks are joined by dots."""
+def rows(entry: dict, prefix: str = "") -> Iterator[tuple[str, str, str]]:
+    """Yield (key, value, meaning) of every key below an entry; keys of inner blocks are joined by dots."""
     further = entry.get("additionalProperties")
     below = dict(entry.get("properties", {}))
     if isinstance(further, dict):
         below["NAME"] = further
-    for key, value in below.items():
+    for key, inner in below.items():
         name = f"{prefix}{key}"
-        yield name, kind(value), bounds(value), value.get("description", "")
-        yield from rows(value, f"{name}.")
+        yield name, value(inner), inner.get("description", "")
+        yield from rows(inner, f"{name}.")
 
 
 def cell(text: str) -> str:
@@ -62,16 +62,16 @@ def page(schema: dict) -> str:
     """
     if not schema.get("properties"):
         raise InputError("the schema has no key `properties`")
-    title = "| key | type | range | meaning |\n|---|---|---|---|\n"
+    title = "| key | value | meaning |\n|---|---|---|\n"
     single, blocks = title, ""
-    for key, value in schema["properties"].items():
-        lines = list(rows(value))
+    for key, entry in schema["properties"].items():
+        lines = list(rows(entry))
         if not lines:
-            lines = [(key, kind(value), bounds(value), value.get("description", ""))]
+            lines = [(key, value(entry), entry.get("description", ""))]
         table = "".join(f"| `{name}` | {' | '.join(map(cell, rest))} |\n" for name, *rest in lines)
         if lines[0][0] == key:
             single += table
         else:
-            about = cell(value.get("description", ""))
+            about = cell(entry.get("description", ""))
             blocks += f"\n## {key}\n\n{about[:1].upper()}{about[1:]}.\n\n{title}{table}"
     return f"{HEAD}\n{single}{blocks}"
