@@ -7,6 +7,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -83,6 +84,38 @@ def test_every_module_and_its_options_exist(page, command):
     known = "\n".join(file.read_text() for file in rooms)
     missing = [word for word in words if word.startswith("--") and word != "--help" and f'"{word}"' not in known]
     assert not missing, f"{page}: {command}"
+
+
+def test_snakemake_understands_every_command_and_has_its_rules():
+    from snakemake.cli import get_argument_parser
+
+    read, wanted = get_argument_parser(), set()
+    for words in (shlex.split(command)[1:] for _, command in NAMED if command.startswith(".venv/bin/snakemake")):
+        asked = read.parse_args(words)
+        wanted |= {name for name in [*asked.targets, *(asked.forcerun or ())] if "/" not in name}
+    rules = "".join(path.read_text() for path in [ROOT / "Snakefile", *(ROOT / "workflow/rules").glob("*.smk")])
+    assert len(wanted) >= 4 and not wanted - set(re.findall(r"^ *rule (\w+):", rules, re.MULTILINE))
+
+
+@pytest.mark.parametrize(
+    "page, command", [pair for pair in NAMED if re.match(r"\.venv/bin/python (?!-m lowalt)", pair[1])]
+)
+def test_every_program_and_its_options_exist(page, command):
+    words = shlex.split(command)[1:]
+    files = [ROOT / word for word in words if re.fullmatch(r"[\w./-]+\.py", word)]
+    made = re.findall(r'title="([^"]+)"', (ROOT / page).read_text())
+    assert files and all(file.is_file() or file.name in made for file in files)
+    if words[0] != "-m":
+        known = files[0].read_text() if files[0].is_file() else ""
+        assert not [word for word in words if word.startswith("--") and f'"{word}"' not in known]
+
+
+def test_every_extra_that_a_command_installs_exists():
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    named = [
+        name for _, command in NAMED for some in re.findall(r"-e '\.\[(.+)\]'", command) for name in some.split(",")
+    ]
+    assert len(named) > 3 and not set(named) - set(extras)
 
 
 def test_every_target_of_make_exists():
