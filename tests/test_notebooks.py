@@ -101,7 +101,7 @@ def test_the_notebook_of_an_effect_runs_once_its_entry_is_in_the_schema(made, ch
     (checkout / "workflow").unlink()
     shutil.copytree(ROOT / "workflow", checkout / "workflow")
     (checkout / "src").unlink()
-    linked_tree(checkout / "src", "lowalt/effects/receiver")
+    linked_tree(checkout / "src", "lowalt/scene/effects/receiver")
     entry = next(code for _, title, code in FENCE.findall((FOLDER / "effect.md").read_text()) if title == "entry")
     schema = checkout / "workflow/schemas/config.schema.yaml"
     schema.write_text(schema.read_text().replace("      squint:", f"{entry}      squint:", 1))
