@@ -140,13 +140,17 @@ def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing
 def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     inputs = folder(tmp_path)
-    (inputs / "craft/craft.urdf").write_text(urdf().replace("continuous", "fixed"))
-    command = ["target", "new", str(inputs / "craft/craft.urdf"), "--inputs", str(inputs), "--out", "a.yaml"]
-    assert main(command) == 2
-    assert f"error: {inputs / 'craft/craft.urdf'}: 4 rotors found, expected their number" in capsys.readouterr().err
-    assert main([*command, "--rotors", "4"]) == 0
-    parts = yaml.safe_load((inputs / "a.yaml").read_text())["craft"]["parts"]
-    assert len(parts) == 5 and (inputs / "a.glb").exists()
+    path = inputs / "craft/craft.urdf"
+    path.write_text(urdf().replace("continuous", "fixed"))
+    command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
+    assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
+    path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
+    assert main([*command, "a.yaml"]) == 2
+    assert f"error: {path}: 4 rotors found, expected --rotors 4 where that is all" in capsys.readouterr().err
+    assert main([*command, "a.yaml", "--rotors", "4"]) == 0
+    for name in ("named", "a"):
+        parts = yaml.safe_load((inputs / f"{name}.yaml").read_text())["craft"]["parts"]
+        assert len(parts) == 5 and (inputs / f"{name}.glb").exists()
 
 
 @pytest.mark.parametrize(

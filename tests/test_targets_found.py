@@ -133,7 +133,9 @@ def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(t
     assert "0 rotors found, expected 6" in error and "craft-pieces.png" in error and "--moving 3 5+6" in error
     assert Image.open(tmp_path / "craft-pieces.png").size[0] > 1000
     assert not path.with_suffix(".yaml").exists()
-    assert draft(path, "--category", "UAV")[0] == 2 and "--rotors N" in capsys.readouterr().err
+    assert (
+        draft(path, "--category", "UAV")[0] == 2 and "expected --rotors 4 where" in capsys.readouterr().err
+    )
     parts = inspect_mesh(path, "UAV", "m").components
     numbers = [str(n) for n, part in enumerate(parts, 1) if part.piece.startswith("part")]
     assert draft(path, "--category", "UAV", "--unit", "m", "--moving", *numbers)[0] == 0

@@ -148,6 +148,9 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
         joints, triangles = parts_of(robot, MOVING_KIND[category])
     except InputError as error:
         raise InputError(f"{given.file}: {error}") from None
+    if not joints:
+        # The names of links tell rotors that no joint turns.
+        triangles = {link: np.concatenate(found) for link, found in robot.surfaces.items() if found}
     with TemporaryDirectory() as folder:
         path = Path(folder) / file
         write_parts(path, triangles)
@@ -158,7 +161,7 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
                                  "for a row of its own, or choose a target with as many")  # fmt: skip
             names = (name, given.file.name, file)
             return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
-        # No joint turns, as where a drone is one mesh: its pieces are looked at.
+        # As where a drone is one mesh: its pieces are looked at.
         given.up, given.front, given.unit = given.up or "z", given.front or "x", "m"
         return _draft(given, path, file, name, row, category, table), path.read_bytes()
 

@@ -121,10 +121,11 @@ def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int
     named = bool(groups) and all(TURNING["rotor"].search(part.piece) for group in groups for part in group)
     if found.category != "UAV" or (len(groups) == count if count else named):
         return
-    wanted = f"{count}" if count else "their number, --rotors N,"
+    unknown = f"expected --rotors {len(groups)} where that is all" if groups else "expected at least one"
+    wanted = f"expected {count}" if count else unknown
     raise InputError(
-        f"{found.path}: {len(groups)} rotors found, expected {wanted} or their pieces, numbered in {picture}: --moving "
-        "and each rotor's, joined by + where it has several, such as --moving 3 5+6 7 9"
+        f"{found.path}: {len(groups)} rotors found, {wanted}; otherwise name each rotor's pieces as numbered in "
+        f"{picture}, such as --moving 3 5+6 7 9. A rotor that has no number is joined to the body: separate it first"
     )
 
 

@@ -200,11 +200,13 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     for frame in range(first, first + count):
         lacking = [name for name in needed if name not in frames.get(frame, {})]
         if lacking:
-            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (truncated file? trim it)")
+            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)")
     motion = {name: np.array([frames[frame][name] for frame in range(first, first + count)]) for name in needed}
     empty = np.flatnonzero(~motion["root"].any(axis=1))
     if len(empty):
-        raise InputError(f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (trim it)")
+        raise InputError(
+            f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
+        )
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
