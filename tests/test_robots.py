@@ -57,7 +57,8 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
 
 def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "base").mkdir()
-    (tmp_path / "base/base.sdf").write_text(SDF)
+    undeclared = '<surface><fdir1 gz:expressed_in="hull">1 1 0</fdir1></surface></model>'
+    (tmp_path / "base/base.sdf").write_text(SDF.replace("</model>", undeclared))
     (tmp_path / "base/model.config").write_text("<model><sdf version='1.9'>base.sdf</sdf></model>")
     top = """<sdf version="1.9"><model name="top"><include merge="true"><uri>model://base</uri></include>
     <link name="lift"><pose relative_to="pusher">0 0 0 0 0 0</pose><visual name="v"><geometry><sphere>

@@ -140,6 +140,9 @@ def inspect_mesh(
     elif category == "Vehicle":
         groups = wheels(parts, high - low)
     right = mirror_axis(points) if category == "Bird" and None in axes else None
+    if category == "Vehicle" and groups:
+        # Wheels are thinnest along their axes.
+        right = int(np.argmin(np.mean([np.subtract(*box_of(group)[::-1]) for group in groups], axis=0)))
     up = ups[0] if up is None and category == "UAV" else up
     guessed = guessed_axes(high - low, category, up, None if right in (up, front) else right)
     seen = category != "Bird" or None not in axes or right is not None
