@@ -99,7 +99,7 @@ def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
 
 
 def _unit_of(path: Path, size: float, size_m: float | None, category: str, row: dict) -> tuple[str | float, str]:
-    """The unit of a file whose largest extent is `size`, and where it is from; size_m: that extent where it is known."""
+    """The unit of a file whose largest extent is `size`, and where it is from; size_m: the same in metres."""
     stated = stated_unit_m(path)
     if size_m is not None:
         return float(f"{size_m / size:.6g}"), "given by the size"
