@@ -11,7 +11,6 @@ from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
 from lowalt.targets.input_files import check_file_name
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.record_schema import check
 
 SIZES = ("motor diagonal", "length", "width", "height", "largest extent")
 ALL_AXES = "length, width and height"
@@ -104,7 +103,6 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     category = like(merged)
     if category not in MOVING_SHARE:
         raise InputError(f"{where}: source is 'mesh' for a {category}, expected mocap or gait")
-    check("mesh", extra, where)
     if merged["up"][-1] == merged["front"][-1]:
         raise InputError(f"{where}: up {merged['up']} and front {merged['front']}, expected two different axes")
     bodies = [name for name, part in merged["parts"].items() if part["kind"] == "body"]
