@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
-from lowalt.targets import mesh
+from lowalt.targets.input_files import record_files
 from lowalt.targets.records import read_records
 from meshes import TABLE, made, plain
 from real_inputs import FOLDER, needs_inputs
@@ -70,7 +70,7 @@ def test_every_real_mesh_is_used_and_alone_becomes_a_valid_cloud():
 
 
 def merged_files(record: dict) -> list[str]:
-    return mesh.record_files(record) if record["source"] == "mesh" else []
+    return record_files(record)
 
 
 @needs_inputs

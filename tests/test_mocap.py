@@ -76,7 +76,7 @@ def rodrigues(vector: np.ndarray) -> np.ndarray:
 def test_forward_kinematics_agrees_with_an_independent_conversion():
     folder = FOLDER / "cmu" / "131"
     skeleton = read_skeleton(folder / "131.asf")
-    channels = read_motion(folder / "131_01.amc", skeleton)
+    channels = read_motion(folder / "131_01.amc", skeleton)[0]
     _, joints = bvh_joints(folder / "131_01.bvh")
     unit = 0.0254 / 0.45
     same = {

@@ -16,11 +16,11 @@ from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
-from lowalt.targets.draft import axis_vector, chosen, drafted, refuse_miscount, row_lines
+from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
 from lowalt.targets.guesses import box_of
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.mesh_record import MOVING_KIND
+from lowalt.targets.mesh_record import MOVING_KIND, body_axes
 from lowalt.targets.records import load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
 from lowalt.targets.robots import drafted_robot, parts_of, turning, write_parts
@@ -186,8 +186,7 @@ def _draft(
         with replacing(picture) as temporary:
             temporary.write_bytes(inspection_picture(found, numbered=True))
         raise
-    front, up = axis_vector(found.front), axis_vector(found.up)
-    frame = np.stack([np.cross(front, up), front, up])
+    frame = body_axes(found.front, found.up)
     extent = np.abs(frame @ (found.high - found.low))
     hubs = np.array([frame[:2] @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
     wheel = max((float(np.subtract(*box_of(group)[::-1]).max()) for group in groups), default=None)

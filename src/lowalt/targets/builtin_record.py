@@ -59,8 +59,3 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     if fault := MODULES[category].fault(result):
         raise InputError(f"{where}: {fault}")
     return result
-
-
-def record_files(record: dict) -> list[str]:
-    """Return the user's files a built-in record needs: none."""
-    return []

@@ -176,11 +176,6 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     return result | {"points": len(names)}
 
 
-def record_files(record: dict) -> list[str]:
-    """Return the user's files a gait record needs: none."""
-    return []
-
-
 def gait_cloud(record: dict, seed: int) -> Cloud:
     """Return the cloud of a built-in pedestrian, cyclist or dog: one cycle of its nodes.
 

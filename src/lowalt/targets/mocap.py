@@ -16,9 +16,9 @@ from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
-from lowalt.targets.input_files import check_file_name
+from lowalt.targets.input_files import check_file_name, record_files
 from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
-from lowalt.targets.mocap_files import first_frame, read_motion, read_skeleton
+from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
 from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
@@ -61,11 +61,6 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     return result
 
 
-def record_files(record: dict) -> list[str]:
-    """Return the user's files that a recording's record names, relative to the folder of inputs."""
-    return [record[key] for key in ("skeleton", "motion") if key in record]
-
-
 def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
     """Return the motion of a record's files, and the number of its first frame.
 
@@ -75,8 +70,8 @@ def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
     kind = path.suffix.lower()
     if kind == ".amc":
         skeleton = read_skeleton(paths[0])
-        channels = read_motion(path, skeleton, first, last)
-        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), max(first, first_frame(path))
+        channels, first = read_motion(path, skeleton, first, last)
+        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), first
     if kind not in (".bvh", ".npz"):
         raise InputError(f"{path}: format {kind!r}, expected .amc with its skeleton, .bvh or .npz")
     joints, rate = read_bvh(path) if kind == ".bvh" else read_joints(path)

@@ -16,6 +16,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
+from lowalt.targets.input_files import record_files
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = record_schema.keys(record_schema.COMMON)
@@ -190,7 +191,7 @@ def _check_like(merged: dict, where: str) -> None:
 
 
 def _source(name: str) -> ModuleType:
-    """The module of a source; each has `check_record(merged, extra, where)` and `record_files(record)`."""
+    """The module of a source; each has `check_record(merged, extra, where)` and `SOURCE_cloud`."""
     return import_module(f"lowalt.targets.{name}")
 
 
@@ -199,7 +200,7 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
 
     Raises: InputError where the record names files and there is no folder.
     """
-    names = _source(record["source"]).record_files(record)
+    names = record_files(record)
     if names and inputs is None:
         raise InputError(f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs")
     return [str(Path(inputs) / name) for name in names]
@@ -210,7 +211,7 @@ def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[
     a user gets it."""
     lines = []
     for name, record in records.items():
-        for file in _source(record["source"]).record_files(record):
+        for file in record_files(record):
             if inputs is None or not (Path(inputs) / file).is_file():
                 get = f"; get it from {record['where']}" if "where" in record else ""
                 lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}")
