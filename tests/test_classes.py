@@ -107,7 +107,7 @@ def test_a_class_of_its_own_needs_to_know_what_it_is_like():
     row = load_table(TABLE)["DJI Mini 2"] | {"category": "Other"}
     with pytest.raises(InputError, match="here: category is 'Other', expected a key `like`"):
         merge(row, {"source": "builtin"}, "here")
-    with pytest.raises(InputError, match="here: like is 'Plane'"):
+    with pytest.raises(InputError, match="here: like: value 'Plane'"):
         merge(row, {"source": "builtin", "like": "Plane"}, "here")
     with pytest.raises(InputError, match=r"no \['speed_lo', 'speed_hi'\], expected m/s for a target like a Vehicle"):
         merge(row, {"source": "builtin", "like": "Vehicle"}, "here")

@@ -26,8 +26,8 @@ noise.__main__: --settings, --motion, --echoes, --out
 recordings.__main__ ablate: --out, --inputs, --models
 recordings.__main__ compare: --out, --inputs
 recordings.__main__ import: --out, --record, --radar
+recordings.__main__ keep: --out, --models
 recordings.__main__ pairs: --out, --inputs
-recordings.__main__ predict: --out, --record, --radar, --model
 recordings.__main__ recognise: --out, --inputs, --models
 recordings.download: --out
 report.__main__: --settings, --manifest, --stages, --figures, --out

@@ -1,7 +1,6 @@
 """Users' meshes: places, axes, units and formats, parts that turn, and which components a region takes."""
 
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,14 +12,6 @@ from lowalt.files.errors import InputWarning
 from lowalt.targets import cloud as clouds
 from lowalt.targets.mesh_files import SUFFIXES, read_mesh
 from meshes import TABLE, box, car_record, made, plain, quad_record
-
-ROOT = Path(__file__).parents[1]
-
-
-# --- the real ones ---
-
-
-# --- laws ---
 
 
 def test_places_senses_and_sizes_are_those_of_the_record(quad):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lowalt.files.errors import InputError
-from lowalt.targets import mesh
+from lowalt.targets.input_files import record_files
 from lowalt.targets.records import read_records
 from meshes import TABLE, made, plain
 from real_inputs import FOLDER, needs_inputs
@@ -60,17 +60,13 @@ def test_real_records_give_clouds_of_the_published_size(subtype):
 def test_every_real_mesh_is_used_and_alone_becomes_a_valid_cloud():
     files = sorted((FOLDER / "meshes").rglob("*.*"))
     assert len(files) >= 18
-    used = {file for record in REAL.values() for file in merged_files(record)}
+    used = {file for record in REAL.values() for file in record_files(record)}
     for path in files:
         name = str(path.relative_to(FOLDER))
         assert name in used
         cloud = made("DJI Mini 2", FOLDER, **plain(name, unit=UNITS.get(path.name, "m")))
         assert len(cloud.points) == 171
         assert np.ptp(cloud.points, axis=0).max() < 5.0
-
-
-def merged_files(record: dict) -> list[str]:
-    return mesh.record_files(record) if record["source"] == "mesh" else []
 
 
 @needs_inputs

@@ -138,6 +138,12 @@ def test_a_collada_file_states_its_unit_outside_comments_and_has_no_entities_or_
     path.write_text(dae(*prism(), more='<!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/passwd">]>'))
     with pytest.raises(InputError, match=r"a\.dae: not a readable XML file .*document type"):
         pieces(path)
+    nameless = (
+        dae(*prism()).replace("<instance_geometry", "<node><instance_geometry").replace("</node>", "</node></node>")
+    )
+    path.write_text(nameless.replace('id="n"', 'id="n" name="hull"'))
+    (piece,) = pieces(path)
+    assert {"n", "hull"} <= set(piece.names)  # those of the nearest node above that has a name
     path.write_text(dae(*prism()).replace("instance_geometry", "instance_controller"))
     with pytest.raises(InputError, match=r"a\.dae: has a skin or morph .*apply it"):
         pieces(path)

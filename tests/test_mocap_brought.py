@@ -28,15 +28,15 @@ def numbered(text: str, first: int) -> str:
 
 
 def test_a_cut_clip_with_a_byte_order_mark_and_comments_is_the_same_clip(files):
-    plain = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))
+    plain = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))[0]
     text = numbered(walk(260), 40).replace("ltibia", "# a note\nltibia").replace(":DEGREES", ":DEGREES # of angle")
     (files / "m.amc").write_text("\ufeff" + text.replace("5 0\n", "5 0 # tired\n"))
     (files / "s.asf").write_text("\ufeff" + (files / "s.asf").read_text())
-    found = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))
+    found = read_motion(files / "m.amc", read_skeleton(files / "s.asf"))[0]
     for name, values in plain.items():
         np.testing.assert_array_equal(found[name], values)
     assert cloud_of(files).record["frames_used"][0] >= 40
-    later = read_motion(files / "m.amc", read_skeleton(files / "s.asf"), 50, 59)
+    later = read_motion(files / "m.amc", read_skeleton(files / "s.asf"), 50, 59)[0]
     np.testing.assert_array_equal(later["root"], plain["root"][10:20])
 
 
@@ -89,7 +89,7 @@ def test_legs_of_a_bvh_are_those_of_the_amc_it_was_made_of():
     joints, rate = read_bvh(folder / "131_01.bvh")
     nodes = to_nodes(joints, "131_01.bvh") * UNIT_M
     skeleton = read_skeleton(folder / "131.asf")
-    track = nodes_m(posed(skeleton, read_motion(folder / "131_01.amc", skeleton), 120))
+    track = nodes_m(posed(skeleton, read_motion(folder / "131_01.amc", skeleton)[0], 120))
     assert rate == pytest.approx(120, rel=1e-5)
     for name in ("root", "lhipjoint", "lfemur", "rtibia", "lfoot", "rtoes"):
         node = NODES.index(name)
@@ -122,7 +122,7 @@ SAME = {"pelvis": "root", "neck": "thorax", "head": "upperneck"} | {
 @pytest.mark.parametrize("order", [[0, 1, 2], [1, 2, 0]])
 def test_joint_positions_of_a_walk_make_the_walk(order, files, tmp_path):
     skeleton = read_skeleton(files / "s.asf")
-    track = nodes_m(posed(skeleton, read_motion(files / "m.amc", skeleton), 120))
+    track = nodes_m(posed(skeleton, read_motion(files / "m.amc", skeleton)[0], 120))
     np.savez(tmp_path / "walk.npz", joints=joints_of(track, SAME)[..., order], mocap_framerate=120.0)
     extra = {"motion": "walk.npz", "scale": "none", "rate_hz": 120}
     record = {"subtype": "A", "category": "Pedestrian", "published": PUBLISHED, "source": "mocap", "points": 30,

@@ -2,7 +2,7 @@
 
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -181,6 +181,19 @@ def test_the_shipped_entries_answer_by_name_and_say_on_their_cards_how_well(name
     assert list(found) == ["UAV", "Bird", "Vehicle", "Pedestrian"] and sum(found.values()) == pytest.approx(1)
     model, made = zoo.opened(name)
     assert found == one_sample.predict(model, tmp_path / "a.npy", made)
+
+
+@pytest.mark.parametrize("name", ["uav_3ghz", "bird_drone_10ghz", "cw_24ghz"])
+def test_the_shipped_entries_of_radars_are_those_of_the_twins_there_are(name, monkeypatch):
+    from lowalt.recordings.library import Library
+
+    monkeypatch.chdir(ROOT)
+    path = zoo.ZOO / f"{name}.safetensors"
+    assert path.stat().st_size < zoo.LARGEST_BYTES and model_file.read(path).measured["percent"] > 80
+    radar = zoo.opened(name)[1]["radar"]
+    assert radar == asdict(Library.read("config/measured/twins.yaml").twins[name])
+    card = path.with_suffix(".md").read_text()
+    assert f"a radar of {radar['carrier_hz'] / 1e9:g} GHz" in card and f"lowalt predict {name} recording.yaml" in card
 
 
 def test_signals_become_images_as_the_model_file_says_unless_overlays_are_given(tmp_path, monkeypatch, capsys):

@@ -62,11 +62,28 @@ def network(tmp_path_factory):
     block |= {"size": 24, "echoes": {"train": 2, "validation": 1}, "receivers": 1, "seeds": [0]}
     block["training"] |= {"steps": 2, "batch": 4, "validate_every": 1}
     (folder / "recognition.yaml").write_text(yaml.safe_dump(block))
-    shared = ["--recognition", str(folder / "recognition.yaml"), "--models", str(folder / "models"), "--out"]
+    twins = load_yaml("config/measured/twins.yaml")
+    del twins["twins"]["uav_3ghz"]
+    for block in (twins, *twins["twins"].values()):
+        for scene in (scene for scenes in block["scenes"].values() for scene in scenes):
+            scene["subtypes"] = scene["subtypes"][:1]
+    (folder / "twins.yaml").write_text(yaml.safe_dump(twins))
+    shared = [
+        "--twins",
+        str(folder / "twins.yaml"),
+        "--recognition",
+        str(folder / "recognition.yaml"),
+        "--models",
+        str(folder / "models"),
+        "--out",
+    ]
     main(["recognise", "--inputs", str(folder / "inputs"), *shared, str(folder), "--jobs", "1"])
     assert [row["file"] for row in read_csv(folder / "measured-recognition.csv")] == ["drive.wav"] * 2
     main(["keep", *shared, str(folder / "zoo")])
-    assert [path.name for path in sorted((folder / "zoo").iterdir())] == ["cw_24ghz.md", "cw_24ghz.safetensors"]
+    # The radar without a recording gets a network of its own.
+    assert {path.name for path in (folder / "zoo").iterdir()} == {
+        f"{name}.{kind}" for name in ("bird_drone_10ghz", "cw_24ghz") for kind in ("md", "safetensors")
+    }
     return folder / "zoo/cw_24ghz.safetensors"
 
 
@@ -84,12 +101,14 @@ def test_a_prediction_names_every_window_and_says_which_hold_a_target(network, t
 
 
 @pytest.mark.parametrize("model, file, changes, words", [
-    ("", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected the network uav_3ghz"),
+    ("", "drive.yaml", {"carrier_hz": 3.4e9}, "carrier_hz is 3.4e+09, .*expected a network of .*uav_3ghz"),
+    ("", "drive.yaml", {"carrier_hz": 5.8e9}, "carrier_hz is 5.8e+09, .*the zoo has none"),
+    ("uav_3ghz", "drive.yaml", {"carrier_hz": 3.4e9, "channel": "real"}, "expected in-phase and quadrature"),
     ("", "signals.npy", {}, "knows recordings, expected the record of one"),
     ("default-seen", "drive.yaml", {}, "knows no recordings, expected a network of a radar"),
 ])  # fmt: skip
 def test_what_a_network_does_not_know_is_refused(network, tmp_path, capsys, model, file, changes, words):
-    drive(tmp_path, 22050, True, **changes)
+    drive(tmp_path, 22050, changes.get("channel") != "real", **changes)
     np.save(tmp_path / "signals.npy", np.ones((1, 1200), np.complex64))
     assert lowalt(["predict", model or str(network), str(tmp_path / file)]) == 2
     assert re.search(words.replace("+", r"\+"), capsys.readouterr().err)

@@ -57,7 +57,8 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
 
 def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "base").mkdir()
-    (tmp_path / "base/base.sdf").write_text(SDF)
+    undeclared = '<surface><fdir1 gz:expressed_in="hull">1 1 0</fdir1></surface></model>'
+    (tmp_path / "base/base.sdf").write_text(SDF.replace("</model>", undeclared))
     (tmp_path / "base/model.config").write_text("<model><sdf version='1.9'>base.sdf</sdf></model>")
     top = """<sdf version="1.9"><model name="top"><include merge="true"><uri>model://base</uri></include>
     <link name="lift"><pose relative_to="pusher">0 0 0 0 0 0</pose><visual name="v"><geometry><sphere>
@@ -140,13 +141,17 @@ def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing
 def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     inputs = folder(tmp_path)
-    (inputs / "craft/craft.urdf").write_text(urdf().replace("continuous", "fixed"))
-    command = ["target", "new", str(inputs / "craft/craft.urdf"), "--inputs", str(inputs), "--out", "a.yaml"]
-    assert main(command) == 2
-    assert f"error: {inputs / 'craft/craft.urdf'}: 4 rotors found, expected their number" in capsys.readouterr().err
-    assert main([*command, "--rotors", "4"]) == 0
-    parts = yaml.safe_load((inputs / "a.yaml").read_text())["craft"]["parts"]
-    assert len(parts) == 5 and (inputs / "a.glb").exists()
+    path = inputs / "craft/craft.urdf"
+    path.write_text(urdf().replace("continuous", "fixed"))
+    command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
+    assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
+    path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
+    assert main([*command, "a.yaml"]) == 2
+    assert f"error: {path}: 4 rotors found, expected --rotors 4 where that is all" in capsys.readouterr().err
+    assert main([*command, "a.yaml", "--rotors", "4"]) == 0
+    for name in ("named", "a"):
+        parts = yaml.safe_load((inputs / f"{name}.yaml").read_text())["craft"]["parts"]
+        assert len(parts) == 5 and (inputs / f"{name}.glb").exists()
 
 
 @pytest.mark.parametrize(

@@ -106,6 +106,10 @@ def test_arms_are_no_rotors_where_propellers_are_missing(tmp_path, capsys, monke
     shapes = {name: shape for name, shape in hull().items() if "plate" not in name}
     assert draft(saved(tmp_path / "craft.obj", shapes), "--subtype", "DJI Mavic 3 Pro")[0] == 2
     assert "0 rotors found, expected 4" in capsys.readouterr().err
+    # Two alike pieces may be two blades of one rotor.
+    two = {"hull": box((0.4, 0.1, 0.1)), "a": disc((0.3, 0, 0.1)), "b": disc((-0.3, 0, 0.1))}
+    assert draft(saved(tmp_path / "two.obj", two), "--category", "UAV")[0] == 2
+    assert "0 rotors found, expected at least one" in capsys.readouterr().err
 
 
 def test_names_tell_rotors_of_any_size_and_axis_and_skids_are_none(tmp_path):
@@ -124,6 +128,17 @@ def test_names_tell_rotors_of_any_size_and_axis_and_skids_are_none(tmp_path):
     assert np.abs(found.axes[1:, 2]).round(2).tolist().count(1.0) == 1  # the tail rotor's axis points sideways
 
 
+def test_wheels_tell_the_front_of_a_vehicle_that_is_wider_than_long(tmp_path):
+    wheel = trimesh.creation.cylinder(0.2, 0.1)
+    wheel.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+    shapes = {"hull": box((2.4, 1.2, 0.3), (0, 0, 0.4))}
+    for index, (x, y) in enumerate([(0.8, 0.5), (0.8, -0.5), (-0.8, 0.5), (-0.8, -0.5)]):
+        shapes[f"wheel{index}"] = wheel.copy().apply_translation((x, y, 0))
+    path = saved(tmp_path / "rover.obj", shapes)
+    assert draft(path, "--category", "Vehicle", "--unit", "m", "--up", "z")[0] == 0
+    assert np.abs(cloud(path.with_suffix(".yaml")).axes[1:, 0]) == pytest.approx(1)
+
+
 def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shapes = hull() | {f"part{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
@@ -133,7 +148,7 @@ def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(t
     assert "0 rotors found, expected 6" in error and "craft-pieces.png" in error and "--moving 3 5+6" in error
     assert Image.open(tmp_path / "craft-pieces.png").size[0] > 1000
     assert not path.with_suffix(".yaml").exists()
-    assert draft(path, "--category", "UAV")[0] == 2 and "--rotors N" in capsys.readouterr().err
+    assert draft(path, "--category", "UAV")[0] == 2 and "expected --rotors 4 where" in capsys.readouterr().err
     parts = inspect_mesh(path, "UAV", "m").components
     numbers = [str(n) for n, part in enumerate(parts, 1) if part.piece.startswith("part")]
     assert draft(path, "--category", "UAV", "--unit", "m", "--moving", *numbers)[0] == 0

@@ -19,14 +19,9 @@ from lowalt.targets.make import make
 from lowalt.targets.mesh_files import read_mesh
 from lowalt.targets.mesh_scene import selected
 from lowalt.targets.records import load_table, merge, read_records
+from meshes import box
 
 ROOT = Path(__file__).parents[1]
-
-
-def box(size, at=(0, 0, 0)) -> trimesh.Trimesh:
-    shape = trimesh.creation.box(size)
-    shape.apply_translation(at)
-    return shape
 
 
 HUBS = [(0.12, 0.1), (0.12, -0.1), (-0.12, 0.1), (-0.12, -0.1)]

@@ -176,6 +176,9 @@ def test_the_loop_works_with_spawned_workers(checkout, shards):
 
 
 def test_a_recording(checkout, monkeypatch):
-    _, names = followed("recording", checkout, monkeypatch)
+    (checkout / "results").mkdir()
+    (checkout / "results/zoo").symlink_to(ROOT / "results/zoo")
+    printed, names = followed("recording", checkout, monkeypatch)
     assert names["signals"].ndim >= 2
     assert len(list((checkout / "mine/tiles").glob("*.png"))) > 2
+    assert "5 of 5 windows hold a target: UAV 0, Bird 0, Vehicle 0, Pedestrian 5" in printed

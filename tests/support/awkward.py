@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from meshes import box
+
 HUBS = {"front left": (0.12, 0.1), "front right": (0.12, -0.1), "rear left": (-0.12, 0.1), "rear right": (-0.12, -0.1)}
 """Motors of the craft in its own axes: x to the front, y to the left."""
 SIZE_M = float(np.hypot(0.24, 0.2))
@@ -15,13 +17,6 @@ ROW = {"category": "UAV", "size_m": SIZE_M, "n_rotors_or_wings": 4, "freq_lo_hz"
        "vx_abs_max": 9, "vy_abs_max": 9, "vz_abs_max": 3, "points_in_published_cloud_approx": 120}  # fmt: skip
 METRES = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254, "ft": 0.3048}
 AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
-
-
-def box(size, at=(0, 0, 0)):
-    """A box of this size (3,) with its middle at a place (3,)."""
-    shape = trimesh.creation.box(size)
-    shape.apply_translation(at)
-    return shape
 
 
 def body():

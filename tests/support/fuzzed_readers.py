@@ -61,7 +61,7 @@ def _recordings() -> list[Reader]:
             ("recording .csv, complex", "a.csv", cells.replace(".", ",").encode(), _semicolons)]  # fmt: skip
     if importlib.util.find_spec("h5py"):
         more.append(
-            ("recording .mat 7.3", "a.mat", _bytes(lambda path: _hdf5(path, wave), "a.mat"), _recording(".mat"))
+            ("recording .mat 7.3", "a.mat", _bytes(lambda path: _hdf5(path, wave), "a.mat"), _recording(".mat"), 0.1)
         )
     return [
         Reader(f"recording {kind}", f"a{kind}", data, _recording(kind), **special.get(kind, {}))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.targets import mocap
+from lowalt.targets import mocap, record_schema
 from lowalt.targets.cloud import Cloud, check
 from lowalt.targets.skeleton import LIMBS, NODES
 
@@ -74,5 +74,6 @@ def cloud_of(folder: Path, **changes) -> Cloud:
     extra = {"skeleton": "s.asf", "motion": "m.amc", "rate_hz": 120} | changes
     extra = {key: value for key, value in extra.items() if value is not None}
     record |= {"published": extra.pop("published", PUBLISHED)}
+    record_schema.check("mocap", extra, "record")
     record = mocap.check_record(record | extra, extra, "record")
     return check(mocap.mocap_cloud(record, folder, 3), "cloud")

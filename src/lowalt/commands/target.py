@@ -16,11 +16,11 @@ from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
-from lowalt.targets.draft import axis_vector, chosen, drafted, refuse_miscount, row_lines
+from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
 from lowalt.targets.guesses import box_of
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.mesh_record import MOVING_KIND
+from lowalt.targets.mesh_record import MOVING_KIND, body_axes
 from lowalt.targets.records import load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
 from lowalt.targets.robots import drafted_robot, parts_of, turning, write_parts
@@ -148,6 +148,9 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
         joints, triangles = parts_of(robot, MOVING_KIND[category])
     except InputError as error:
         raise InputError(f"{given.file}: {error}") from None
+    if not joints:
+        # The names of links tell rotors that no joint turns.
+        triangles = {link: np.concatenate(found) for link, found in robot.surfaces.items() if found}
     with TemporaryDirectory() as folder:
         path = Path(folder) / file
         write_parts(path, triangles)
@@ -158,7 +161,7 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
                                  "for a row of its own, or choose a target with as many")  # fmt: skip
             names = (name, given.file.name, file)
             return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
-        # No joint turns, as where a drone is one mesh: its pieces are looked at.
+        # As where a drone is one mesh: its pieces are looked at.
         given.up, given.front, given.unit = given.up or "z", given.front or "x", "m"
         return _draft(given, path, file, name, row, category, table), path.read_bytes()
 
@@ -183,8 +186,7 @@ def _draft(
         with replacing(picture) as temporary:
             temporary.write_bytes(inspection_picture(found, numbered=True))
         raise
-    front, up = axis_vector(found.front), axis_vector(found.up)
-    frame = np.stack([np.cross(front, up), front, up])
+    frame = body_axes(found.front, found.up)
     extent = np.abs(frame @ (found.high - found.low))
     hubs = np.array([frame[:2] @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
     wheel = max((float(np.subtract(*box_of(group)[::-1]).max()) for group in groups), default=None)

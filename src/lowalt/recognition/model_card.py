@@ -25,10 +25,26 @@ MEANING = {
     "seen": "trained and tested on the same subtypes, with different motion models",
     "unseen": "tested on subtypes that no training sample shows",
 }
+USE = """\
+.safetensors sample.npy
+
+`sample.npy` holds the signals of one sample, (stations, symbols) complex; a tile (.png) does as well. The file's
+metadata, the entry `lowalt`, holds everything that determined the weights, and how signals become images.
+"""
 LIMITS = """\
 - It has seen simulated echoes only, of the network and the effects that its run was configured with.
 - One target a sample, tracked perfectly. It always answers with one of its classes, also for noise alone.
 - Accuracy on subtypes that it was not trained on is lower: compare the tables of both protocols.
+"""
+RADAR_ACCURACY = "On measured recordings: `results/reference/measured-recognition.csv`.\n"
+RADAR_USE = """\
+ recording.yaml
+
+`recording.yaml` names the file of samples and says what they do not hold: docs/tutorials/recording.md.
+"""
+RADAR_LIMITS = """\
+- It has seen simulated echoes of few kinds of targets only, and never a recording.
+- It always answers with one of its classes, also for a window that holds none of them.
 """
 
 
@@ -104,17 +120,18 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         *((f"SHA-256 of the {part} samples", f"`{digest}`")
           for part, digest in sorted(content.identity.get("samples", {}).items())),
     ]  # fmt: skip
+    if "radar" in content.input:
+        radar, measured, use, limits = content.input["radar"], RADAR_ACCURACY, RADAR_USE, RADAR_LIMITS
+        where = f"a radar of {radar['carrier_hz'] / 1e9:g} GHz with a\n{radar['channel']} channel, trained on its twin"
+    else:
+        where, measured, use, limits = "base stations, trained", _accuracy(accuracy), USE, LIMITS
     parts = [
         f"---\n{yaml.safe_dump(front, sort_keys=False)}---\n\n# {name}\n",
-        f"A network that tells {', '.join(state['classes'])} apart by their echoes at base stations, trained by lowalt "
+        f"A network that tells {', '.join(state['classes'])} apart by their echoes at {where} by lowalt "
         f"{__version__}.\nProtocol {state['protocol']}: {MEANING.get(state['protocol'], 'of the user')}.\n",
-        "## Training\n", _table(("entry", "value"), facts), "## Accuracy\n", _accuracy(accuracy),
+        "## Training\n", _table(("entry", "value"), facts), "## Accuracy\n", measured,
         _rounded(content.measured) if content.weights == EIGHT and content.measured else "",
-        f"## Use\n\n    lowalt predict {name}.safetensors sample.npy\n\n"
-        "`sample.npy` holds the signals of one sample, (stations, symbols) complex; a tile (.png) does as well. The "
-        "file's metadata, the entry `lowalt`,\nholds everything that determined the weights, and how signals become "
-        "images.\n",
-        f"## Limits\n\n{LIMITS}",
+        f"## Use\n\n    lowalt predict {name}{use}", f"## Limits\n\n{limits}",
     ]  # fmt: skip
     return "\n".join(part for part in parts if part)
 

@@ -153,25 +153,24 @@ def ablate(arguments: list[str]) -> None:
 
 
 def keep(arguments: list[str]) -> None:
-    """Keep the first network of every radar in the zoo, in 8 bits, held against the simulated validation windows."""
+    """Keep a network of every radar in the zoo, in 8 bits; one that --models lacks is trained on its twin first."""
     options = _line("keep", keep.__doc__, record=False)
-    options.add_argument("--models", required=True, type=Path, help="folder of the networks of `recognise`")
+    options.add_argument("--models", required=True, type=Path, help="folder of networks, as `recognise` writes it")
     given = options.parse_args(arguments)
     from lowalt.recognition import zoo
     from lowalt.recognition.model_file import of_run
-    from lowalt.recordings.recognise import simulated
+    from lowalt.recordings.recognise import simulated, train
 
     library, block = Library.read(given.twins), settings(given.recognition)
-    paths = {name: given.models / f"{name}-{block['seeds'][0]}/model.pt" for name in library.twins}
-    if not any(path.is_file() for path in paths.values()):
-        raise InputError(f"--models {given.models}: none of {sorted(map(str, paths.values()))} is there")
-    for name, path in paths.items():
+    seed = block["seeds"][0]
+    for name, twin in library.twins.items():
+        path, validation = given.models / f"{name}-{seed}/model.pt", simulated(library, name, block, "validation")
         if not path.is_file():
-            continue
-        twin = library.twins[name]
+            windows = {"train": simulated(library, name, block, "train"), "validation": validation}
+            train(block, windows, name, seed, path.parent)
         told = {"network": samples.block(twin), "spectra": samples.spectra_block(twin), "images": block["images"]}
         content = replace(of_run(path), input={**told, "radar": asdict(twin)})
-        measured = zoo.kept(content, path, simulated(library, name, block, "validation"), name, given.out)
+        measured = zoo.kept(content, path, validation, name, given.out)
         print(f"{name}: {measured['percent']:.2f} % of {measured['samples']} simulated windows right")
 
 

@@ -30,6 +30,11 @@ class Answers(NamedTuple):
     probabilities: np.ndarray
 
 
+def _near(record: Record, twin: Twin) -> bool:
+    """Whether a network of this radar may be asked of a recording at its carrier."""
+    return 1 / TRAINED_RATIO <= record.carrier_hz / twin.carrier_hz <= TRAINED_RATIO
+
+
 def answers(trained: Trained, settings: dict, record: Record, where: str) -> Answers:
     """Return what a network says of every window of a recording.
 
@@ -41,13 +46,13 @@ def answers(trained: Trained, settings: dict, record: Record, where: str) -> Ans
     if "radar" not in settings:
         raise InputError(f"{trained.path}: knows no recordings, expected a network of a radar such as {sorted(radars)}")
     known = Twin.from_settings(settings["radar"])
-    ratio = record.carrier_hz / known.carrier_hz
-    if not 1 / TRAINED_RATIO <= ratio <= TRAINED_RATIO:
-        near = min(radars, key=lambda name: abs(np.log(record.carrier_hz / radars[name].carrier_hz)))
+    if not _near(record, known):
+        near = [name for name, twin in radars.items() if _near(record, twin)]
         raise InputError(
             f"{where}: carrier_hz is {record.carrier_hz:.3g}, and {trained.path.stem} knows {known.carrier_hz:.3g}, "
-            f"expected the network {near} ({radars[near].carrier_hz:.3g}), or one of a twin of your own"
-        )
+            + (f"expected a network of {near}" if near else "expected a network of a twin at this carrier, which "
+               "`python -m lowalt.recordings keep --twins FILE` trains; the zoo has none")
+        )  # fmt: skip
     twin = at_carrier(known, record.carrier_hz)
     intervals = samples.signals(record, twin)
     images = rendered(intervals, twin, Images.from_settings(settings["images"]), trained.size)

@@ -149,7 +149,9 @@ def sampled(one: Record, twin: Twin, baseband: Baseband | None = None) -> np.nda
     """
     values, rate = baseband or read(one)
     if one.channel == "real" and twin.channel == "complex":
-        raise InputError(f"{one.file}: channel 'real', but the radar has a complex channel")
+        raise InputError(
+            f"{one.file}: channel 'real', but the radar has a complex channel, expected in-phase and quadrature"
+        )
     if one.channel == "complex" and twin.channel == "real":
         values = values.real
     try:

@@ -8,10 +8,10 @@ import numpy as np
 from lowalt.config.classes import like
 from lowalt.numerics.streams import stream
 from lowalt.targets.assemble import assemble
-from lowalt.targets.builtin_record import MODULES, check_record, record_files
+from lowalt.targets.builtin_record import MODULES, check_record
 from lowalt.targets.cloud import Cloud
 
-__all__ = ["builtin_cloud", "check_record", "record_files"]
+__all__ = ["builtin_cloud", "check_record"]
 
 
 def checksum(record: dict) -> str:

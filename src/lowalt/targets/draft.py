@@ -11,17 +11,12 @@ from lowalt.files.errors import InputError
 from lowalt.numerics import portable
 from lowalt.targets.guesses import TURNING, Component, box_of
 from lowalt.targets.inspection import Inspection
-from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND
+from lowalt.targets.mesh_record import ALL_AXES, MOVING_KIND, body_axes
 
 MARGIN = 0.02
 """A region reaches this share of its largest extent beyond the components that it shall take."""
 
 CONFIRM = "  # GUESSED, please confirm"
-
-
-def axis_vector(axis: str) -> np.ndarray:
-    """Return the unit vector (3,) of an axis name such as "-y"."""
-    return np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1)
 
 
 def _numbers(values: np.ndarray) -> str:
@@ -40,8 +35,8 @@ def _place(group: list[Component], found: Inspection) -> str:
     """Return the place of a group on the target in words: front or rear, left or right."""
     middle = (found.low + found.high) / 2
     centre = np.mean(box_of(group), axis=0) - middle
-    front, up = axis_vector(found.front), axis_vector(found.up)
-    return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ np.cross(front, up) >= 0 else 'left'}"
+    right, front, _ = body_axes(found.front, found.up)
+    return f"{'front' if centre @ front >= 0 else 'rear'} {'right' if centre @ right >= 0 else 'left'}"
 
 
 def _diagonal(hubs: np.ndarray) -> float:
@@ -87,7 +82,7 @@ def _wings(found: Inspection) -> list[str]:
     """Return the lines of two wings without elbows; each begins at `shoulder_m` and is hinged at its root's middle."""
     front, up = "xyz".index(found.front[-1]), "xyz".index(found.up[-1])
     right = 3 - front - up
-    sign = np.sign(np.cross(axis_vector(found.front), axis_vector(found.up))[right])
+    sign = body_axes(found.front, found.up)[0, right]
     middle, lines = (found.low + found.high)[right] / 2, []
     for name, side in (("left wing", -sign), ("right wing", sign)):
         out = side * (found.points[:, right] - middle)
@@ -121,10 +116,11 @@ def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int
     named = bool(groups) and all(TURNING["rotor"].search(part.piece) for group in groups for part in group)
     if found.category != "UAV" or (len(groups) == count if count else named):
         return
-    wanted = f"{count}" if count else "their number, --rotors N,"
+    unknown = f"expected --rotors {len(groups)} where that is all" if groups else "expected at least one"
+    wanted = f"expected {count}" if count else unknown
     raise InputError(
-        f"{found.path}: {len(groups)} rotors found, expected {wanted} or their pieces, numbered in {picture}: --moving "
-        "and each rotor's, joined by + where it has several, such as --moving 3 5+6 7 9"
+        f"{found.path}: {len(groups)} rotors found, {wanted}; otherwise name each rotor's pieces as numbered in "
+        f"{picture}, such as --moving 3 5+6 7 9. A rotor that has no number is joined to the body: separate it first"
     )
 
 
@@ -155,7 +151,7 @@ def drafted(
     kind = MOVING_KIND[category]
     unit = "" if found.unit_from != "guessed from the size" else CONFIRM
     groups = sorted(groups, key=lambda group: group[0].centre.tolist())
-    frame = np.stack([np.cross(axis_vector(found.front), axis_vector(found.up)), axis_vector(found.front)])
+    frame = body_axes(found.front, found.up)[:2]
     hubs = np.array([frame @ np.mean(box_of(group), axis=0) for group in groups]).reshape(-1, 2)
     marks = {name: "" if name in given else f"{CONFIRM}: {axis[-1]} or -{axis[-1]}"
              for name, axis in (("up", found.up), ("front", found.front))}  # fmt: skip

@@ -191,7 +191,7 @@ def rotors(
 
     Pieces that their names call rotors come first, whatever their axes, then sets of alike flat groups that lie about
     a hub each, of which the set farthest out is taken: motors stand at the ends of arms. `ups` are the axes that may
-    point up, the likeliest first; without `count` at least two alike groups are needed where no name tells.
+    point up, the likeliest first; at least three alike groups are needed where no name tells.
     """
     named = [part for part in parts if TURNING["rotor"].search(part.piece)]
     # Where the number is known, whole propellers that touch stay apart; else blades that touch are taken together.
@@ -205,7 +205,8 @@ def rotors(
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
         sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
         sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in sets]
-        if found := _alike_set(sets, up, whole, count):
+        found = _alike_set(sets, up, whole, count)
+        if len(found) > 2:
             return up, found
     return ups[0], []
 
@@ -229,7 +230,7 @@ def _bladed(parts: Sequence[Component], up: int, count: int) -> list[list[list[C
 def _alike_set(
     choices: list[list[list[Component]]], up: int, whole: np.ndarray, count: int | None
 ) -> list[list[Component]]:
-    """The set of alike groups at one height that is farthest out, of `count` groups or of at least two; slender pieces
+    """The set of alike groups at one height that is farthest out, of `count` groups or of several; slender pieces
     that all point at the middle and reach near it are arms."""
     found: list[tuple[float, list[list[Component]]]] = []
     for groups in choices:

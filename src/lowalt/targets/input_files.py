@@ -9,6 +9,12 @@ FORBIDDEN = "{}\\"
 only."""
 
 
+def record_files(record: dict) -> list[str]:
+    """Return the user's files that a merged record names, relative to the folder of inputs, each once, in order."""
+    files = [mesh["file"] for part in record.get("parts", {}).values() for mesh in part.get("meshes", [])]
+    return list(dict.fromkeys([*files, *(record[key] for key in ("skeleton", "motion") if key in record)]))
+
+
 def check_file_name(name: object, where: str) -> None:
     """Refuse a file name that leaves the folder of inputs or that the workflow cannot pass on.
 

@@ -98,6 +98,17 @@ def _piece_names(mesh: Mesh, found: list[Piece], metres: float) -> list[str]:
     return names
 
 
+def _unit_of(path: Path, size: float, size_m: float | None, category: str, row: dict) -> tuple[str | float, str]:
+    """The unit of a file whose largest extent is `size`, and where it is from; size_m: the same in metres."""
+    stated = stated_unit_m(path)
+    if size_m is not None:
+        return float(f"{size_m / size:.6g}"), "given by the size"
+    if stated is not None:
+        return {metres: name for name, metres in UNITS_M.items()}.get(stated, stated), "stated by the file"
+    wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
+    return guessed_unit(size, category, wanted), "guessed from the size"
+
+
 def inspect_mesh(
     path: str | Path, category: str, unit: str | float | None = None, row: dict | None = None,
     size_m: float | None = None, axes: tuple[str | None, str | None] = (None, None),
@@ -113,17 +124,8 @@ def inspect_mesh(
     found = pieces(path)
     corners = [piece.vertices for piece in found] or [np.zeros((1, 3))]
     size = max(float(np.ptp(np.concatenate(corners), axis=0).max()), 1e-12)
-    stated, row = stated_unit_m(path), row or {}
-    known = {metres: name for name, metres in UNITS_M.items()}
-    if unit is not None:
-        source = "given"
-    elif size_m is not None:
-        unit, source = float(f"{size_m / size:.6g}"), "given by the size"
-    elif stated is not None:
-        unit, source = known.get(stated, stated), "stated by the file"
-    else:
-        wanted = row.get("len_m") if category == "Vehicle" else row.get("size_m")
-        unit, source = guessed_unit(size, category, wanted), "guessed from the size"
+    row = row or {}
+    unit, source = (unit, "given") if unit is not None else _unit_of(path, size, size_m, category, row)
     metres = UNITS_M[unit] if isinstance(unit, str) else unit
     mesh = read_mesh(path, unit)
     some = np.unique(np.linspace(0, len(mesh.faces) - 1, min(len(mesh.faces), MOST_POINTS)).astype(int))
@@ -140,6 +142,9 @@ def inspect_mesh(
     elif category == "Vehicle":
         groups = wheels(parts, high - low)
     right = mirror_axis(points) if category == "Bird" and None in axes else None
+    if category == "Vehicle" and groups:
+        # Wheels are thinnest along their axes.
+        right = int(np.argmin(np.mean([np.subtract(*box_of(group)[::-1]) for group in groups], axis=0)))
     up = ups[0] if up is None and category == "UAV" else up
     guessed = guessed_axes(high - low, category, up, None if right in (up, front) else right)
     seen = category != "Bird" or None not in axes or right is not None

@@ -20,14 +20,15 @@ from lowalt.targets import vehicle
 from lowalt.targets.assemble import Part, allot, sample_part
 from lowalt.targets.builtin import checksum
 from lowalt.targets.cloud import Cloud
+from lowalt.targets.input_files import record_files
 from lowalt.targets.mesh_files import Mesh, joined, read_mesh
 from lowalt.targets.mesh_parts import Pool, cut, hinged, placed, pool_of, refuse_shared
-from lowalt.targets.mesh_record import check_record, ordered_parts, record_files
+from lowalt.targets.mesh_record import body_axes, check_record, ordered_parts
 from lowalt.targets.mesh_size import sized
 from lowalt.targets.plausible import refuse_implausible
 from lowalt.targets.sampling import thin
 
-__all__ = ["check_record", "mesh_cloud", "record_files"]
+__all__ = ["check_record", "mesh_cloud"]
 
 DENSE = 200
 """Dense samples of a part's surface for each point of the cloud, before regions are cut and the rest is thinned."""
@@ -37,11 +38,6 @@ THINNED = 25
 
 FEWEST_SAMPLES = 100
 """Least number of samples of a wheel that the record asks to be made."""
-
-
-def _vector(axis: str) -> np.ndarray:
-    """Return the unit vector (3,) of an axis name such as "-y"."""
-    return np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1)
 
 
 def _wheel_size(part: dict) -> tuple[float, float]:
@@ -86,8 +82,8 @@ def pools(record: dict, inputs_dir: Path, rng: np.random.Generator) -> tuple[dic
     `record` is a checked mesh record. The closed share is that of the triangles in watertight components.
     Raises: InputError naming the file, or the part whose region holds nothing.
     """
-    front, up = _vector(record["front"]), _vector(record["up"])
-    frame = np.stack([np.cross(front, up), front, up])
+    frame = body_axes(record["front"], record["up"])
+    _, front, up = frame
     where = record["subtype"]
     dense = DENSE * record["points"]
     (body_name, body_part), *moving = ordered_parts(record["parts"]).items()

@@ -4,8 +4,10 @@ Source: Khronos, COLLADA 1.4.1, elements unit, polylist, polygons and instance_c
 """
 
 import math
+import re
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
@@ -22,12 +24,20 @@ class _Plain(ElementTree.TreeBuilder):
 
 
 def parsed(path: Path) -> ElementTree.Element:
-    """Return the root of an XML file; nothing that it names is opened, and entities of its own are refused.
+    """Return the root of an XML file; nothing that it names is opened, and entities of its own are refused. A prefix
+    that it does not declare, such as `gz:`, is part of the name, as Gazebo's own parser has it.
 
     Raises: InputError naming the file where it is no XML or declares a document type.
     """
+    data = path.read_bytes()
     try:
-        return ElementTree.fromstring(path.read_bytes(), ElementTree.XMLParser(target=_Plain()))
+        try:
+            return ElementTree.fromstring(data, ElementTree.XMLParser(target=_Plain()))
+        except ElementTree.ParseError as error:
+            if error.code != expat.errors.codes[expat.errors.XML_ERROR_UNBOUND_PREFIX]:
+                raise
+            joined = re.sub(rb"(</?|\s)(\w+):(?=\w+[\s=/>])", rb"\1\2_", data)
+            return ElementTree.fromstring(joined, ElementTree.XMLParser(target=_Plain()))
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise InputError(f"{path}: not a readable XML file ({error})") from None
 
@@ -69,12 +79,18 @@ def for_trimesh(path: Path) -> tuple[bytes, dict[str, list[str]]]:
                 if _name(element) in ("polylist", "polygons"):
                     _cut(element, elements)
     names: dict[str, list[str]] = {}
-    for node in root.iter():
-        for shown in node if _name(node) == "node" else ():
-            if _name(shown) == "instance_geometry":
-                key = shown.get("url", "")[1:]
+
+    def name(element: ElementTree.Element, above: list[str]) -> None:
+        """Name the geometries below an element by their node, or by the nearest above it that has a name."""
+        for child in element:
+            told = [child.get(key) for key in ("name", "id") if child.get(key)] if _name(child) == "node" else []
+            if _name(child) == "instance_geometry":
+                key = child.get("url", "")[1:]
                 own = elements[key].get("name") if key in elements else None
-                names.setdefault(key, []).extend(name for name in (node.get("name"), node.get("id"), own) if name)
+                names.setdefault(key, []).extend([*above, *([own] if own else [])])
+            name(child, told or above)
+
+    name(root, [])
     return ElementTree.tostring(root), names
 
 

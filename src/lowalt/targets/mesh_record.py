@@ -5,19 +5,26 @@ unit; a checked record has metres. The order of keys and parts changes nothing. 
 with their meaning.
 """
 
+import numpy as np
+
 from lowalt.config.classes import like
 from lowalt.files.errors import InputError
 from lowalt.targets import bird, uav, vehicle
 from lowalt.targets.cloud import MOST_TURNING_PARTS
-from lowalt.targets.input_files import check_file_name
+from lowalt.targets.input_files import check_file_name, record_files
 from lowalt.targets.mesh_files import UNITS_M
-from lowalt.targets.record_schema import check
 
 SIZES = ("motor diagonal", "length", "width", "height", "largest extent")
 ALL_AXES = "length, width and height"
 DEFAULTS = {"scale": "published", "scale_limit": 2.5, "drop": []}
 MOVING_SHARE = {"UAV": uav.MOVING_SHARE, "Bird": bird.MOVING_SHARE, "Vehicle": vehicle.MOVING_SHARE}
 MOVING_KIND = {"UAV": "rotor", "Bird": "wing", "Vehicle": "wheel"}
+
+
+def body_axes(front: str, up: str) -> np.ndarray:
+    """Return the unit vectors (3, 3) right, front and up, of the names of two axes such as "-y"."""
+    vectors = [np.eye(3)["xyz".index(axis[-1])] * (-1 if axis[0] == "-" else 1) for axis in (front, up)]
+    return np.stack([np.cross(*vectors), *vectors])
 
 
 def ordered_parts(parts: dict[str, dict]) -> dict[str, dict]:
@@ -104,7 +111,6 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     category = like(merged)
     if category not in MOVING_SHARE:
         raise InputError(f"{where}: source is 'mesh' for a {category}, expected mocap or gait")
-    check("mesh", extra, where)
     if merged["up"][-1] == merged["front"][-1]:
         raise InputError(f"{where}: up {merged['up']} and front {merged['front']}, expected two different axes")
     bodies = [name for name, part in merged["parts"].items() if part["kind"] == "body"]
@@ -129,9 +135,3 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     for name in record_files(result):
         check_file_name(name, f"{where}: file")
     return result
-
-
-def record_files(record: dict) -> list[str]:
-    """Return the user's files that a mesh record names, relative to the folder of inputs, each once, in order."""
-    files = [mesh["file"] for part in record["parts"].values() for mesh in part.get("meshes", [])]
-    return list(dict.fromkeys(files))

@@ -14,12 +14,11 @@ from lowalt.config.classes import like
 from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError, InputWarning
 from lowalt.numerics import portable
-from lowalt.targets import record_schema
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gait import stance_speed_mps
-from lowalt.targets.input_files import check_file_name
+from lowalt.targets.input_files import check_file_name, record_files
 from lowalt.targets.mocap_cycle import closed, find_cycle, refuse_short, refuse_strange_rate
-from lowalt.targets.mocap_files import first_frame, read_motion, read_skeleton
+from lowalt.targets.mocap_files import read_motion, read_skeleton
 from lowalt.targets.mocap_joints import moved, read_bvh, read_joints, to_nodes
 from lowalt.targets.mocap_motion import Motion, front, nodes_m, posed, refuse_glitches
 from lowalt.targets.skeleton import NODES, node_cloud, stature_m
@@ -29,9 +28,6 @@ CMU_HZ = 120
 
 LONG = 20
 """A recording that is more times longer than the cycle used is told so: it may hold other motions."""
-
-KEYS = record_schema.keys("mocap")
-"""Keys of a recording's record in addition to those of every record; the key `where` says where to get the files."""
 
 
 def check_record(merged: dict, extra: dict, where: str) -> dict:
@@ -44,10 +40,8 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
     `extra` are the keys of the record as written that are not common to all sources.
     Raises: InputError naming `where`, the key, the value and what was expected.
     """
-    needed = {"motion"} | ({"skeleton"} if str(extra.get("motion")).lower().endswith(".amc") else set())
-    unknown, missing = sorted(set(extra) - set(KEYS)), sorted(needed - set(extra))
-    if unknown or missing:
-        raise InputError(f"{where}: unknown keys {unknown}, missing keys {missing}, expected some of {sorted(KEYS)}")
+    if extra["motion"].lower().endswith(".amc") and "skeleton" not in extra:
+        raise InputError(f"{where}: skeleton is missing, expected the .asf of {extra['motion']}")
     if like(merged) != "Pedestrian":
         raise InputError(f"{where}: source is 'mocap' for a target like a {like(merged)}, expected builtin or mesh")
     defaults = {
@@ -62,26 +56,9 @@ def check_record(merged: dict, extra: dict, where: str) -> dict:
         if key in result:
             check_file_name(result[key], f"{where}: {key}")
     first, last = result["first_frame"], result["last_frame"]
-    if not (isinstance(first, int) and first >= 1 and (last is None or (isinstance(last, int) and last > first))):
-        raise InputError(
-            f"{where}: first_frame {first!r}, last_frame {last!r}, expected frame numbers from 1, in order"
-        )
-    for key in ("rate_hz", "max_acceleration_mps2"):
-        if key in result and (
-            isinstance(result[key], bool) or not isinstance(result[key], (int, float)) or not 1 <= result[key] <= 1e5
-        ):
-            raise InputError(f"{where}: {key} is {result[key]!r}, expected a number from 1 to 100000")
-    mismatch = result["max_mismatch_m"]
-    if isinstance(mismatch, bool) or not isinstance(mismatch, (int, float)) or not 0 < mismatch <= 10:
-        raise InputError(f"{where}: max_mismatch_m is {mismatch!r}, expected metres, more than 0 and at most 10")
-    if result["scale"] not in ("published", "none"):
-        raise InputError(f"{where}: scale is {result['scale']!r}, expected published or none")
+    if last is not None and last <= first:
+        raise InputError(f"{where}: first_frame {first}, last_frame {last}, expected frame numbers in order")
     return result
-
-
-def record_files(record: dict) -> list[str]:
-    """Return the user's files that a recording's record names, relative to the folder of inputs."""
-    return [record[key] for key in ("skeleton", "motion") if key in record]
 
 
 def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
@@ -93,8 +70,8 @@ def _read(paths: list[Path], record: dict) -> tuple[Motion, int]:
     kind = path.suffix.lower()
     if kind == ".amc":
         skeleton = read_skeleton(paths[0])
-        channels = read_motion(path, skeleton, first, last)
-        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), max(first, first_frame(path))
+        channels, first = read_motion(path, skeleton, first, last)
+        return posed(skeleton, channels, record.get("rate_hz", CMU_HZ)), first
     if kind not in (".bvh", ".npz"):
         raise InputError(f"{path}: format {kind!r}, expected .amc with its skeleton, .bvh or .npz")
     joints, rate = read_bvh(path) if kind == ".bvh" else read_joints(path)

@@ -108,15 +108,17 @@ def read_skeleton(path: str | Path) -> Skeleton:
     return Skeleton(bones, axes, dofs, unit_m)
 
 
-def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
-    """Return (frame number, words) of every line of data up to frame `last`; later lines are not read.
+def _lines(path: Path, last: int | None) -> tuple[list[tuple[int, list[str]]], bool]:
+    """Return (frame number, words) of every line of data up to frame `last`, later lines are not read; and whether the
+    file says before its first frame that its angles are in radians.
 
     A clip cut out of a longer one may begin at any frame.
     """
-    result, frame = [], None
+    result, frame, radians = [], None, False
     for line in path.read_text(encoding="utf-8-sig", errors="replace").splitlines():
         words = line.split("#", 1)[0].split()
         if not words or words[0].startswith(":"):
+            radians |= frame is None and words[:1] != [] and words[0].upper() == ":RADIANS"
             continue
         if len(words) == 1 and words[0].isdecimal():
             number = int(words[0])
@@ -129,29 +131,7 @@ def _lines(path: Path, last: int | None) -> list[tuple[int, list[str]]]:
             raise InputError(f"{path}: {' '.join(words)[:60]!r} stands before frame 1, expected an AMC motion")
         else:
             result.append((frame, words))
-    return result
-
-
-def first_frame(path: Path) -> int:
-    """Return the number of the first frame of a motion file, 1 where it has none."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line in file:
-            words = line.split("#", 1)[0].split()
-            if len(words) == 1 and words[0].isdecimal():
-                return int(words[0])
-    return 1
-
-
-def in_radians(path: Path) -> bool:
-    """Return whether a motion file says before its first frame that its angles are in radians."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        for line in file:
-            word = line.split()[:1]
-            if word and word[0].upper() == ":RADIANS":
-                return True
-            if word and word[0].isdecimal():
-                return False
-    return False
+    return result, radians
 
 
 def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
@@ -168,9 +148,11 @@ def _values(where: str, words: list[str], skeleton: Skeleton) -> list[float]:
     return values
 
 
-def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None) -> dict[str, np.ndarray]:
+def read_motion(
+    path: str | Path, skeleton: Skeleton, first: int = 1, last: int | None = None
+) -> tuple[dict[str, np.ndarray], int]:  # fmt: skip
     """Return the channels (F, channels) of each node that has any, frames `first` to `last` by the file's own numbers,
-    both inclusive; a file that begins later is read from its first frame.
+    both inclusive, and the number of the first: a file that begins later is read from its first frame.
 
     Values in file units and degrees; a file that says `:RADIANS` is converted. Frames outside first..last are not
     checked, so that a record can leave out frames with known faults.
@@ -179,7 +161,8 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     """
     path = existing(path, "motion file")
     frames: dict[int, dict[str, list[float]]] = {}
-    for frame, words in _lines(path, last):
+    lines, radians = _lines(path, last)
+    for frame, words in lines:
         if frame >= first:
             values = frames.setdefault(frame, {})
             if words[0] in values:
@@ -190,7 +173,7 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     if count < 2 or (last is not None and max(frames) < last):
         found = f"frames up to {max(frames)}" if frames else "no frame in that range"
         raise InputError(f"{path}: {found}, expected frames {first} to {last or 'the end'}, at least two")
-    if in_radians(path):
+    if radians:
         turns = {name: [dof[0] == "r" for dof in dofs] for name, dofs in skeleton.dofs.items()}
         for values in frames.values():
             for name, row in values.items():
@@ -200,13 +183,15 @@ def read_motion(path: str | Path, skeleton: Skeleton, first: int = 1, last: int 
     for frame in range(first, first + count):
         lacking = [name for name in needed if name not in frames.get(frame, {})]
         if lacking:
-            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (truncated file? trim it)")
+            raise InputError(f"{path}: frame {frame} lacks {lacking}, expected all nodes (end it by last_frame)")
     motion = {name: np.array([frames[frame][name] for frame in range(first, first + count)]) for name in needed}
     empty = np.flatnonzero(~motion["root"].any(axis=1))
     if len(empty):
-        raise InputError(f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (trim it)")
+        raise InputError(
+            f"{path}: frame {first + empty[0]} has an all-zero root, expected a tracked one (begin by first_frame)"
+        )
     still = np.all([(values[1:] == values[:-1]).all(axis=1) for values in motion.values()], axis=0)
     if still.any():
         frame = first + 1 + int(np.argmax(still))
         raise InputError(f"{path}: frame {frame} repeats frame {frame - 1}, expected a recording that is not frozen")
-    return motion
+    return motion, first

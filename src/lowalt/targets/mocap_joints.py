@@ -25,7 +25,7 @@ SMPL = (
 NAMES = {
     "root": "hips pelvis hip root", "hip": "hip upleg thigh femur upperleg",
     "knee": "knee leg shin tibia lowleg lowerleg calf",
-    "ankle": "ankle foot", "toe": "toe toebase ball foot", "shoulder": "shoulder arm uparm upperarm humerus",
+    "ankle": "ankle foot", "toe": "toe toebase ball forefoot foot", "shoulder": "shoulder arm uparm upperarm humerus",
     "elbow": "elbow forearm lowarm lowerarm radius", "wrist": "wrist hand", "neck": "neck neck1 lowerneck spine3",
     "head": "head",
 }  # fmt: skip

@@ -84,5 +84,6 @@ def refuse_glitches(positions: np.ndarray, rate_hz: float, limit_mps2: float, wh
         frame, node = np.unravel_index(acceleration.argmax(), acceleration.shape)
         raise InputError(
             f"{where}: frame {first + 1 + frame}: {NODES[node]} accelerates by {acceleration.max():.0f} m/s2, "
-            f"expected at most {limit_mps2:.0f} (a glitch? trim it)"
+            f"expected at most {limit_mps2:.0f}: a glitch or a pose before the motion, to leave out by first_frame or "
+            "last_frame"
         )

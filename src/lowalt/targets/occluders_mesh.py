@@ -11,7 +11,7 @@ from lowalt.numerics.streams import stream
 from lowalt.targets import mesh, vehicle
 from lowalt.targets.mesh_files import Mesh
 from lowalt.targets.mesh_parts import Pool, cut, inside
-from lowalt.targets.mesh_record import ordered_parts
+from lowalt.targets.mesh_record import body_axes, ordered_parts
 from lowalt.targets.mesh_size import sized
 from lowalt.targets.occluders import GRAIN, longest_edge, quartered
 from lowalt.targets.sampling import face_normals
@@ -101,8 +101,7 @@ def mesh_surfaces(record: dict, inputs: Path, seed: int) -> tuple[list[Surface],
     raw, _ = mesh.pools(record, inputs, stream(seed, "cloud", record["subtype"]))
     kinds = {name: part["kind"] for name, part in record["parts"].items()}
     final, _ = sized(record, raw, kinds)
-    front, up = mesh._vector(record["front"]), mesh._vector(record["up"])
-    triangles = _triangles(record, inputs, np.stack([np.cross(front, up), front, up]))
+    triangles = _triangles(record, inputs, body_axes(record["front"], record["up"]))
     surfaces, offsets = [], []
     for number, name in enumerate(cloud.names):
         # How a part's samples were scaled and moved, recovered from the samples themselves.

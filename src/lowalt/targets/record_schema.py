@@ -3,8 +3,7 @@
 import functools
 from pathlib import Path
 
-import jsonschema
-
+from lowalt.config.schema import faults
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 
@@ -24,18 +23,10 @@ def keys(section: str) -> tuple[str, ...]:
     return tuple(schema()["sources"][section]["properties"])
 
 
-@functools.cache
-def _validator(section: str) -> jsonschema.Draft202012Validator:
-    """Return the validator of a section, made once."""
-    return jsonschema.Draft202012Validator({"$defs": schema()["$defs"], **schema()["sources"][section]})
-
-
 def check(section: str, record: dict, where: str) -> None:
-    """Refuse keys of a record that are unknown to a section, missing, or of another type than it says.
+    """Refuse keys of a record that are unknown to a section, missing, or of another value than it says.
 
-    Raises: InputError naming `where`, the key and what is wrong with it.
+    Raises: InputError naming `where`, the key, its value and what was expected.
     """
-    fault = jsonschema.exceptions.best_match(_validator(section).iter_errors(record))
-    if fault is not None:
-        place = ".".join(str(key) for key in fault.absolute_path) or "record"
-        raise InputError(f"{where}: {place}: {fault.message}")
+    if found := faults(record, {"$defs": schema()["$defs"], **schema()["sources"][section]}, "record"):
+        raise InputError(f"{where}: {found[0]}")

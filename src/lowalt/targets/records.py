@@ -16,13 +16,11 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.targets import record_schema
+from lowalt.targets.input_files import record_files
 
 SOURCES = ("builtin", "mesh", "mocap", "gait")
 COMMON_KEYS = record_schema.keys(record_schema.COMMON)
 """Keys every record may have; `source` it must have. Each source adds its own."""
-
-MOST_POINTS = 20_000
-"""Most points of a cloud: spreading them evenly takes a time that grows with their square (a minute at this count)."""
 
 _WORDS = ("category", "name", "unseen_protocol")
 _WHOLE = ("idx", "n_rotors_or_wings", "points_in_published_cloud_approx")
@@ -170,20 +168,14 @@ def merge(row: dict, record: dict, where: str) -> dict:
     merged |= {
         "subtype": row["name"], "category": row["category"], "group": row["unseen_protocol"], "published": row,
     }  # fmt: skip
+    record_schema.check(record_schema.COMMON, {key: merged[key] for key in COMMON_KEYS if key in merged}, where)
     _check_like(merged, where)
-    unknown = sorted(set(record.get("row_from") or {}) - set(row))
+    unknown = sorted(set(record.get("row_from", {})) - set(row))
     if unknown:
         raise InputError(f"{where}: row_from names {unknown}, expected columns of the table of targets")
-    points, rcs = merged["points"], merged["rcs_m2_per_point"]
-    if isinstance(points, bool) or not isinstance(points, int) or not 1 <= points <= MOST_POINTS:
-        raise InputError(f"{where}: points is {points!r}, expected a whole number from 1 to {MOST_POINTS}")
-    if isinstance(rcs, bool) or not isinstance(rcs, (int, float)) or not (math.isfinite(rcs) and rcs >= 0):
-        raise InputError(f"{where}: rcs_m2_per_point is {rcs!r}, expected square metres >= 0")
     extra = {key: value for key, value in record.items() if key not in COMMON_KEYS}
-    found = _source(source).check_record(merged, extra, where)
-    record_schema.check(record_schema.COMMON, record, where)
     record_schema.check(source, extra, where)
-    return found
+    return _source(source).check_record(merged, extra, where)
 
 
 def _check_like(merged: dict, where: str) -> None:
@@ -199,7 +191,7 @@ def _check_like(merged: dict, where: str) -> None:
 
 
 def _source(name: str) -> ModuleType:
-    """The module of a source; each has `check_record(merged, extra, where)` and `record_files(record)`."""
+    """The module of a source; each has `check_record(merged, extra, where)` and `SOURCE_cloud`."""
     return import_module(f"lowalt.targets.{name}")
 
 
@@ -208,7 +200,7 @@ def source_files(record: dict, inputs: str | Path | None) -> list[str]:
 
     Raises: InputError where the record names files and there is no folder.
     """
-    names = _source(record["source"]).record_files(record)
+    names = record_files(record)
     if names and inputs is None:
         raise InputError(f"{record['subtype']}: source {record['source']} reads {names}, expected a folder of inputs")
     return [str(Path(inputs) / name) for name in names]
@@ -219,7 +211,7 @@ def missing_inputs(records: dict[str, dict], inputs: str | Path | None) -> list[
     a user gets it."""
     lines = []
     for name, record in records.items():
-        for file in _source(record["source"]).record_files(record):
+        for file in record_files(record):
             if inputs is None or not (Path(inputs) / file).is_file():
                 get = f"; get it from {record['where']}" if "where" in record else ""
                 lines.append(f"{name}: {record['source']} file {file} (inputs folder: {inputs or 'not given'}){get}")
