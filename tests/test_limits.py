@@ -125,8 +125,9 @@ def test_a_tiles_file_beyond_4_gib_is_read_image_by_image(tmp_path):
 
 
 def config_of(models, per_chunk):
-    """The default's configuration with other numbers of motion models."""
-    return merge(load_yaml(ROOT / "config/default.yaml"), {"motion": {"models": models, "models_per_chunk": per_chunk}})
+    """The default's configuration with other numbers of motion models, and shards as large as their folds."""
+    motion, shards = {"models": models, "models_per_chunk": per_chunk}, {"largest_mb": 30_000}
+    return merge(load_yaml(ROOT / "config/default.yaml"), {"motion": motion, "shards": shards})
 
 
 @pytest.fixture(scope="module")
