@@ -72,10 +72,11 @@ def write_shard(
     groups = sorted({row["group"] for row in rows})
     if len(groups) != 1:
         raise InputError(f"{path}: its motion table has the groups {groups}, expected exactly one")
-    chosen, turns = select(rows, snrs, split, seed, wanted), {}
-    for row, _ in chosen:
-        turns.setdefault(row, len(turns) % piece[1])
-    chosen = [(row, level) for row, level in chosen if turns[row] == piece[0]]
+    chosen = select(rows, snrs, split, seed, wanted)
+    turns: dict[int, int] = {}
+    for number, _ in chosen:
+        turns.setdefault(number, len(turns) % piece[1])
+    chosen = [(number, level) for number, level in chosen if turns[number] == piece[0]]
     table = np.zeros(len(chosen), SAMPLE)
     levels: dict[int, list[float]] = {}
     for number, level in chosen:
