@@ -192,7 +192,7 @@ READ_AS = {
 }  # fmt: skip
 
 
-@pytest.mark.skipif(not FAULTS.is_dir(), reason="the folder of faults is not here")
+@pytest.mark.skipif(not FAULTS.is_dir(), reason="no real inputs: the folder of faults is not here")
 def test_every_file_of_the_folder_of_faults_is_read_rightly_or_refused():
     found = {path.stem: path for path in FAULTS.glob("*.yaml")}
     assert set(found) == set(READ_AS)
