@@ -59,6 +59,18 @@ def keys(value):
     return set(value).union(*(keys(item) for name, item in value.items() if name not in STATIC))
 
 
+def test_explain_takes_out_together_what_needs_each_other_and_a_target_without_surfaces(answer, tmp_path):
+    overlay = tmp_path / "scene.yaml"
+    effects = "effects: {clutter: {}, canceller: {kind: pulse}}, targets: {own: {more: config/targets/more.yaml}}"
+    overlay.write_text(f"{{run: a, network: {{symbols: 32}}, spectra: {{vrp: {{window: 16}}}}, {effects}}}")
+    found, status = answer("explain", str(overlay), "--sample", "Road cyclist:0")
+    changes = {change["effect"]: change for change in found["changes"]}
+    assert status == 0 and not changes["clutter"]["refused"] and changes["clutter"]["signal"] > 0.01
+    assert changes["clutter"]["also"] == "and without canceller" and changes["canceller"]["also"] == ""
+    assert changes["receiver_noise"]["also"] == "at no set SNR" and changes["receiver_noise"]["signal"] > 0
+    assert "surfaces" in changes["occlusion"]["refused"]
+
+
 def test_explain_answers_with_findings_and_changes(answer, capsys, tmp_path):
     overlay, mine = tmp_path / "scene.yaml", tmp_path / "mine.yaml"
     effects = "effects: {iq_imbalance: {}, adc: {bits: 24, clip: false}}"

@@ -38,6 +38,7 @@ def test_one_call_trains_and_another_evaluates_as_the_commands_do(run, tmp_path)
     history = (tmp_path / "model/history.csv").read_text()
     assert checkpoint.model(tmp_path / "model/model.pt")[1]["protocol"] == "seen" and "\n3," in history
     found = lowalt.evaluate(trained, run)
+    assert found == lowalt.evaluate(trained, run)
     block = json.dumps(yaml.safe_load((run / "config.yaml").read_text())["recognition"]["evaluation"])
     index, table = str(run / "shards/index.json"), str(tmp_path / "p.csv")
     main(

@@ -88,7 +88,7 @@ def page():
     network, times = renderer.network, renderer.network.times_s
     signals = np.stack([np.exp(2j * np.pi * 30 * times), 0 * times])
     speeds = {network.stations[0].name: {"radial_mps": 17.0}, network.stations[1].name: {"radial_mps": None}}
-    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "level": 300.0, "network": tile[1],
+    shared = {"category": "UAV", "group": "seen", "snr": "no noise", "network": tile[1],
               "echoes": viewer_echoes.echoes(signals, speeds, network)}  # fmt: skip
     one = {**shared, "subtype": "One", "model": 1, "tile": tile[0], "probabilities": {"seen A": [0.2, 0.8]}}
     two = {**shared, "subtype": "Two", "model": 5, "tile": tile[1], "probabilities": {}}

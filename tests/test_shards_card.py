@@ -4,6 +4,7 @@ import csv
 import hashlib
 import json
 import math
+import re
 import shutil
 
 import pytest
@@ -39,6 +40,8 @@ def test_card_has_counts_configuration_and_versions(published):
     assert yaml.safe_load(text.split("```yaml")[1].split("```")[0]) == CONFIG
     versions = ShardSet(published / "index.json").record(0)["versions"]
     assert all(f"| {name} | {version} |" in text for name, version in versions.items())
+    shard = re.search(r'WebDataset\("([^"]+)"', text)[1]
+    assert (published / shard).is_file()
     for word in ("Known limits", "Oddities", "Licence", "verify"):
         assert word in text
 

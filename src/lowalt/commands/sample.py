@@ -1,7 +1,6 @@
 """The command `lowalt sample`: one sample of a configuration as files and as a picture with axes."""
 
 import argparse
-import json
 import math
 import os
 from pathlib import Path
@@ -47,12 +46,12 @@ def run(given: argparse.Namespace) -> str:
         raise InputError(f"{given.subtype!r}, model {given.model}: expected a selected subtype and a number from 0")
     (group,) = dataset.plan.groups
     place = Place(group, given.subtype, given.model, given.snr)
-    image, signal, record = dataset.made(place)
+    image, signal, _ = dataset.made(place)
     key, renderer = sample_key(given.subtype, given.model, given.snr), dataset.maker.renderer
     noise = "no noise" if math.isinf(given.snr) else f"SNR {given.snr:g} dB"
     written = {
         f"{key}.png": encode(image, renderer.images.palette),
-        f"{key}.json": (json.dumps(record, indent=1) + "\n").encode(),
+        f"{key}.json": dataset.made_record(place),
         f"{key}-axes.png": figure(image, renderer, f"{given.subtype}, motion model {given.model}, {noise}"),
     }
     for name, data in written.items():

@@ -9,6 +9,7 @@ echoes.
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from tarfile import BLOCKSIZE
 
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError, instead
@@ -18,8 +19,6 @@ PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
 PIECE = r"(?:p\d+)?"
 """Regular expression of a shard's piece, where a fold of a chunk is packed in several shards."""
-BLOCK = 512
-"""Bytes by which the parts of a tar are rounded up."""
 RECORD_BYTES = 2048
 """Space of a sample's JSON record in the tar, padded."""
 PIXEL_BYTES = 0.5
@@ -46,7 +45,7 @@ def sample_bytes(config: dict) -> int:
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     else:
         data = 128 + 8 * stations * config["network"]["symbols"]
-    whole = 2 * BLOCK + RECORD_BYTES + data + -data % BLOCK
+    whole = 2 * BLOCKSIZE + RECORD_BYTES + data + -data % BLOCKSIZE
     return whole // len(snrs_of(config)) if kind == "recipe" else whole
 
 

@@ -26,7 +26,7 @@ MEANING = {
     "unseen": "tested on subtypes that no training sample shows",
 }
 USE = """\
-.safetensors sample.npy
+    lowalt predict {name}.safetensors sample.npy
 
 `sample.npy` holds the signals of one sample, (stations, symbols) complex; a tile (.png) does as well. The file's
 metadata, the entry `lowalt`, holds everything that determined the weights, and how signals become images.
@@ -38,7 +38,7 @@ LIMITS = """\
 """
 RADAR_ACCURACY = "On measured recordings: `results/reference/measured-recognition.csv`.\n"
 RADAR_USE = """\
- recording.yaml
+    lowalt predict {name} recording.yaml
 
 `recording.yaml` names the file of samples and says what they do not hold: docs/tutorials/recording.md.
 """
@@ -131,7 +131,7 @@ def card(content: ModelFile, accuracy: list[dict[str, str]], name: str) -> str:
         f"{__version__}.\nProtocol {state['protocol']}: {MEANING.get(state['protocol'], 'of the user')}.\n",
         "## Training\n", _table(("entry", "value"), facts), "## Accuracy\n", measured,
         _rounded(content.measured) if content.weights == EIGHT and content.measured else "",
-        f"## Use\n\n    lowalt predict {name}{use}", f"## Limits\n\n{limits}",
+        f"## Use\n\n{use.format(name=name)}", f"## Limits\n\n{limits}",
     ]  # fmt: skip
     return "\n".join(part for part in parts if part)
 

@@ -2,14 +2,11 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from lowalt.config.network import station_names
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located
 from lowalt.files.yaml_files import load_yaml
-from lowalt.recognition import inference, recipe, runs, zoo
-from lowalt.recognition.ahead import ReadAhead, Unchanged
+from lowalt.recognition import inference, runs, zoo
 from lowalt.recognition.inference import Machine
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Samples, ViewSamples, first_models
@@ -56,12 +53,10 @@ def evaluate(model: runs.Trained | str | Path, run: str | Path) -> dict:
     """
     trained = model if isinstance(model, runs.Trained) else zoo.opened(model)[0]
     config, index = _opened(run)
-    batch, threads, precision, mirror, workers = inference.evaluation(config["recognition"]["evaluation"])
-    recipe.seeded(trained.seed, ("evaluate",), threads)
-    machine = Machine.here(precision)
+    settings = config["recognition"]["evaluation"]
+    machine = Machine.here(inference.evaluation(settings)[2])
     samples = _samples(index, trained.scheme.columns, trained.size, trained.protocol, "test")
-    ahead, every = ReadAhead(Unchanged(samples), workers, pin=machine.gpu), np.arange(len(samples.facts))
-    found = inference.probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
+    found = runs.answers(trained, samples, settings, machine)
     return {"protocol": trained.protocol, **scores(samples.facts, found)}
 
 

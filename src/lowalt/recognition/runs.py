@@ -170,6 +170,15 @@ def _network(scheme: Scheme, state: dict, classes: int, path: str | Path, own: s
     return model
 
 
+def answers(trained: Trained, samples: Samples, settings: dict, machine: Machine) -> np.ndarray:
+    """Return the class probabilities (n, classes) of all samples of a source; settings as in `evaluate`."""
+    batch, threads, _, mirror, workers = inference.evaluation(settings)
+    recipe.seeded(trained.seed, ("evaluate",), threads)
+    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
+    every = np.arange(len(samples.facts))
+    return probabilities(machine.placed(trained.model), samples, every, machine, batch, mirror, ahead)
+
+
 def evaluate(
     trained: Trained, samples: Samples, settings: dict, out: str | Path, trained_on: str = "", more: dict | None = None
 ) -> None:
@@ -179,13 +188,9 @@ def evaluate(
     the run that trained the model, where it is another; more: further entries of the record.
     Under torchrun the ranks share the work and rank 0 writes.
     """
-    batch, threads, precision, mirror, workers = inference.evaluation(settings)
-    recipe.seeded(trained.seed, ("evaluate",), threads)
-    machine = Machine.here(precision)
-    model = machine.placed(trained.model)
-    start = time.monotonic()
-    ahead = ReadAhead(Unchanged(samples), workers, pin=machine.gpu)
-    found = probabilities(model, samples, np.arange(len(samples.facts)), machine, batch, mirror, ahead)
+    _, _, precision, mirror, _ = inference.evaluation(settings)
+    machine, start = Machine.here(precision), time.monotonic()
+    found = answers(trained, samples, settings, machine)
     seconds = time.monotonic() - start
     if machine.rank:
         return

@@ -2,9 +2,7 @@
 
 import json
 
-import jinja2
-
-from lowalt.report.page import TEMPLATES, assembled
+from lowalt.report.page import assembled, templates
 
 
 def _text(value: object) -> str:
@@ -44,9 +42,7 @@ def gallery(runs: dict[str, dict[str, dict]], pages: dict[str, str]) -> str:
         name: {**facts, "configuration": {key: _text(value) for key, value in facts["configuration"].items()}}
         for name, facts in runs.items()
     }
-    loader = jinja2.FileSystemLoader(TEMPLATES)
-    template = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
-    html = template.get_template("gallery.html").render(rows=rows, data=data)
+    html = templates().get_template("gallery.html").render(rows=rows, data=data)
     runs_html, _, compare_html = html.partition("<!-- compare -->")
     parts = [
         {"id": "runs", "title": "Runs", "html": runs_html},

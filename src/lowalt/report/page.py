@@ -66,17 +66,19 @@ The template has the name of its module and lies in the same folder.
 TEMPLATES = Path(__file__).parent
 
 
-def _templates() -> jinja2.Environment:
-    """The templates, which refuse a name that nobody gave them."""
+def templates() -> jinja2.Environment:
+    """Return the templates, which refuse a name that nobody gave them and data that a browser cannot read."""
     loader = jinja2.FileSystemLoader(TEMPLATES)
     environment = jinja2.Environment(loader=loader, autoescape=True, undefined=jinja2.StrictUndefined)
     environment.filters["plotted"] = plotted
+    # JSON has no infinity and no NaN.
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": True, "allow_nan": False}
     return environment
 
 
 def rendered(name: str, values: dict | None) -> str:
     """Return the HTML of the section `name` with these values; None gives an empty text."""
-    return "" if values is None else _templates().get_template(f"sections/{name}.html").render(values)
+    return "" if values is None else templates().get_template(f"sections/{name}.html").render(values)
 
 
 def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
@@ -86,7 +88,7 @@ def assembled(title: str, parts: list[dict[str, str]], script: str = "") -> str:
     """
     drawn = any('<figure class="plot">' in part["html"] for part in parts)
     plots = (script or scripts()) if drawn else ""
-    return _templates().get_template("page.html").render(title=title, parts=parts, plots=plots)
+    return templates().get_template("page.html").render(title=title, parts=parts, plots=plots)
 
 
 def section_page(title: str, name: str, values: dict) -> str:

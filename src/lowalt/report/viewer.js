@@ -127,7 +127,7 @@
   function choose() {
     const mine = data.samples.filter((sample) => sample.subtype === at("subtype").value);
     fill(at("model"), unique(mine.map((sample) => sample.model)).sort((x, y) => x - y));
-    const levels = mine.filter((sample) => String(sample.model) === at("model").value).sort((x, y) => y.level - x.level);
+    const levels = mine.filter((sample) => String(sample.model) === at("model").value);
     fill(at("snr"), levels.map((sample) => sample.snr));
     show();
   }

@@ -146,7 +146,8 @@ def samples(
     numbers = chosen(shards, predicted_keys(files), unseen)
     shares = probabilities(files, {shards.keys[number].decode() for number in numbers}, shards.classes)
     names = [station.name for station in shards.renderer.network.stations]
-    spectra, held, motions, total = len(shards.spectra), [], {}, 0
+    spectra, motions, total = len(shards.spectra), {}, 0
+    held: list[tuple[float, dict]] = []
     for number in numbers:
         whole, record = shards.tile(number), shards.record(number)
         tile = reduced(whole, spectra, PIXELS, shards.palette)
@@ -158,10 +159,12 @@ def samples(
             motions[name] = motion(clouds[record["subtype"]], row_of(record)[0])
         heard = echoes(remaker.signal(record), record["geometry"], remaker.network) if remaker else []
         snr = f"{record['snr_db']:g} dB" if record["noise"] else "no noise"
-        held.append({
+        held.append((record["snr_db"], {
             "subtype": record["subtype"], "category": record["category"], "model": record["model"],
-            "group": groups.get(record["subtype"], ""), "snr": snr, "level": record["snr_db"], "tile": tile,
+            "group": groups.get(record["subtype"], ""), "snr": snr, "tile": tile,
             "network": reduced(whole, spectra, pixels, shards.palette), "echoes": heard,
             "probabilities": shares.get(record["key"], {}),
-        })  # fmt: skip
-    return {"samples": held, "motions": motions, "classes": list(shards.classes), "stations": names}
+        }))  # fmt: skip
+    # The clearest sample of a motion model first, as the page lists them.
+    clearest = [sample for _, sample in sorted(held, key=lambda pair: -pair[0])]
+    return {"samples": clearest, "motions": motions, "classes": list(shards.classes), "stations": names}

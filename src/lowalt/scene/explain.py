@@ -40,7 +40,7 @@ class ExplainedSample(NamedTuple):
 
     cloud: Cloud
     row: dict
-    occluders: dict
+    occluders: dict | None
 
 
 class Finding(NamedTuple):
@@ -106,7 +106,11 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
         cloud = make(record, inputs, config["seed"])
         rng = stream(config["seed"], "motion", name, model)
         row = draw(rng, cloud, record["published"], masts, corners, config["motion"])
-        surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
+        try:
+            surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
+        except InputError:
+            # A target without surfaces is refused where the scene, or a trial, hides points behind them.
+            surfaces = None
         row = {**row, "group": record["published"]["unseen_protocol"], "model": model}
         result.append(ExplainedSample(cloud, row, surfaces))
     return result

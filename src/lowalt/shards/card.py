@@ -134,6 +134,7 @@ def description(shards: ShardSet) -> str:
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
     images = len(shards.columns())
+    example = shards.shards[0]["path"] if shards.shards else "SHARD.tar"
     first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
     return f"""---
 {yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip()}
@@ -156,7 +157,7 @@ import datasets
 samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
 
 import webdataset
-for sample in webdataset.WebDataset("seen-train-00000.tar", shardshuffle=False).decode("pil"):
+for sample in webdataset.WebDataset("{example}", shardshuffle=False).decode("pil"):
     print(sample["__key__"], sample["json"]["category"], sample["{MEMBERS[shards.kind]}"])
 
 from lowalt.shards import ShardSet

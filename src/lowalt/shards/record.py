@@ -48,13 +48,16 @@ def encoded(content: dict) -> bytes:
 
     Raises: ValueError for any other number that is not finite.
     """
-    snrs = content["snr_db"] if isinstance(content["snr_db"], list) else [content["snr_db"]]
-    texts = ["1e999" if snr == math.inf else json.dumps(snr, allow_nan=False) for snr in snrs]
-    said = f"[{','.join(texts)}]" if isinstance(content["snr_db"], list) else texts[0]
-    names = [json.dumps(name) + ":" for name in content]
-    values = [said if name == "snr_db" else json.dumps(value, separators=(",", ":"), allow_nan=False)
-              for name, value in content.items()]  # fmt: skip
-    return ("{" + ",".join(map(str.__add__, names, values)) + "}").encode()
+
+    def number(snr: float) -> str:
+        """One SNR as a number of JSON."""
+        return "1e999" if snr == math.inf else json.dumps(snr, allow_nan=False)
+
+    snr_db = content["snr_db"]
+    texts = {name: json.dumps(value, separators=(",", ":"), allow_nan=False)
+             for name, value in content.items() if name != "snr_db"}  # fmt: skip
+    texts["snr_db"] = f"[{','.join(map(number, snr_db))}]" if isinstance(snr_db, list) else number(snr_db)
+    return ("{" + ",".join(f'"{name}":{texts[name]}' for name in content) + "}").encode()
 
 
 def versions() -> dict[str, str]:

@@ -11,7 +11,6 @@ from typing import BinaryIO
 
 from lowalt.files.errors import InputError
 
-BLOCK = 512
 RECORD = 10240
 
 
@@ -25,7 +24,7 @@ def member(name: str, data: bytes) -> bytes:
     info.uname = info.gname = "bigdata"
     if len(name.encode()) > 100:
         raise InputError(f"shard member {name!r}: longer than the 100 bytes of a tar header")
-    return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % BLOCK)
+    return info.tobuf(tarfile.USTAR_FORMAT) + data + bytes(-len(data) % tarfile.BLOCKSIZE)
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ class Writer:
         offset, places = self.size, {}
         parts: list[bytes] = []
         for name, content in sorted({"json": record, extension: data}.items()):
-            start = offset + sum(map(len, parts)) + BLOCK
+            start = offset + sum(map(len, parts)) + tarfile.BLOCKSIZE
             places[name] = (start, len(content))
             parts.append(member(f"{key}.{name}", content))
         span = b"".join(parts)
@@ -67,6 +66,6 @@ class Writer:
 
     def close(self) -> str:
         """Write the end of the archive; return the SHA-256 of the whole file in hexadecimal."""
-        end = self.size + 2 * BLOCK
-        self._put(bytes(2 * BLOCK + -end % RECORD))
+        end = self.size + 2 * tarfile.BLOCKSIZE
+        self._put(bytes(2 * tarfile.BLOCKSIZE + -end % RECORD))
         return self._hash.hexdigest()

@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator
 from pathlib import Path
+from tarfile import BLOCKSIZE
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from lowalt.files.errors import InputError
 from lowalt.shards import manifest, sums
 from lowalt.shards.index import load
 from lowalt.shards.table import map_samples, table_path
-from lowalt.shards.tar import BLOCK
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
@@ -89,7 +89,7 @@ def _locate(path: Path, samples: np.ndarray, expected: int, found: int) -> Itera
                 named = True
         file.seek(end)
         rest = file.read()
-    if rest.strip(b"\0") or len(rest) < 2 * BLOCK:
+    if rest.strip(b"\0") or len(rest) < 2 * BLOCKSIZE:
         yield "the end of the archive is damaged"
     elif not named:
         yield "SHA-256 differs"

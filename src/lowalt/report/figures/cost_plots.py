@@ -4,6 +4,8 @@ import math
 
 from lowalt.report.plots import Plot
 
+NAMES_BELOW = (30, -24, -44, 30, 48)
+"""Pixels by which the names of the front's points stand below these, in turn, so that neighbours do not meet."""
 _PER_NAME = {"content": "data"}
 _BELOW = {"orient": "bottom", "title": None, "columns": 6}
 
@@ -26,7 +28,7 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
             "scheme": row["scheme"], "core_s": float(row["core_s_training"]), "front": row["front"],
             "accuracy_percent": float(row["unseen_percent"]), "low": first + float(row["low"]),
             "high": first + float(row["high"]), "told": kinds[0] if row is known[0] else kinds[1 if held else 2],
-            "side": named.index(row) % 4 if row in named else -1,
+            "side": named.index(row) % len(NAMES_BELOW) if row in named else -1,
         })  # fmt: skip
     x = {"field": "core_s", "type": "quantitative", "title": "core-seconds of a training", "scale": {"type": "log"}}
     y = {"field": "accuracy_percent", "type": "quantitative", "title": "accuracy, unseen subtypes (%)",
@@ -42,8 +44,8 @@ def recognition(rows: list[dict[str, str]]) -> Plot:
         {"mark": {"type": "point", "filled": True, "size": 70, "opacity": 1, "tooltip": _PER_NAME},
          "encoding": {"color": colour}},
         *({"transform": [{"filter": f"datum.side == {side}"}],
-           "mark": {"type": "text", "align": "left", "dx": -6, "dy": (30, -24, -44, 30)[side]},
-           "encoding": {"text": {"field": "scheme", "type": "nominal"}}} for side in range(4)),
+           "mark": {"type": "text", "align": "left", "dx": -6, "dy": below},
+           "encoding": {"text": {"field": "scheme", "type": "nominal"}}} for side, below in enumerate(NAMES_BELOW)),
     ]  # fmt: skip
     words = "accuracy on unseen subtypes over the core-seconds of a training, with 95 % intervals of the difference"
     spec = {"width": 720, "height": 340, "encoding": {"x": x, "y": y}, "layer": layers}
@@ -72,7 +74,7 @@ def echo(measured: list[dict[str, str]]) -> Plot:
     encoding = {**axes, "color": {"field": "method", "type": "nominal", "legend": _BELOW}, "shape": distance}
     order = list(dict.fromkeys(row["target"] for row in rows))
     spec = {"facet": {"field": "target", "title": None, "sort": order}, "columns": 4,
-            "spec": {"width": 240, "height": 220, "mark": {"type": "point", "tooltip": _PER_NAME}, "encoding": encoding,
+            "spec": {"width": 190, "height": 220, "mark": {"type": "point", "tooltip": _PER_NAME}, "encoding": encoding,
                      "params": [{"name": "zoom", "select": "interval", "bind": "scales"}]}}  # fmt: skip
     return Plot("echo_cost", "time of an echo signal over its error, by method, distance and target", spec, rows)
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from lowalt.recognition.predictions import Predictions, read
+from lowalt.recognition.predictions import Predictions, read, record
+from lowalt.recognition.protocols import folds
 from lowalt.report.run import ReportedRun
 
 ACCURACY = ("protocol", "scheme", "subtype", "category", "accuracy_percent")
@@ -47,11 +48,14 @@ def reasons(found: Predictions, classes: tuple[str, ...]) -> dict[str, str]:
 
 
 def values(run: ReportedRun) -> dict | None:
-    """Return the pivoted table, the worst subtype first, distances and reasons; None where nothing was predicted."""
+    """Return the pivoted table, the worst subtype of the last column first, distances and reasons; None without any."""
     columns, rows = subtype_table(run.inputs.table("subtypes", *ACCURACY))
     distances = {row["subtype"]: row for row in run.inputs.table("distances", *DISTANCES)}
-    rows.sort(key=lambda row: min(map(float, row[2].values())))
+    rows.sort(key=lambda row: float([*row[2].values()][-1]))
     files = run.inputs.paths("predictions") if "predictions" in run.inputs else []
     # The last training is of the protocol and the scheme that the configuration names last.
-    told = reasons(read(files[-1], run.shards.classes), run.shards.classes) if files else {}
+    told = {}
+    if files:
+        tested = folds(record(files[-1])["protocol"], "test")
+        told = reasons(read(files[-1], run.shards.classes).of(tested), run.shards.classes)
     return {"columns": columns, "rows": rows, "distances": distances, "reasons": told, "worst": WORST} if rows else None
