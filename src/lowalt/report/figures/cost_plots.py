@@ -4,7 +4,7 @@ import math
 
 from lowalt.report.plots import Plot
 
-NAMES_BELOW = (30, -24, -44, 30, 48)
+NAMES_BELOW = (30, -24, -44, 30, 48, -24)
 """Pixels by which the names of the front's points stand below these, in turn, so that neighbours do not meet."""
 _PER_NAME = {"content": "data"}
 _BELOW = {"orient": "bottom", "title": None, "columns": 6}
