@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 from craft import craft, row
+from dataset import build
 from lowalt.motion import positions
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report import viewer, viewer_echoes
 from lowalt.report.figures.style import embedded
 from lowalt.report.page import assembled, rendered
+from lowalt.shards import ShardSet
 from lowalt.shards.record import sample_key
 from lowalt.tiles.png import encode
 from pages import browsed, sound
@@ -162,3 +164,14 @@ def test_power_and_phase_come_back_from_their_bytes():
     assert power[3:].tolist() == [0, 0] and set(base64.b64decode(viewer_echoes.power(0 * signal))) == {0}
     phase = np.frombuffer(base64.b64decode(viewer_echoes.phase(signal)), np.uint8)
     assert phase[:3].tolist() == [0, 64, 128]
+
+
+def test_the_clearest_sample_of_a_motion_model_stands_first_and_a_browser_can_read_all_of_them(tmp_path):
+    shards = ShardSet(build(tmp_path, "image") / "index.json")
+    found = viewer.samples(shards, None, {}, [], {}, 16)
+    levels = {}
+    for sample in found["samples"]:
+        levels.setdefault((sample["subtype"], sample["model"]), []).append(sample["snr"])
+    assert len(levels) > 3 and all(snrs[0] == "no noise" for snrs in levels.values() if "no noise" in snrs)
+    assert max(map(len, levels.values())) > 1
+    json.dumps(found, allow_nan=False)

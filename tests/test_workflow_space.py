@@ -39,6 +39,16 @@ def test_a_job_leaves_the_bytes_of_its_arrays(rule, more, kind, expected):
     assert space.written("cloud", {"subtype": "crow"}, PLAN, config) == 0
 
 
+def test_the_shards_of_a_fold_share_its_bytes():
+    small = CONFIG | {"shards": {"kind": "image", "largest_mb": 20}}
+    plan, wildcards = Plan.of(small, PUBLISHED), CHUNK | {"fold": "train"}
+    pieces = plan.pieces("seen-00001", "train")
+    whole = space.written("shard", wildcards, PLAN, CONFIG)
+    assert len(pieces) > 4 and pieces == [f"p{number}" for number in range(len(pieces))]
+    assert len(pieces) * space.written("shard", wildcards, plan, small) == pytest.approx(whole)
+    assert whole / len(pieces) <= 20e6 < whole / (len(pieces) - 1)
+
+
 @pytest.mark.parametrize("there", [0, 1_000_000, 10**9])
 def test_a_run_is_refused_where_its_new_bytes_do_not_fit_and_started_when_told(there, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
