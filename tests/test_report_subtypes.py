@@ -8,7 +8,7 @@ from made_predictions import SUBTYPES, run_files
 
 
 def test_reasons_are_those_of_test_samples_and_the_worst_subtype_stands_first(tmp_path):
-    path, found, guess = run_files(tmp_path, "unseen", "ABC:VRP", 0.6)
+    path, found, _ = run_files(tmp_path, "unseen", "ABC:VRP", 0.6)
     rows = [
         {
             "protocol": "seen",
