@@ -18,7 +18,7 @@ from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.record import sample_key
 from lowalt.shards.table import SAMPLE, map_samples, table_path
-from lowalt.shards.tar import BLOCK, Writer
+from lowalt.shards.tar import Writer
 from lowalt.targets.records import records_of
 from lowalt.tiles.files import Tiles, map_array, npy_header
 
@@ -51,7 +51,7 @@ def test_a_shard_beyond_4_gib_is_written_indexed_and_read(kind, tmp_path, monkey
         path = tmp_path / "late" / shard["path"]
         far, near = map_samples(table_path(path)), map_samples(table_path(tmp_path / "plain" / shard["path"]))
         for name in ("offset", "record_offset", "data_offset"):
-            assert (far[name] - near[name] == HOLE + BLOCK).all()
+            assert (far[name] - near[name] == HOLE + BLOCKSIZE).all()
         with tarfile.open(path) as archive:
             names = archive.getnames()
             assert names[0] == "hole" and len(names) > 1
