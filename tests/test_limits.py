@@ -51,7 +51,7 @@ def test_a_shard_beyond_4_gib_is_written_indexed_and_read(kind, tmp_path, monkey
         path = tmp_path / "late" / shard["path"]
         far, near = map_samples(table_path(path)), map_samples(table_path(tmp_path / "plain" / shard["path"]))
         for name in ("offset", "record_offset", "data_offset"):
-            assert (far[name] - near[name] == HOLE + BLOCKSIZE).all()
+            assert (far[name] - near[name] == HOLE + tarfile.BLOCKSIZE).all()
         with tarfile.open(path) as archive:
             names = archive.getnames()
             assert names[0] == "hole" and len(names) > 1
