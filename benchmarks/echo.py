@@ -1,6 +1,6 @@
 """The echo stage as the workflow runs it, files included.
 
-    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out results/benchmarks/echo_stage.csv]
+    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out echo_stage.csv]
 
 Writes the stage's rate on motion models of mixed subtypes by the real command, with one and with two processes at a
 time; the shares of its time that poses, signals, kernels and correct rounding take; and how it scales with points,
