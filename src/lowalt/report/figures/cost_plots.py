@@ -12,6 +12,7 @@ from lowalt.files.csv_tables import read_csv
 from lowalt.report.plots import Plot, svg
 
 RECOGNITION = ("scheme", "kind", "unseen_percent", "low", "high", "core_s_data", "core_s_training", "front")
+PRESET = ("preset", "command", "macro_f1_low", "macro_f1_high")
 ECHO = ("method", "tolerance", "points", "seconds", "relative_error")
 STORED = 2.0**-24
 """Half a unit of the last place of a stored value (complex64), relative to it."""
@@ -121,7 +122,8 @@ def main(arguments: list[str]) -> None:
     options.add_argument("--figure", required=True, help="picture to write (.svg)")
     given = options.parse_args(arguments)
     draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[given.plot]
-    drawn = svg(draw(read_csv(given.table, *columns)))
+    plot = draw(read_csv(given.table, *columns))
+    drawn = svg(plot._replace(spec={**plot.spec, "background": "white"}))
     with replacing(given.figure) as temporary:
         temporary.write_text(drawn)
 

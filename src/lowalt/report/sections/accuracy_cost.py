@@ -3,8 +3,8 @@
 from lowalt.report.figures import cost_plots
 from lowalt.report.run import ReportedRun
 
-SHOWN = ("preset", "command", "macro_f1_low", "macro_f1_high", "pixels", "train_samples", "steps", "seen_percent",
-         "inference_ms_1", "inference_ms_64", "hardware")  # fmt: skip
+SHOWN = (*cost_plots.PRESET, "pixels", "train_samples", "steps", "seen_percent", "inference_ms_1", "inference_ms_64",
+         "hardware")  # fmt: skip
 
 
 def values(run: ReportedRun) -> dict | None:
