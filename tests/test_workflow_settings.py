@@ -104,17 +104,15 @@ def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
         assert (len(set(told)) > 1) == (stage not in ("images", "index"))
 
 
-def test_tiles_with_range_profiles_follow_the_seed_and_the_snrs():
+def test_tiles_of_range_cells_follow_the_seed_and_the_snrs():
     """Their noise is drawn from both; tiles of signals alone need neither."""
-    job, profiled = (
+    job, cells = (
         Job(run="default", group="seen", part="00000"),
         {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}},
     )
     changes = [{}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}]
-    plain, with_profiles = (
-        [parts({**block, **change})[2].images(job) for change in changes] for block in ({}, profiled)
-    )
-    assert len(set(plain)) == 1 and len(set(with_profiles)) == 3
+    plain, of_cells = ([parts({**block, **change})[2].images(job) for change in changes] for block in ({}, cells))
+    assert len(set(plain)) == 1 and len(set(of_cells)) == 3
 
 
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():

@@ -112,11 +112,11 @@ def panels(renderer: Renderer) -> list[dict]:
     for row, station in enumerate(renderer.network.stations):
         for column, name in enumerate(renderer.spectra):
             axes = axes_of(name, station, renderer)
-            low, high = sorted((axes.bottom_mps, axes.top_mps))
+            low, high = sorted(axes.upwards[1:])
             folds = largest_speed(station.frequency_hz, renderer.network.symbol_interval_s)
             ticks = {
                 key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
-                for key, ends in (("x", (0.0, axes.seconds)), ("y", (low, high)))
+                for key, ends in (("x", axes.across[1:]), ("y", (low, high)))
             }
             found.append(
                 {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
