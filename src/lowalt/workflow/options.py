@@ -28,7 +28,7 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
     return words
 
 
-clouds, fidelity, motion, occluders, powers = map(of_inputs, ("clouds", "fidelity", "motion", "occluders", "powers"))
+clouds, motion, occluders, powers = map(of_inputs, ("clouds", "motion", "occluders", "powers"))
 content = of_inputs("signals", "tiles", "echoes", "powers", "clouds", "occluders")
 """The files that a shard is packed from, by its kind."""
 reduced_chunk = of_inputs("reduced", "motion")

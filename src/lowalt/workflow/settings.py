@@ -126,11 +126,6 @@ class Settings:
         blocks = self._blocks("network", "motion", "seed", "cost")
         return self._text("cost_table", **blocks, published=self._published)
 
-    def cost_pixels(self, wildcards: Any) -> str:
-        """Settings with which the echo is timed, rows of the table of targets, and the images that are compared."""
-        blocks = self._blocks("network", "motion", "spectra", "images", "seed", "cost")
-        return self._text("cost_pixels", **blocks, published=self._published)
-
     def views(self, wildcards: Any) -> str:
         """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""
         size, snrs = int(wildcards.size), self._snrs(wildcards)
