@@ -138,6 +138,12 @@ def test_a_track_is_in_one_fold_whole(dataset):
             chosen = {(rows[number]["subtype"], rows[number]["model"]) for number, _ in
                       select(rows, [3.0, math.inf], plan.split, plan.seed, fold)}  # fmt: skip
             assert chosen == {(place.subtype, place.model) for place in places[fold] if place.group == group}
+    # One track of each subtype is in one fold, however many looks it has.
+    few = Dataset(configuration(models=1), dataset.clouds)
+    for chunk in few.plan.chunks:
+        names = few.plan.chunk(chunk).members
+        dealt = {fold for fold, found in tracks.items() if found & {(name, 0) for name in names}}
+        assert {*few.plan.folds(chunk)} == dealt
 
 
 @pytest.mark.parametrize("which", ["dataset", "logged"])
