@@ -120,6 +120,19 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
     np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [0.46, 0.8, 0.35], rtol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("name", "seen"), [("drum_", "neither rotors nor wheels"), ("wheel_", "both rotors and wheels")]
+)
+def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given(name, seen, tmp_path, capsys):
+    path = folder(tmp_path) / "craft/craft.urdf"
+    path.write_text(urdf().replace("rotor_", name, -1 if name == "drum_" else 6))
+    command = ["target", "new", str(path), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.yaml")]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert seen in error and "--category Vehicle" in error and error.count("\n") == 1
+    assert main([*command, "--category", "UAV"]) == 0
+
+
 def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing_is_left(tmp_path, capsys):
     inputs = folder(tmp_path)
     (inputs / "craft/craft.urdf").write_text(urdf())
@@ -146,6 +159,7 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
     command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
     assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
     path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
+    command.insert(2, "--category=UAV")
     assert main([*command, "a.yaml"]) == 2
     assert f"error: {path}: 4 rotors found, expected --rotors 4 where that is all" in capsys.readouterr().err
     assert main([*command, "a.yaml", "--rotors", "4"]) == 0

@@ -156,6 +156,13 @@ def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(t
     assert draft(path, "--category", "UAV", "--moving", "99")[0] == 2 and "--moving is '99'" in capsys.readouterr().err
 
 
+def test_a_mesh_alone_tells_no_category(tmp_path, capsys):
+    status, out = draft(saved(tmp_path / "lawnmower.obj", hull()))
+    error = capsys.readouterr().err
+    assert status == 2 and not out.exists()
+    assert "lawnmower.obj: its category cannot be seen, expected --category UAV" in error and len(error) < 300
+
+
 def test_a_craft_made_with_another_number_of_rotors_than_its_row_says_so(tmp_path):
     path = saved(tmp_path / "a.obj", hull())
     out = tmp_path / "a.yaml"

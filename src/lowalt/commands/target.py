@@ -23,7 +23,7 @@ from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
 from lowalt.targets.records import load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
-from lowalt.targets.robots import drafted_robot, parts_of, turning, write_parts
+from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
 
 AXES = ("x", "-x", "y", "-y", "z", "-z")
 TABLE = SHIPPED / "config/targets.csv"
@@ -132,8 +132,11 @@ def _target(given: argparse.Namespace, table: dict[str, dict]) -> tuple[str, dic
     if row.get("category") == "Pedestrian":
         raise InputError(f"--subtype is {name!r}, a pedestrian, expected a UAV, a bird or a vehicle")
     if not (row or given.category or is_description(given.file)):
-        raise InputError(f"--subtype is {given.subtype!r}, expected one of {list(table)}, or --category for a row of "
-                         "its own")  # fmt: skip
+        if given.subtype:
+            raise InputError(f"--subtype is {name!r}, expected one of {list(table)}, or --category for a row of its "
+                             "own")  # fmt: skip
+        raise InputError(f"{given.file}: its category cannot be seen, expected --category UAV, --category Bird or "
+                         "--category Vehicle, or --subtype with a published target")  # fmt: skip
     return name, row
 
 
@@ -141,10 +144,8 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
     """The record of a robot's description and the bytes of the GLB of its parts."""
     file = f"{(given.out or given.file).stem}.glb"
     robot = read_robot(given.file, given.inputs)
-    category = row.get("category") or given.category
-    if category is None:
-        category = "Vehicle" if turning(robot, "wheel") and not turning(robot, "rotor") else "UAV"
     try:
+        category = row.get("category") or given.category or category_of(robot)
         joints, triangles = parts_of(robot, MOVING_KIND[category])
     except InputError as error:
         raise InputError(f"{given.file}: {error}") from None
