@@ -104,7 +104,7 @@ def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
     assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(0.21, abs=1e-6)
 
 
-def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
+def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, capsys):
     wheels = "".join(
         f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.06"/>'
         f'</geometry></visual></link><joint name="axle_{index}" type="continuous"><origin xyz="{x} {y} 0.1"/>'
@@ -118,6 +118,10 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
     assert row["category"] == "Vehicle" and row["wheel_diam_m"] == pytest.approx(0.2, rel=0.01)
     assert cloud.kinds == ("body", *("wheel",) * 4)
     np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [0.46, 0.8, 0.35], rtol=0.02)
+    path = tmp_path / "two.urdf"
+    path.write_text((tmp_path / "rover.urdf").read_text().replace("continuous", "fixed", 2))
+    assert main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"]) == 2
+    assert "2 wheels turn, AITO M9 2024 has 4" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -139,6 +139,22 @@ def test_wheels_tell_the_front_of_a_vehicle_that_is_wider_than_long(tmp_path):
     assert np.abs(cloud(path.with_suffix(".yaml")).axes[1:, 0]) == pytest.approx(1)
 
 
+def test_wheels_that_no_name_tells_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((1.2, 2.4, 0.3), (0, 0, 0.4))}
+    for index, (x, y) in enumerate([(0.5, 0.8), (0.5, -0.8), (-0.5, 0.8), (-0.5, -0.8)]):
+        drum = disc((0, 0, 0), 0.2, 0.1).apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+        shapes[f"drum{index}"] = drum.apply_translation((x, y, 0))
+    words = (saved(tmp_path / "rover.obj", shapes), "--category", "Vehicle", "--unit", "m", "--up", "z")
+    assert draft(*words)[0] == 2
+    assert "4 wheels found, expected --wheels 4 where that is all" in capsys.readouterr().err
+    assert draft(*words, "--wheels", "4")[0] == 0
+    assert cloud(tmp_path / "rover.yaml").kinds.count("wheel") == 4
+    bare = saved(tmp_path / "bare.obj", {"hull": shapes["hull"]})
+    assert draft(bare, *words[1:])[0] == 2 and "0 wheels found" in capsys.readouterr().err
+    assert draft(bare, *words[1:], "--wheels", "0")[0] == 0
+
+
 def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shapes = hull() | {f"part{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}

@@ -74,7 +74,8 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         new.add_argument(
             f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
         )
-    new.add_argument("--rotors", type=int, help="number of rotors of a target with a row of its own")
+    new.add_argument("--rotors", "--wheels", type=int, dest="count", metavar="N",
+                     help="number of its rotors or wheels, 0 for none")  # fmt: skip
     new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
                      "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
@@ -156,9 +157,9 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
         path = Path(folder) / file
         write_parts(path, triangles)
         if joints:
-            count = row.get("n_rotors_or_wings", len(joints))
-            if category == "UAV" and count != len(joints):
-                raise InputError(f"{given.file}: {len(joints)} rotors turn, {name} has {count}: leave --subtype out "
+            count, kind = row.get("n_rotors_or_wings", len(joints)), MOVING_KIND[category]
+            if kind != "wing" and count != len(joints):
+                raise InputError(f"{given.file}: {len(joints)} {kind}s turn, {name} has {count}: leave --subtype out "
                                  "for a row of its own, or choose a target with as many")  # fmt: skip
             names = (name, given.file.name, file)
             return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
@@ -171,13 +172,14 @@ def _draft(
     given: argparse.Namespace, path: Path, file: str, name: str, row: dict, category: str, table: dict
 ) -> str:  # fmt: skip
     """The record of a mesh file."""
-    known = row or {"n_rotors_or_wings": given.rotors}
+    count = row.get("n_rotors_or_wings") if given.count is None else given.count
+    known = row | {"n_rotors_or_wings": count}
     found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
     found = replace(found, path=given.file)  # of a description, not the file that its parts lie in for now
     if not found.sides_seen:
         raise InputError(f"{path}: left and right of the bird cannot be seen, expected --up and --front")
     groups = chosen(found, given.moving) if given.moving else found.groups
-    count = known["n_rotors_or_wings"] or (len(groups) if given.moving else None)
+    count = len(groups) if given.moving and count is None else count
     picture = Path(f"{(given.out or given.file).stem}-pieces.png")
     try:
         refuse_miscount(found, groups, count, str(picture))

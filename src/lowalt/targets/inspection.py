@@ -135,8 +135,10 @@ def inspect_mesh(
     up, front = (name and "xyz".index(name[-1]) for name in axes)
     ups = [up] if up is not None else [int(axis) for axis in np.argsort(high - low, kind="stable") if axis != front]
     groups: list[list[Component]] = []
-    if category == "UAV":
-        count = row.get("n_rotors_or_wings")
+    count = row.get("n_rotors_or_wings")
+    if count == 0:
+        pass
+    elif category == "UAV":
         best, groups = rotors(parts, ups, high - low, count)
         up = best if up is None and groups else up
     elif category == "Vehicle":
