@@ -172,6 +172,29 @@ def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(t
     assert draft(path, "--category", "UAV", "--moving", "99")[0] == 2 and "--moving is '99'" in capsys.readouterr().err
 
 
+def without_a_side(shape: trimesh.Trimesh, axis: int) -> trimesh.Trimesh:
+    """A shape without the triangles that lie lowest along an axis."""
+    heights = shape.triangles[:, :, axis]
+    return trimesh.Trimesh(shape.vertices, shape.faces[(heights > heights.min() + 1e-9).any(axis=1)])
+
+
+def test_one_half_of_a_craft_is_refused_and_a_whole_one_on_one_side_of_the_file_s_axes_is_not(tmp_path, capsys):
+    shapes = hull() | {f"rotor{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
+    right = {name: shape for name, shape in shapes.items() if shape.bounds[0, 1] > -1e-9}
+    closed = right | {"hull": box((0.2, 0.06, 0.06), (0, 0.03, 0))}
+    open_half = right | {"hull": without_a_side(closed["hull"], 1)}
+    away = {name: shape.copy().apply_translation([0, 0.3, 0]) for name, shape in open_half.items()}
+    for name, half in (("closed", closed), ("open", open_half), ("away", away)):
+        assert draft(saved(tmp_path / f"{name}.obj", half), "--category", "UAV")[0] == 2
+        assert f"{name}.obj: one half of a target, cut off along y" in capsys.readouterr().err
+    corner = {name: shape.copy().apply_translation([0.23, 0.21, 0.1]) for name, shape in shapes.items()}
+    assert draft(saved(tmp_path / "corner.obj", corner), "--category", "UAV")[0] == 0
+    van = {"hull": without_a_side(box((4, 2, 2)), 0)}
+    words = (saved(tmp_path / "van.obj", van), "--category", "Vehicle", "--unit", "m", "--up", "z", "--wheels", "0")
+    assert draft(*words)[0] == 2 and "or give --front x where" in capsys.readouterr().err
+    assert draft(*words, "--front", "x")[0] == 0
+
+
 def test_a_mesh_alone_tells_no_category(tmp_path, capsys):
     status, out = draft(saved(tmp_path / "lawnmower.obj", hull()))
     error = capsys.readouterr().err

@@ -178,6 +178,9 @@ def _draft(
     found = replace(found, path=given.file)  # of a description, not the file that its parts lie in for now
     if not found.sides_seen:
         raise InputError(f"{path}: left and right of the bird cannot be seen, expected --up and --front")
+    if found.cut:
+        raise InputError(f"{given.file}: one half of a target, cut off along {found.cut}: join it with its mirror "
+                         f"image first, or give --front {found.cut} where a whole one ends flat there")  # fmt: skip
     groups = chosen(found, given.moving) if given.moving else found.groups
     count = len(groups) if given.moving and count is None else count
     picture = Path(f"{(given.out or given.file).stem}-pieces.png")

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial import cKDTree
 
-from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_files import UNITS_M, Mesh, edges_of
 
 USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
@@ -30,6 +30,10 @@ blades have a quarter."""
 
 SYMMETRIC = 0.02
 """Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
+
+IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
+"""A half ends in a plane: distances from it and from the file's zero in parts of the size (at most), and the rectangle
+that its edges there span in parts of that of the extents (at least), in the file's zero and where all are open."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
 """An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
@@ -95,17 +99,42 @@ def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> s
     return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
 
 
-def mirror_axis(points: np.ndarray) -> int | None:
-    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
-    cannot be seen: left and right of a bird."""
-    size = float(np.ptp(points, axis=0).max())
+def _off_mirror(points: np.ndarray) -> np.ndarray:
+    """Mean distance (3,) of a body of points (N, 3) from its mirror image along each axis, in parts of its size."""
     tree, off = cKDTree(points), []
     for axis in range(3):
         mirrored = points.copy()
         mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
-        off.append(float(np.mean(tree.query(mirrored)[0])) / max(size, 1e-300))
+        off.append(float(np.mean(tree.query(mirrored)[0])))
+    return np.array(off) / max(float(np.ptp(points, axis=0).max()), 1e-300)
+
+
+def mirror_axis(points: np.ndarray) -> int | None:
+    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
+    cannot be seen: left and right of a bird."""
+    off = _off_mirror(points)
     best, second = np.sort(off)[:2]
     return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+
+
+def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
+    """Return which of the axes a half of a target is cut along, None where it seems whole.
+
+    points: (N, 3) m on its surface. A half ends flat in one plane, open or in the file's zero, and is not its own
+    mirror image along that axis.
+    """
+    edges, _, uses = edges_of(mesh.faces)
+    ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
+    off, size = _off_mirror(points), extent.max()
+    for axis in axes:
+        for limit in (mesh.vertices[:, axis].min(), mesh.vertices[:, axis].max()):
+            there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
+            if off[axis] < SYMMETRIC or not there.any():
+                continue
+            span = np.prod(np.delete(np.ptp(ends[there].reshape(-1, 3), axis=0) / extent, axis))
+            if (span > CUT and abs(limit) < AT_ZERO * size) or (span > OPEN_CUT and (uses[there] == 1).all()):
+                return axis
+    return None
 
 
 def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
