@@ -57,6 +57,7 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
 
 def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "base").mkdir()
+    (tmp_path / "top").mkdir()
     undeclared = '<surface><fdir1 gz:expressed_in="hull">1 1 0</fdir1></surface></model>'
     (tmp_path / "base/base.sdf").write_text(SDF.replace("</model>", undeclared))
     (tmp_path / "base/model.config").write_text("<model><sdf version='1.9'>base.sdf</sdf></model>")
@@ -67,8 +68,8 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     <child>lift</child><axis><xyz expressed_in="hull">0 0 -2</xyz></axis></joint>
     <plugin><jointName>lift_rotor</jointName><turningDirection>ccw</turningDirection></plugin>
     <include><name>eye</name><uri>base</uri><pose>0 0 5 0 0 0</pose></include></model></sdf>"""
-    (tmp_path / "top.sdf").write_text(top)
-    found, triangles = joints(tmp_path / "top.sdf", tmp_path)
+    (tmp_path / "top/top.sdf").write_text(top)
+    found, triangles = joints(tmp_path / "top/top.sdf", tmp_path)
     assert set(found) == {"pusher", "lift", "eye pusher"}
     # The link's own turn by a quarter about y takes its z, and the joint's shift along it, to the front.
     np.testing.assert_allclose(found["pusher"].hinge, [-0.28, 0, 1], atol=1e-9)
@@ -79,7 +80,7 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     np.testing.assert_allclose(triangles["pusher"].mean(axis=(0, 1))[:2], [-0.3, 0], atol=1e-9)
     np.testing.assert_allclose(np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3)
     assert triangles["body"].reshape(-1, 3)[:, 1].max() == pytest.approx(0.3)  # the aileron is held
-    words = [str(tmp_path / "top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
+    words = [str(tmp_path / "top/top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
     assert main(["target", "new", *words]) == 0
     parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
     assert parts["lift"]["sense"] == "cw"  # anticlockwise about an axis that points down

@@ -244,6 +244,36 @@ def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(factor, word
     assert re.search(words, error)
 
 
+def test_a_bird_as_long_as_a_bridge_is_asked_for_its_unit(tmp_path, capsys):
+    path = bird(tmp_path, 0.3)
+    assert draft(path, "--category", "Bird", "--size", "717")[0] == 2
+    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in capsys.readouterr().err
+    assert not path.with_suffix(".yaml").exists()
+
+
+def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((0.2, 0.12, 0.06))}
+    for index, (x, y) in enumerate(HUBS):
+        for side in (-1, 1):
+            shape = box((0.1, 0.01, 0.004), (side * 0.055, 0, 0))
+            shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4 * (index == 0), [0, 0, 1]))
+            shapes[f"blade{index}{side}"] = shape.apply_translation([x, y, 0.06])
+    path = saved(tmp_path / "craft.obj", shapes)
+    assert draft(path, "--category", "UAV")[0] == 2
+    assert "5 rotors found, expected --rotors 5 where that is all" in capsys.readouterr().err
+    assert draft(path, "--category", "UAV", "--rotors", "4")[0] == 0
+
+
+def test_motors_without_propellers_are_no_rotors(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((0.2, 0.12, 0.06))}
+    for kind, status in (("part", 0), ("MotorMount.", 2)):
+        found = shapes | {f"{kind}{index}": disc((x, y, 0.02)) for index, (x, y) in enumerate(HUBS)}
+        assert draft(saved(tmp_path / f"{kind}.obj", found), "--category", "UAV", "--rotors", "4")[0] == status
+    assert "0 rotors found, expected 4" in capsys.readouterr().err
+
+
 def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:
     """A bird longer or shorter than its span, its wings bent down from 4 cm out; `lean` moves them apart."""
     shapes = {"trunk": trimesh.creation.icosphere(3)}

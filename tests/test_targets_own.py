@@ -211,6 +211,7 @@ def test_groups_of_an_obj_and_instances_of_a_scene_have_names(tmp_path):
         (["new", "{folder}/craft.stl", "--subtype", "Crow", "--inputs", "{folder}/other"], "expected --inputs with it"),
         (["new", "{folder}/craft.stl", "--subtype", "Walking Pedestrian 1", "--inputs", "{folder}"], "a pedestrian"),
         (["inspect", "{folder}/nothing.stl"], "no file at"),
+        (["new", "{folder}/nothing.stl", "--subtype", "Crow", "--inputs", "{folder}"], "no file at"),
         (["make", "{folder}/two.yaml", "--inputs", "{folder}"], "--subtype is None, expected one of"),
         (["show", "{folder}/craft.stl"], "not a cloud file"),
     ],

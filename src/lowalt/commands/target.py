@@ -17,7 +17,7 @@ from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
-from lowalt.targets.guesses import box_of
+from lowalt.targets.guesses import UNUSUAL, USUAL_M, box_of
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
@@ -207,18 +207,21 @@ def _new(given: argparse.Namespace) -> str:
     name, row = _target(given, table)
     if given.size_m is not None and not 0 < given.size_m < 1e6:
         raise InputError(f"--size is {given.size_m}, expected metres")
-    try:
-        file = existing(given.file, "mesh or description").resolve().relative_to(given.inputs.resolve()).as_posix()
-    except ValueError:
-        raise InputError(
-            f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it"
-        ) from None
+    path = existing(given.file, "mesh or description").resolve()
+    if not path.is_relative_to(given.inputs.resolve()):
+        raise InputError(f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it")
+    file = path.relative_to(given.inputs.resolve()).as_posix()
     if is_description(given.file):
         text, data = _robot(given, name, row, table)
     else:
         text = _draft(given, given.file, file, name, row, row.get("category") or given.category, table)
     record = yaml.safe_load(text)[name]
     cells = record.pop("row", None)
+    if cells:
+        (low, high), size = USUAL_M[cells["category"]], cells.get("len_m", cells.get("size_m"))
+        if not low / UNUSUAL < size < high * UNUSUAL:
+            raise InputError(f"{given.file}: measures {size:.4g} m in the unit {record['unit']!r}, expected {low} to "
+                             f"{high} m for a {cells['category']}: give --unit or --size")  # fmt: skip
     merge(with_row(None, name, cells, "draft") if cells else row, record, f"draft: {name}")
     moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
     glb = given.inputs / f"{(given.out or given.file).stem}.glb"

@@ -115,7 +115,8 @@ def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
     kind = MOVING_KIND[found.category]
-    named = bool(groups) and all(TURNING[kind].search(part.piece) for group in groups for part in group)
+    named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
+    named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
     if kind == "wing" or (named if count is None else len(groups) == count):
         return
     unknown = f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"

@@ -13,6 +13,9 @@ from lowalt.targets.mesh_files import UNITS_M, Mesh, edges_of
 USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
 
+UNUSUAL = 20
+"""A target of a row of its own is at most so many times smaller or larger than that."""
+
 
 ALIKE = 0.1
 """Pieces whose extents differ by at most this share are of one kind, such as the four propellers of a craft."""
@@ -57,6 +60,9 @@ TURNING = {
     "wing": re.compile(r"wing", re.I),
 }
 """Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
+
+FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|guard|duct)", re.I)
+"""Words in the names of pieces that do not turn."""
 
 
 @dataclass(frozen=True)
@@ -232,6 +238,9 @@ def rotors(
     for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
         flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
+        flat = (
+            [part for part in flat if not FIXED.search(part.piece)] if len({part.piece for part in parts}) > 1 else flat
+        )
         sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
         sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in sets]
         found = _alike_set(sets, up, whole, count)
