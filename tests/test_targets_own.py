@@ -91,7 +91,7 @@ def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
     wheels = [part for part in found.components if part.guess]
     assert {part.guess for part in wheels} == {"wheel"} and len(wheels) == 4
     assert sorted(tuple(np.sign(part.centre[:2])) for part in wheels) == [(-1, -1), (-1, 1), (1, -1), (1, 1)]
-    assert described(found).count("may be a wheel") == 4
+    assert described(found).count("may be a wheel") == 4 and "category Vehicle" in described(found)
 
 
 @pytest.mark.parametrize(

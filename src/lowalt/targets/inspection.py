@@ -179,6 +179,7 @@ def described(found: Inspection, most: int = 30) -> str:
     """Return an inspection as text, at most `most` components, the largest and those with a guess first."""
     lines = [
         f"{found.path}: {found.triangles} triangles, {len(found.components)} connected components",
+        f"category {found.category} (give --category where it is another)",
         f"unit     {found.unit} ({found.unit_from})",
         f"extent   {_size(found.high - found.low)} m along x, y, z, from {np.round(found.low, 4).tolist()} to "
         f"{np.round(found.high, 4).tolist()}",
