@@ -63,6 +63,9 @@ def sample_bytes(config: dict) -> int:
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     else:
         data = 128 + 8 * stations * config["network"]["symbols"]
+    if kind == "cube":
+        # The truth of a symbol takes some 60 bytes of the record.
+        data = data * config["network"]["subcarriers"] + 60 * stations * config["network"]["symbols"]
     whole = 2 * BLOCKSIZE + RECORD_BYTES + data + -data % BLOCKSIZE
     return whole // len(snrs_of(config)) if kind == "recipe" else whole
 

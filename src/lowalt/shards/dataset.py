@@ -25,8 +25,9 @@ from lowalt.motion.sample import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
-from lowalt.shards.record import accompanied, npy, record, sample_key
+from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
+from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import records_of
 
@@ -175,10 +176,10 @@ class Dataset:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
         return self.maker.signal(self.row(place), place.snr_db)
 
-    def made_record(self, place: Place) -> bytes:
-        """Return the JSON record of a sample."""
+    def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
+        """Return the JSON record of a sample; cubes: what it tells of each station's cube."""
         row, told = self.row(place), self._fold(place)
-        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes)
+        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes, cubes)
 
     def made(self, place: Place) -> Sample:
         """Return a sample by its group, subtype, motion model and SNR.
@@ -213,12 +214,16 @@ class Dataset:
         return json.loads(self.made_record(self.place(number)))
 
     def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
-        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", or "signal" and
-        "recipe", which hold the same)."""
+        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", "cube", or
+        "signal" and "recipe", which hold the same)."""
         place = self.place(number)
-        signal = self.made_signal(place)
-        data = self.maker.png(signal, self.row(place), place.snr_db) if kind == "image" else npy(signal)
-        return self.made_record(place), data
+        data, told = self.maker.data(kind, self.made_signal(place), self.row(place), place.snr_db)
+        return self.made_record(place, told), data
+
+    def cubes(self, number: int) -> list[Cube]:
+        """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and the truth."""
+        place = self.place(number)
+        return self.maker.cubes(self.row(place), place.snr_db, self.made_signal(place))
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""
