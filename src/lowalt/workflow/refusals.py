@@ -29,7 +29,7 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
     keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"),
             ("motion", "track"))  # fmt: skip
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
-    paths |= {f"{block}.{key}": config[block].get(key) for block, key in keys}
+    paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
