@@ -26,7 +26,7 @@ RANGES = ((0, 200), (200, 300), (300, 400), (400, 600))
 SCENES = {
     "empty air": ({}, SNRS),
     "town": ("config/scenes/urban.yaml", SNRS),
-    "air, absolute powers": ({"mean_cross_section": {}, "receiver_noise": {}}, (np.inf,)),
+    "absolute powers": ({"mean_cross_section": {}, "receiver_noise": {}}, (np.inf,)),
 }
 COLUMNS = (
     "scene", "class", "snr_db", "range_m", "false_alarm", "looks", "detected_percent", "low", "high",
@@ -99,7 +99,7 @@ def picture(rows: list[list], path: Path) -> None:
             panel.set(title=f"{category}, {name}", ylim=(-3, 103))
     figure.supxlabel("false alarms in a look of one second without a target")
     figure.supylabel("looks in which the target is detected (%)")
-    panels[0, 0].legend(title="SNR of a symbol", fontsize=7)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), title="SNR of a symbol", loc="outside right")
     figure.savefig(path, dpi=90)
 
 
