@@ -92,14 +92,13 @@ def test_files_of_plots_repeat_and_hold_their_rows(plots, tmp_path):
 
 
 def test_names_inside_a_plot_are_its_own_and_do_not_tell_what_was_drawn_before(plots):
-    named = [plots["accuracy_over_snr"], plots["accuracy_over_snr"]._replace(name="others")]
+    cut = {"mark": {"type": "line", "clip": True}, "encoding": {key: {"field": key} for key in ("x", "y")}}
+    clipped = plots["echo_cost"]._replace(spec=cut, rows=[{"x": 1, "y": 2}, {"x": 2, "y": 3}])
+    named = [clipped, clipped._replace(name="others")]
     first, second = (re.findall(r'<clipPath id="(.*?)"', svg(plot)) for plot in named)
-    assert (
-        first[0] == "accuracy_over_snr-clip1"
-        and [name.replace("accuracy_over_snr", "others") for name in first] == second
-    )
+    assert first[0] == "echo_cost-clip1" and [name.replace("echo_cost", "others") for name in first] == second
     assert {f"url(#{name})" for name in first} == set(re.findall(r"url\(#.*?\)", svg(named[0])))
-    assert svg(named[0]).replace("accuracy_over_snr-clip", "others-clip") == svg(named[1])
+    assert svg(named[0]).replace("echo_cost-clip", "others-clip") == svg(named[1])
 
 
 def test_a_name_cannot_end_the_script_that_holds_it():

@@ -16,13 +16,14 @@ import numpy as np
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan
+from lowalt.config.plan import GROUPS, Plan, motion_block
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.motion.sample import draw, region_polygon
-from lowalt.numerics.streams import stream
+from lowalt.motion.sample import region_polygon
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
 from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
@@ -112,6 +113,9 @@ class Dataset:
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
+        self._motion = motion_block(located(config))
+        self._path = path_of(self._motion, self._corners, self._masts)
+        self._drawn: tuple[tuple, list[dict]] = (), []
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
@@ -155,15 +159,17 @@ class Dataset:
 
     def _fold(self, place: Place) -> str:
         """Fold of a sample."""
-        return fold(self.plan.split, self.plan.seed, place.subtype, place.model, place.snr_db)
+        return fold(self.plan.split, self.plan.seed, place.subtype, place.model // self.plan.looks, place.snr_db)
 
     def row(self, place: Place) -> dict:
         """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
-        rng = stream(self.plan.seed, "motion", place.subtype, place.model)
-        published, settings = self.published[place.subtype], self.config["motion"]
-        cloud = self.clouds[place.subtype]
-        row = draw(rng, cloud, published, self._masts, self._corners, settings)
-        row = {**row, "group": place.group, "model": place.model}
+        track, look = divmod(place.model, self.plan.looks)
+        name = place.subtype, track
+        # The looks of a track are drawn together, and most often asked for one after the other.
+        if self._drawn[0] != name:
+            sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
+            self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
+        row = {**self._drawn[1][look], "group": place.group, "model": place.model}
         return accompanied(row, self.config["effects"], self.plan.seed)
 
     def made_signal(self, place: Place) -> np.ndarray:

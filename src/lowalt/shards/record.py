@@ -14,10 +14,13 @@ from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
+from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
 from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.tiles.files import npy_header
+
+NAMES = ("subtype", "category", "group", "model")
 
 
 def snr_label(snr_db: float) -> str:
@@ -107,11 +110,11 @@ def record(
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
-    targets in the beam, the record has it too; the label is the row's own target's. classes: in the order of their
-    labels; cubes: what is told of each station's cube (`of_cubes`). Raises: InputError where the row's category is no
-    class.
+    targets in the beam, the record has it too; the label is the row's own target's. A row of a track adds its track
+    and look. classes: in the order of their labels; cubes: what is told of each station's cube (`of_cubes`).
+    Raises: InputError where the row's category is no class.
     """
-    names = ("subtype", "category", "group", "model")
+    names = NAMES + TRACK * (TRACK[0] in row)
     motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
     added = {"companions": list(row["companions"])} if "companions" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
@@ -174,7 +177,7 @@ def row_of(entry: dict) -> tuple[dict, float]:
     if "noise" not in entry:
         made_by = entry.get("versions", {}).get("lowalt", "an unknown version")
         raise InputError(f"sample {entry.get('key')}: record of lowalt {made_by}, expected of 0.2 or later")
-    names = ("subtype", "category", "group", "model")
+    names = NAMES + TRACK * (TRACK[0] in entry)
     snr_db = entry["snr_db"] if entry["noise"] else math.inf
     return {**{name: entry[name] for name in names}, **entry["motion"]}, snr_db
 

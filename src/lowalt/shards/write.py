@@ -44,7 +44,7 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
             # A measured sample's row names its fold; a simulated sample's fold is drawn.
-            dealt = row.get("fold") or fold(split, seed, row["subtype"], row["model"], snr_db)
+            dealt = row.get("fold") or fold(split, seed, row["subtype"], row.get("track", row["model"]), snr_db)
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
     return [(number, level) for _, number, level in sorted(chosen)]

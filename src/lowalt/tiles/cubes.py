@@ -24,31 +24,34 @@ class Cubes:
 
     def __init__(
         self, scene: Scene, clouds: Mapping[str, Cloud], occluders: dict | None = None, every_cell: bool = False,
-        kept: int = 3,
+        empty: bool = False, kept: int = 3,
     ) -> None:  # fmt: skip
         """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides points behind them.
 
-        every_cell: whether noise at the samples' SNRs is an effect of the scene (`set_noise.in_all_cells`).
+        every_cell: whether noise at the samples' SNRs is an effect of the scene (`set_noise.in_all_cells`); empty:
+        whether the targets reflect nothing, so that noise and land alone are left.
         """
         self.scene, self.clouds, self.occluders = scene, clouds, occluders or {}
-        self.every_cell, self.kept = every_cell, kept
+        self.every_cell, self.empty, self.kept = every_cell, empty, kept
         self._clean: dict[tuple, tuple] = {}
 
     @classmethod
-    def from_settings(cls, settings: dict, clouds: Mapping[str, Cloud], occluders: dict | None = None) -> "Cubes":
+    def from_settings(
+        cls, settings: dict, clouds: Mapping[str, Cloud], occluders: dict | None = None, empty: bool = False
+    ) -> "Cubes":
         """Build from a settings object with exactly seed, network, tolerance and effects.
 
         Raises: InputError naming the key and value that is missing, unknown or out of range.
         """
         seed, network, tolerance, effects = pick(settings, "seed", "network", "tolerance", "effects")
         scene = Scene(Network.from_settings(network), seed, tolerance, tuple(called(effects)))
-        return cls(scene, clouds, occluders, in_all_cells(effects))
+        return cls(scene, clouds, occluders, in_all_cells(effects), empty)
 
-    def of(self, row: dict, snr_db: float, station: Station, signal: np.ndarray) -> Cube:
+    def of(self, row: dict, snr_db: float, station: Station, signal: np.ndarray | None = None) -> Cube:
         """Return the cube of a row of the motion table at a station and an SNR (dB).
 
-        signal: the sample's noisy signal (N,) complex64 at this station, which is what the chosen cells hold; the noise
-        of the other cells has the same power and a stream of its own for each subtype, model, station and SNR.
+        signal: the sample's noisy signal (N,) complex64 at this station, which is what the chosen cells then hold; the
+        noise of the other cells has the same power and a stream of its own for each subtype, model, station and SNR.
         Raises: InputError naming the sample that cannot be computed.
         """
         clean, chosen, truth, power_w = self._seen(row, snr_db, station)
@@ -59,9 +62,10 @@ class Cubes:
             for effect in self.scene.effects:
                 noise = effect.module.filtered(effect.settings, noise) if effect.name == "canceller" else noise
             cells = (clean + noise).astype(np.complex64)
-        there = np.flatnonzero(chosen >= 0)
         cells[chosen < 0] = 0
-        cells[there, chosen[there]] = signal[there]
+        if signal is not None:
+            there = np.flatnonzero(chosen >= 0)
+            cells[there, chosen[there]] = signal[there]
         return Cube(cells, chosen, truth)
 
     def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
@@ -82,7 +86,8 @@ class Cubes:
         received, sampling = sample.received(), sample.view.sampling
         there = slice(None) if sampling is None else sampling.present
         cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
-        cells[there] = sample.filtered(sample.detection)
+        seen = sample.without_target() if self.empty else sample
+        cells[there] = seen.filtered(sample.detection)
         own = np.full(len(cells), -1)
         own[there] = sample.own_cell()
         return cells, received.cell, np.column_stack([truth(sample), own]), received.power

@@ -57,6 +57,10 @@ class DataProducts:
         """Name of the chunk whose motion and echoes a chunk uses: its own, or the one that it adds SNRs to."""
         return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
 
+    def track(self, wildcards: Any) -> list[str]:
+        """The flight log whose path motion models follow; none where paths are drawn."""
+        return [self._config["motion"]["track"]] if "track" in self._config["motion"] else []
+
     def group_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of a group's subtypes, in the table's order."""
         return self._of_group("clouds", wildcards)

@@ -26,9 +26,10 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 
 def refuse_braces(config: dict, inputs: str | None) -> None:
     """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
-    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"))
+    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"),
+            ("motion", "track"))  # fmt: skip
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
-    paths |= {f"{block}.{key}": config[block][key] for block, key in keys}
+    paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
@@ -121,6 +122,7 @@ def refuse_missing(config: dict) -> None:
     backbone, colon, _ = network["backbone"].rpartition(":")
     files = {
         "inputs": [config["inputs"]],
+        "motion.track": [config["motion"].get("track")],
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
         "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],

@@ -8,7 +8,7 @@ from typing import Any
 
 from lowalt.config.layers import canonical
 from lowalt.config.network import as_far_as, masts_m
-from lowalt.config.plan import Chunk
+from lowalt.config.plan import Chunk, motion_block
 from lowalt.files.shipped import as_named
 from lowalt.motion.sample import masts_in_reach
 from lowalt.scene.lateness import timed
@@ -16,8 +16,8 @@ from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra.catalogue import of_cells
 from lowalt.workflow.run import Run
 
-MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m")
-"""Keys of the block `motion` that decide what is drawn; the last one may be left out."""
+MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m", "looks", "look_s", "track")
+"""Keys of the block `motion` that decide what is drawn; from `sizes_m` on they may be left out."""
 
 
 class Settings:
@@ -64,7 +64,7 @@ class Settings:
 
     def motion(self, wildcards: Any) -> str:
         """Data that a chunk's motion models are drawn from: region, masts in its reach, ranges of its subtypes."""
-        block, members = self._config["motion"], self._chunk(wildcards).members
+        block, members = motion_block(self._config), self._chunk(wildcards).members
         return self._text(
             "motion", members,
             seed=self._config["seed"],
