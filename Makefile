@@ -124,12 +124,11 @@ style:
 	$(BIN)/snakefmt --check Snakefile workflow
 	$(BIN)/snakemake --lint
 
-cost: $(SETUP)  ## time of the echo over its accuracy, up to 1600 points: results/cost/cost.csv and cost.png
-	$(SNAKEMAKE) --configfile config/cost/echo.yaml -- cost
+cost: $(SETUP)  ## error of the echo over its time: results/default/cost.csv and cost.svg
+	$(SNAKEMAKE) -- cost
 
-accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .png
-	for order in 1 2 3; do $(SNAKEMAKE) --configfile config/cost/fidelity.yaml config/cost/fidelity-1e-$$order.yaml -- models || exit 1; done
-	$(SNAKEMAKE) --configfile config/cost/fidelity.yaml -- results/fidelity-exact/transfer.csv
+accuracy-cost: $(SETUP)  ## recognition accuracy over time, three trainings a row: results/default/accuracy_cost.csv and .svg
+	$(MAKE) --no-print-directory study NAME=heights
 	$(SNAKEMAKE) --configfile config/cost/accuracy.yaml -- accuracy_cost
 
 study:  ## a study of studies/: make study NAME=rotors
@@ -142,7 +141,10 @@ check-bytes: $(SETUP)  ## rebuild each data set that has a manifest in results/r
 # Of runs that are finished: tables, manifests and pictures. What changed, git shows.
 reference: $(SETUP)  ## keep tables, manifests and pictures of finished runs
 	for run in default real; do for table in $(TABLES); do cp results/$$run/$$table results/reference/$$run-$$table 2>/dev/null || true; done; done
-	for end in csv png; do cp results/default/accuracy_cost.$$end results/reference/default-accuracy_cost.$$end 2>/dev/null || true; done
+	for table in cost accuracy_cost; do cp results/default/$$table.csv results/reference/default-$$table.csv 2>/dev/null || true; done
+	$(BIN)/python -m lowalt.report.figures.cost_plots echo --table results/reference/default-cost.csv --figure design/pictures/cost.svg
+	$(BIN)/python -m lowalt.report.figures.cost_plots recognition --table results/reference/default-accuracy_cost.csv --figure design/pictures/accuracy_cost.svg
+	$(BIN)/python -m lowalt.report.documents docs/results.md presets=results/reference/default-
 	for run in default tiny; do test ! -e results/$$run/shards || \
 		$(BIN)/python -m lowalt.shards.manifest write --run results/$$run --manifest results/reference/$$run.sha256 || exit 1; done
 	$(BIN)/python -m lowalt.measure.scale --stages results/reference/default-stages.csv --costs results/reference/default-accuracy_cost.csv \

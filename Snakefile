@@ -88,13 +88,12 @@ rule models:
 rule cost:
     input:
         f"results/{RUN.name}/cost.csv",
-        f"results/{RUN.name}/cost_pixels.csv",
-        f"results/{RUN.name}/cost.png",
+        f"results/{RUN.name}/cost.svg",
     localrule: True
 
 
 rule accuracy_cost:
     input:
         f"results/{RUN.name}/accuracy_cost.csv",
-        f"results/{RUN.name}/accuracy_cost.png",
+        f"results/{RUN.name}/accuracy_cost.svg",
     localrule: True

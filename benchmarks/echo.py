@@ -1,13 +1,10 @@
-"""The echo against other methods, and the echo stage as the workflow runs it, files included.
+"""The echo stage as the workflow runs it, files included.
 
-    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out results/benchmarks/echo.csv]
+    python benchmarks/echo.py --clouds results/default/clouds/*.npz [--models 2000] [--out echo_stage.csv]
 
-Writes echo.csv (columns COLUMNS): one cloud of each category, resampled to 31, 185 and 400 points, at 200 m. Times are
-medians of five calls, forty of the engine, with all methods in turn. Ratios are to other methods in the same run, and
-both sides include geometry and gains.
-Writes echo_stage.csv in the same folder: the stage's rate on motion models of mixed subtypes by the real command, with
-one and with two processes at a time; the shares of its time that poses, signals, kernels and correct rounding take; and
-how it scales with points, symbols, stations and cores. A process has one thread; run it on a quiet machine.
+Writes the stage's rate on motion models of mixed subtypes by the real command, with one and with two processes at a
+time; the shares of its time that poses, signals, kernels and correct rounding take; and how it scales with points,
+symbols, stations and cores. A process has one thread; run it on a quiet machine.
 """
 
 import argparse
@@ -38,26 +35,10 @@ from lowalt.numerics.streams import stream
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.records import load_table
 
-COLUMNS = (
-    "method", "category", "points", "tolerance", "seconds_a_sample", "relative_error", "proved_bound",
-    "ratio_to_finufft", "ratio_to_direct", "hardware",
-)  # fmt: skip
 PAPER = 240_000
 """Motion models of the paper, each seen by three stations."""
 CHUNK = 1000
 """Models a job: 50 of each of a protocol's 20 subtypes, in the default's chunks and in the paper's."""
-
-
-def tables(config: dict, clouds: list[Cloud], repeats: int, direct: bool) -> list[dict]:
-    """Rows of echo.csv: the first cloud of each category."""
-    first = list({cloud.category: cloud for cloud in reversed(clouds)}.values())
-    block = {
-        "motion": config["motion"], "seed": 1, "distances_m": [200.0], "points": [31, 185, 400], "repeats": repeats,
-        "tolerances": [1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-9], "direct_distances_m": [200.0],
-        "direct_repeats": repeats if direct else 0,
-    }  # fmt: skip
-    rows = cost.measure(Network.from_settings(config["network"]), first, load_table("config/targets.csv"), block)
-    return [{name: (row | {"seconds_a_sample": row["seconds"]})[name] for name in COLUMNS} for row in rows]
 
 
 def models(config: dict, clouds: list[Cloud], count: int) -> list[dict]:
@@ -165,22 +146,17 @@ def scaling(config: dict, cloud: Cloud) -> list[dict]:
 
 
 def main() -> None:
-    """Run both parts and write both tables."""
+    """Measure the stage and write the table."""
     line = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     line.add_argument("--clouds", nargs="+", required=True)
     line.add_argument("--config", default="config/default.yaml")
     line.add_argument("--models", type=int, default=2000)
-    line.add_argument("--repeats", type=int, default=5)
-    line.add_argument("--no-direct", action="store_true", help="leave out the direct sum, seconds a call")
-    line.add_argument("--stage-only", action="store_true", help="write echo_stage.csv alone")
-    line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo.csv"))
+    line.add_argument("--out", type=Path, default=Path("results/benchmarks/echo_stage.csv"))
     given = line.parse_args()
     config, clouds = load_yaml(given.config), [read(path) for path in given.clouds]
     lacking = set(load_table("config/targets.csv")) - {cloud.subtype for cloud in clouds}
     if lacking:
         raise SystemExit(f"--clouds: no cloud of {sorted(lacking)}, expected all subtypes (`make data`)")
-    if not given.stage_only:
-        write_csv(given.out, COLUMNS, tables(config, clouds, given.repeats, not given.no_direct))
     rows = models(config, clouds, given.models)
     everyone = list(config["network"]["stations"])
     first = {cloud.category: cloud for cloud in reversed(clouds)}
@@ -203,10 +179,9 @@ def main() -> None:
     result += [{"what": f"inside the stage, 1 process: {name[:-2]}", "seconds": value, "share": value / alone}
                for name, value in spent.items()]  # fmt: skip
     result[-1]["what"] += f", {again} of {symbols} symbols computed again"
-    path = given.out.with_name("echo_stage.csv")
     columns = ("what", "seconds", "models_per_s", "paper_minutes", "share", "hardware")
-    write_csv(path, columns, [row | {"hardware": cost.hardware()} for row in result])
-    print(path.read_text(), end="")
+    write_csv(given.out, columns, [row | {"hardware": cost.hardware()} for row in result])
+    print(given.out.read_text(), end="")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,6 @@ from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import Rigid, echo_signal, refine
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import BelowFloor
-from lowalt.measure.echo_baselines import judge
 from lowalt.measure.echo_cost import hardware
 from lowalt.numerics.streams import stream
 
@@ -64,6 +63,37 @@ def scene(seed: int, index: int) -> tuple[Network, Station, Rigid, np.ndarray, n
     translation = path[:, None] + rng.normal(scale=size / 5, size=(parts, 3))
     motion = Rigid(rotation, translation, points, rng.integers(0, parts, count))
     return network, station, motion, rng.exponential(size=count), path[0]
+
+
+def judge(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, n: int) -> np.ndarray:
+    """All cells (M,) of symbol n by plain sums over array elements and subcarriers, ranges in extended precision."""
+    wide = np.longdouble
+    place = np.array(station.position_m, wide)
+    turned = (motion.rotation[n, motion.part].astype(wide) * motion.points[:, None, :].astype(wide)).sum(axis=2)
+    offset = (motion.translation[n, motion.part].astype(wide) - place) + turned
+    kappa = wide(station.frequency_hz) / wide(network.carrier_hz)
+    sine, cosine = np.sin(wide(station.normal_rad)), np.cos(wide(station.normal_rad))
+
+    def look(d):
+        """Return range and both direction cosines of vectors d (..., 3) from the station."""
+        r = np.sqrt((d * d).sum(axis=-1))
+        return r, (cosine * d[..., 1] - sine * d[..., 0]) / r, d[..., 2] / r
+
+    r, psi, omega = look(offset)
+    _, psi0, omega0 = look(np.asarray(aim_m, wide) - place)
+    gain = np.ones(len(r), complex)
+    for counts in (network.transmit, network.receive):
+        for number, cosines in zip(counts, (psi - psi0, omega - omega0), strict=True):
+            step = (kappa * cosines / 2).astype(float)
+            gain *= np.exp(2j * np.pi * np.outer(np.arange(number), step)).sum(axis=0)
+    light = wide(299792458)
+    start, step = 2 * wide(station.frequency_hz) * r / light, 2 * wide(network.subcarrier_spacing_hz) * r / light
+    start, step = (start - np.rint(start)).astype(float), (step - np.rint(step)).astype(float)
+    amplitude = np.sqrt(rcs_m2) / ((4 * np.pi) ** 1.5 * r.astype(float) ** 2) * SPEED_OF_LIGHT / network.carrier_hz
+    wave = amplitude * gain * np.exp(-2j * np.pi * start)
+    y = np.exp(-2j * np.pi * np.outer(np.arange(network.subcarriers), step)) @ wave
+    elements = np.prod(network.transmit) * np.prod(network.receive)
+    return np.sqrt(network.power / elements) * np.fft.ifft(y)
 
 
 def examine(seed: int, index: int) -> list[dict]:

@@ -16,10 +16,8 @@ NEEDED = """
 config.layers: --settings, --out
 echo.__main__: --settings, --motion, --clouds, --station, --out
 scene.__main__: --settings, --motion, --clouds, --station, --out, --power
-measure.accuracy_cost: --settings, --predictions, --speeds, --index, --out
+measure.accuracy_cost: --settings, --predictions, --speeds, --data-jobs, --index, --presets, --out
 measure.echo_cost: --settings, --clouds, --out
-measure.echo_pixels: --settings, --table, --clouds, --out
-measure.hard_cases: --out
 measure.scale: --stages, --costs, --schema, --base, --overlays, --out
 motion.__main__: --settings, --clouds, --group, --first, --count, --out
 noise.__main__: --settings, --motion, --echoes, --out
@@ -31,8 +29,7 @@ recordings.__main__ pairs: --out, --inputs
 recordings.__main__ recognise: --out, --inputs, --models
 recordings.download: --out
 report.__main__: --settings, --manifest, --stages, --figures, --out
-report.figures.accuracy_cost: --table, --figure
-report.figures.echo_cost: --table, --pixels, --figure
+report.figures.cost_plots: plot, --table, --figure
 report.figures.house: --figure
 report.measured: --pairs, --tables, --page
 shards.__main__ index: --settings, --shards, --out

@@ -44,8 +44,9 @@ def test_a_target_of_known_speed_stands_at_that_speed_on_the_axes(name, speed):
         axes = axes_of(name, station, render)
         rows = images[3 * number + column][:, 100].astype(int)
         place = (np.flatnonzero(rows == rows.max()).mean() + 0.5) / len(rows)
-        assert axes.top_mps + (axes.bottom_mps - axes.top_mps) * place == pytest.approx(speed, abs=0.1)
-        assert axes.seconds == pytest.approx((400 - (256 if name == "vrp" else 8)) * 2.5e-3)
+        _, bottom, top = axes.upwards
+        assert top + (bottom - top) * place == pytest.approx(speed, abs=0.1)
+        assert axes.across[2] == pytest.approx((400 - (256 if name == "vrp" else 8)) * 2.5e-3)
 
 
 def test_sample_writes_the_bytes_of_the_data_set_and_a_picture(tmp_path, capsys):

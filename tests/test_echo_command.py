@@ -15,7 +15,6 @@ from lowalt.echo.__main__ import main
 from lowalt.echo.scene import Rigid, target
 from lowalt.files.errors import InputError
 from lowalt.measure import echo_baselines
-from lowalt.measure.echo_cost import COLUMNS, rows_of, sample
 from lowalt.motion import poses, positions, write_table
 from lowalt.targets.cloud import write
 
@@ -120,22 +119,3 @@ def test_the_non_uniform_transform_is_asked_once_for_all_symbols_and_for_the_acc
         assert found.tolist() == 6 * [1]
     assert [settings["eps"] for _, settings in asked] == [1e-9, 1e-3] and places == 12 * [4]
     assert asked[0] == ((1, (NETWORK["subcarriers"],)), {"eps": 1e-9, "isign": 1, "nthreads": 1})
-
-
-def test_the_cost_table_has_every_method_and_its_error():
-    network = Network.from_settings(NETWORK)
-    published = {"vx_abs_max": 5, "vy_abs_max": 5, "vz_abs_max": 2, "freq_lo_hz": 60, "freq_hi_hz": 100}
-    motion = {
-        "region": {"polygon_m": [[0, -400], [400, -400], [400, 400], [0, 400]], "mast_clearance_m": 10.0},
-        "height_m": {"UAV": [30, 150]}, "tilt_deg": 20.0, "cadence": "free",
-    }  # fmt: skip
-    given = sample(craft(), published, network, motion, 1, 150.0, 40)
-    assert len(given[1]) == 40
-    assert np.linalg.norm(given[2] - [0, 0, 25]) == pytest.approx(150)
-    block = {"repeats": 1, "direct_repeats": 1, "tolerances": [1e-3, 1e-9]}
-    pytest.importorskip("finufft")
-    rows = rows_of(network, craft(), given, 150.0, 1, block)
-    assert all(set(row) == set(COLUMNS) for row in rows) and len(rows) == 7
-    for line in rows:
-        allowed = line["tolerance"] if isinstance(line["tolerance"], float) else 1e-10
-        assert line["relative_error"] < max(allowed, 1e-10) and line["seconds"] > 0

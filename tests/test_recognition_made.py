@@ -22,10 +22,11 @@ from lowalt.scene import chunk
 from lowalt.shards import maker
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
+from lowalt.spectra import NAMES
 from lowalt.workflow import options
 from test_dataset import configuration
 
-SIZE, COLUMNS = 24, [0, 2, 4, 6]
+SIZE, COLUMNS = 24, [0, 2, len(NAMES), len(NAMES) + 2]
 """Views by the catalogue, whose spectra are four: images 0, 2, 3 and 5 of a data set with the first three."""
 ONE_OF_EACH = ["DJI Mini 2", "Crow", "AITO M9 2024", "Walking Pedestrian 1", "Owl"]
 
@@ -111,7 +112,7 @@ def test_what_a_made_training_rests_on_is_in_its_identity(run, pair):
     changed = DatasetSamples(other, COLUMNS, folds, SIZE, placed=False).sha256()
     assert same[0] == same[1] != changed
     with pytest.raises(InputError, match="3 stations, the scheme needs"):
-        DatasetSamples(other, [12], folds, SIZE, placed=False)
+        DatasetSamples(other, [3 * len(NAMES)], folds, SIZE, placed=False)
     with pytest.raises(InputError, match="no samples"):
         DatasetSamples(other, [0], set(), SIZE, placed=False)
 
@@ -151,7 +152,7 @@ def test_only_the_stations_that_a_scheme_sees_are_computed(run, effects, monkeyp
     assert (one[1] == whole[1]).all() and not one[[0, 2]].any()
 
 
-def test_all_stations_are_asked_for_range_profiles(run):
+def test_all_stations_are_asked_for_range_cells(run):
     dataset = opened(run / "config.yaml")
     assert stations_of(dataset.maker, [3, 5]) == [1]
     assert stations_of(dataset.maker, [0, 2, 3]) == [0, 1]

@@ -1,7 +1,6 @@
 """What accuracy costs in time: fronts, paired differences and extrapolation by construction; times that add up."""
 
 import csv
-import io
 import itertools
 import json
 
@@ -9,13 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
 
 from lowalt.files.errors import InputError
 from lowalt.measure import accuracy_cost, network_speed
 from lowalt.recognition import predictions, samples, schemes, statistics
-from lowalt.recognition.evaluated import Evaluated
-from lowalt.report.figures.accuracy_cost import draw
 
 SNRS = (3.0, np.inf)
 HEAD = ",".join((*schemes.COLUMNS, *schemes.OPTIONAL))
@@ -37,7 +33,7 @@ def test_points_without_a_cost_are_on_no_front():
 
 
 def run_of(folder, name, wrong, count=40, seed=0, took=12.5):
-    """Predictions of 40 motion models of unseen and 40 of seen subtypes, the first `wrong` of each called wrong."""
+    """The file of predictions of 40 motion models of unseen and of seen subtypes, the first `wrong` called wrong."""
     columns = {"group": np.repeat(["unseen", "seen"], 2 * count), "fold": np.full(4 * count, "test")}
     model = np.tile(np.arange(count).repeat(2), 2)
     label = model % 4
@@ -52,7 +48,7 @@ def run_of(folder, name, wrong, count=40, seed=0, took=12.5):
     path.with_suffix(".json").write_text(json.dumps(
         {"protocol": "unseen", "scheme": name, "seed": seed, "hardware": "here", "steps": 30, "train_samples": 77,
          "train_processor_s": took}))  # fmt: skip
-    return Evaluated(path)
+    return str(path)
 
 
 def speed_of(folder, name, fast):
@@ -60,113 +56,94 @@ def speed_of(folder, name, fast):
     path.write_text(json.dumps(
         {"scheme": name, "size": 24, "parameters": 99, "inference_ms_1": 2 * fast, "inference_ms_64": fast,
          "train_ms": 3.0, "batch": 8, "steps": 1000, "backbone": "x", "hardware": "here"}))  # fmt: skip
-    return path
+    return str(path)
+
+
+def written(folder, predictions, speeds, presets=()):
+    """The table's rows by scheme, as the command writes them from files."""
+    (folder / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
+    (folder / "presets.csv").write_text("\n".join((",".join(accuracy_cost.PRESETS), *presets)) + "\n")
+    (folder / "job.jsonl").write_text('{"cpu_time": 1}\n{"cpu_time": 5.5}\n')
+    stations = {name: {"position_m": [0, 0, 25], "normal_deg": 0} for name in "ABC"}
+    shards = [{"samples": 4}, {"samples": 7}]
+    (folder / "index.json").write_text(json.dumps({"shards": shards, "render": {"network": {"stations": stations}}}))
+    accuracy_cost.main([
+        "--settings", json.dumps({"seed": 1}), "--predictions", *predictions, "--speeds", *speeds, "--data-jobs",
+        str(folder / "job.jsonl"), str(folder / "job.jsonl"), "--index", str(folder / "index.json"), "--presets",
+        str(folder / "presets.csv"), "--schemes", str(folder / "schemes.csv"), "--out", str(folder / "out.csv"),
+    ])  # fmt: skip
+    with (folder / "out.csv").open(newline="") as file:
+        return {row["scheme"]: row for row in csv.DictReader(file)}
 
 
 @pytest.fixture
-def table(tmp_path):
-    (tmp_path / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
-    (tmp_path / "transfer.csv").write_text(
-        "protocol,scheme,trained_on,snr_db,accuracy_percent,own_percent,difference_points,low,high,samples,hardware,"
-        "seeds,spread_points\nseen,ABC,rough,avg,50,60,-10,-12,-8,80,here,2,0.4\n"
-        "unseen,ABC,rough,avg,70,71,-1,-2,0.5,80,here,2,0.3\n"
-    )
-    runs = [
-        run_of(tmp_path, name, wrong, seed=seed, took=took)
-        for name, wrong, seed, took in (
-            ("small", 9, 5, 12.0),
-            ("base", 4, 0, 1.0),
-            ("small", 11, 2, 13.0),
-            ("base", 4, 1, 1.0),
-        )
-    ]
-    speeds = accuracy_cost.read_speeds(
-        [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
-    )
-    timed = accuracy_cost.entries(tmp_path / "schemes.csv", "ABC", speeds, 280000.0)
-    out = tmp_path / "accuracy_cost.csv"
-    fidelity = accuracy_cost.fidelity_rows(tmp_path / "transfer.csv")
-    accuracy_cost.write(runs, ["base", "small", "large"], timed, fidelity, out, 1)
-    with out.open(newline="") as file:
-        return list(csv.DictReader(file))
+def speeds(tmp_path):
+    return [speed_of(tmp_path, name, ms) for name, ms in (("base", 4.0), ("small", 1.0), ("large", 90.0))]
 
 
-def test_accuracy_differences_and_costs_are_those_put_in(table):
-    base, small, large, rough = (row for row in table if row["snr_db"] == "avg")
-    assert [row["kind"] for row in (base, small, large, rough)] == ["trained", "trained", "timed", "fidelity"]
-    assert (float(base["unseen_percent"]), float(small["unseen_percent"])) == (90.0, 75.0)
-    assert (float(base["seen_percent"]), float(small["seen_percent"])) == (90.0, 75.0)
-    assert (float(base["difference_points"]), float(small["difference_points"])) == (0.0, -15.0)
+def test_accuracy_differences_and_costs_are_those_put_in(tmp_path, speeds):
+    study = tmp_path / "mine-study/predictions"
+    study.mkdir(parents=True)
+    trainings = (("small", 9, 5, 12.0), ("base", 4, 0, 1.0), ("small", 11, 2, 13.0), ("base", 4, 1, 1.0))
+    paths = [run_of(tmp_path, name, wrong, seed=seed, took=took) for name, wrong, seed, took in trainings]
+    paths += [run_of(study, "ABC with more", 0, seed=seed, took=90.0) for seed in (3, 4)]
+    presets = ["best,both,make best,study/predictions", "quick,small,make small,"]
+    rows = written(tmp_path, paths, speeds, presets)
+    assert list(rows) == ["base", "small", "both", "large"]
+    base, small, both, large = rows.values()
+    assert [row["kind"] for row in rows.values()] == ["trained", "trained", "trained", "timed"]
+    assert [float(row["unseen_percent"]) for row in (base, small, both)] == [90.0, 75.0, 100.0]
+    assert [float(row["seen_percent"]) for row in (base, small, both)] == [90.0, 75.0, 100.0]
+    assert [float(row["difference_points"]) for row in (base, small, both)] == [0.0, -15.0, 10.0]
     assert -40 < float(small["low"]) < -15 < float(small["high"]) < 5
+    assert float(small["macro_f1_low"]) < 75 < float(small["macro_f1_high"])
     assert [row["seeds"] for row in (base, small)] == ["2", "2"]
     # 72.5 and 77.5 % of the two trainings.
-    assert (base["spread_points"], float(small["spread_points"])) == ("0", pytest.approx(12.5**0.5, rel=1e-5))
+    assert (float(base["spread_points"]), float(small["spread_points"])) == (0, pytest.approx(12.5**0.5, abs=1e-3))
     assert (base["low"], base["high"]) == ("0", "0")
     assert (small["stations"], small["spectra"], small["network_bytes"]) == ("A", "VT", str(24**2))
     assert (small["steps"], small["train_samples"], float(small["core_s_training"])) == ("30", "77", 12.5)
+    # Two jobs took 5.5 s each for eleven samples, a second a sample; one station of three is a third of that.
+    assert [float(row["core_s_data"]) for row in (base, small, both)] == pytest.approx([77, 77 / 3, 77], rel=1e-5)
     assert [float(row["train_ms"]) for row in (base, small, large)] == [3.0] * 3
-    assert (base["front"], small["front"]) == ("yes", "yes")
+    assert [row["front"] for row in (base, small, both, large)] == ["yes", "yes", "yes", ""]
+    told = [(row["preset"], row["command"]) for row in rows.values()]
+    assert told == [("", ""), ("quick", "make small"), ("best", "make best"), ("", "")]
     # A thousand steps of eight samples, three milliseconds each; no accuracy for what was not trained.
-    assert float(large["core_s_training"]) == pytest.approx(24.0)
-    assert large["unseen_percent"] == large["seen_percent"] == large["front"] == ""
-    assert (rough["scheme"], float(rough["high"])) == ("ABC trained on rough", 0.5)
-    assert (rough["seeds"], rough["spread_points"]) == ("2", "0.3")
-    assert [row["snr_db"] for row in table[:3]] == ["3", "inf", "avg"]
+    assert float(large["core_s_training"]) == pytest.approx(24.0) and large["unseen_percent"] == ""
 
 
-def written(folder, runs):
-    """The table's rows of trainings of the first two schemes."""
-    (folder / "schemes.csv").write_text("\n".join((HEAD, *ROWS)) + "\n")
-    speeds = accuracy_cost.read_speeds([speed_of(folder, name, ms) for name, ms in (("base", 4.0), ("small", 1.0))])
-    timed = accuracy_cost.entries(folder / "schemes.csv", "ABC", speeds, 280000.0)
-    accuracy_cost.write(runs, ["base", "small"], timed, [], folder / "out.csv", 1)
-    with (folder / "out.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def test_the_table_is_the_same_in_whatever_order_the_trainings_come(tmp_path):
+def test_the_table_is_the_same_in_whatever_order_the_trainings_come(tmp_path, speeds):
     """An interval draws trainings by their place, so they are put in the order of their seeds first."""
     wrong = {"base": (4, 25, 13), "small": (9, 31, 2)}
-    runs = [
+    paths = [
         run_of(tmp_path, name, count, seed=seed) for name, counts in wrong.items() for seed, count in enumerate(counts)
     ]
-    tables = [written(tmp_path, order) for order in (runs, runs[::-1], [*runs[3:], *runs[:3]])]
+    tables = [written(tmp_path, order, speeds) for order in (paths, paths[::-1], [*paths[3:], *paths[:3]])]
     assert tables[0] == tables[1] == tables[2]
 
 
-def test_schemes_of_one_training_have_an_interval_and_no_spread(tmp_path):
-    rows = written(tmp_path, [run_of(tmp_path, "base", 4), run_of(tmp_path, "small", 10)])
-    (small,) = [row for row in rows if (row["scheme"], row["snr_db"]) == ("small", "avg")]
+def test_schemes_of_one_training_have_an_interval_and_no_spread(tmp_path, speeds):
+    small = written(tmp_path, [run_of(tmp_path, "base", 4), run_of(tmp_path, "small", 10)], speeds)["small"]
     assert (small["seeds"], small["spread_points"]) == ("1", "")
     # Six of 40 motion models more are called wrong: 15 points.
     assert float(small["low"]) < float(small["difference_points"]) == -15.0 < float(small["high"]) <= 0
 
 
-def test_a_network_takes_in_its_images_and_no_more():
-    assert accuracy_cost._input_bytes(schemes.Scheme("x", (0,), (0, 1)), 24) == 2 * 24 * 24
-
-
-def test_runs_without_speed_or_row_are_refused(table, tmp_path):
-    run, order = run_of(tmp_path, "base", 0), ["base", "small", "large"]
-    with pytest.raises(InputError, match="base"):
-        accuracy_cost.write([run], order, {}, [], tmp_path / "out.csv", 1)
-    with pytest.raises(InputError, match="stranger"):
-        accuracy_cost.write([run_of(tmp_path, "stranger", 0)], order, {}, [], tmp_path / "out.csv", 1)
-    several = [run_of(tmp_path, "base", 0, seed=seed) for seed in (0, 1)] + [run_of(tmp_path, "small", 0)]
+def test_trainings_presets_and_measurements_that_do_not_fit_are_refused(tmp_path, speeds):
+    base = run_of(tmp_path, "base", 0)
+    with pytest.raises(InputError, match=r"schemes\.csv: no row for \['stranger'\]"):
+        written(tmp_path, [run_of(tmp_path, "stranger", 0)], speeds)
     with pytest.raises(InputError, match=r"'base': 2, 'small': 1.*expected as many seeds of each"):
-        accuracy_cost.write(several, order, {"base": None, "small": None}, [], tmp_path / "out.csv", 1)
+        written(tmp_path, [base, run_of(tmp_path, "base", 0, seed=1), run_of(tmp_path, "small", 0)], speeds)
+    with pytest.raises(InputError, match=r"presets: scheme 'small', expected one of \['base'\]"):
+        written(tmp_path, [base], speeds, ["quick,small,make small,"])
     (tmp_path / "bad.json").write_text("{}")
     with pytest.raises(InputError, match=r"bad\.json: not a record of speed"):
-        accuracy_cost.read_speeds([tmp_path / "bad.json"])
-
-
-def test_the_figure_is_a_picture_and_repeats(table):
-    first = draw(table)
-    assert first == draw(table)
-    pixels = np.asarray(Image.open(io.BytesIO(first)).convert("L"))
-    assert pixels.min() < 100 < 250 < pixels.max()
-    with pytest.raises(InputError, match="no trained row"):
-        draw([row for row in table if row["kind"] != "trained"])
+        written(tmp_path, [base], [str(tmp_path / "bad.json")])
+    with pytest.raises(InputError, match=r"bad\.json: not an extended benchmark file"):
+        accuracy_cost.sample_seconds([tmp_path / "bad.json"], 1)
+    assert not (tmp_path / "out.csv").exists()
 
 
 def test_a_network_is_timed_on_images_of_all_values():

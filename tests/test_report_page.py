@@ -30,8 +30,7 @@ def test_a_run_without_own_costs_shows_the_kept_ones_and_says_so(kept):
         assert "This run did not measure it" in " ".join(text.split()) and "make " in text
         parts.append({"id": name, "title": name, "html": text})
     tables = {table["caption"]: table for table in sound(assembled("kept", parts)).tables}
-    methods = {row[0] for row in tables["Simulation: time and error by method"]["rows"]}
-    assert {"engine", "FINUFFT"} <= methods and "Recognition: accuracy and its times" in tables
+    assert "Recognition: accuracy and its times" in tables
 
 
 def test_a_run_s_own_table_goes_before_the_kept_one(kept):

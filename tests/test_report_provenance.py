@@ -15,7 +15,7 @@ SCHEMA, BASE = "workflow/schemas/config.schema.yaml", "config/default.yaml"
 OTHERS = (
     {"run": "other", "network": {"stations": {"C": None, "tower": {"position_m": [250, 400, 30], "normal_deg": 270}}}},
     {"noise": {"snr_db": [3.0, float("inf")]}, "recognition": {"seeds": [0, 1], "network": {"backbone": "resnet18"}}},
-    {"effects": {"clutter": {}, "phase_noise": {}}, "spectra": {"vt": None}, "report": {"cost": False}},
+    {"effects": {"clutter": {}, "phase_noise": {}}, "spectra": {"vt": None}},
 )
 
 

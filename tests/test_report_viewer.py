@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from chain import SPECTRA, WAVE
 from craft import craft, row
 from dataset import build
 from lowalt.motion import positions
@@ -20,8 +21,10 @@ from lowalt.shards import ShardSet
 from lowalt.shards.record import sample_key
 from lowalt.tiles.png import encode
 from pages import browsed, sound
-from test_report_cost import IMAGES, NETWORK, SPECTRA
 
+STATIONS = {"A": {"position_m": [0, 0, 25], "normal_deg": 0}, "B": {"position_m": [400, 0, 25], "normal_deg": 180}}
+NETWORK = WAVE | {"stations": STATIONS}
+IMAGES = {"size": 16, "scale": "decibel", "floor_db": 40.0, "gamma": 1.0, "colour_map": "viridis"}
 LEVELS = (3.0, 8.0, 13.0, float("inf"))
 
 
@@ -82,7 +85,7 @@ def page():
     vt = panels[2]
     assert (vt["low"], vt["high"]) == (-6.0, 6.0) and set(vt["y"]) <= set(np.arange(-6.0, 6.5, 0.5))
     # Fewer symbols than the signal has: a window of 4 of 24, 2.5 ms apart.
-    assert vt["seconds"] == pytest.approx(20 * 2.5e-3) and max(vt["x"]) <= vt["seconds"]
+    assert vt["right"] == pytest.approx(20 * 2.5e-3) and max(vt["x"]) <= vt["right"]
     tile = [
         embedded(encode(np.arange(32 * 48, dtype=np.uint8).reshape(32, 48) * step, renderer.images.palette))
         for step in (0, 1)

@@ -57,6 +57,7 @@ def test_a_urdf_s_rotors_turn_about_their_joints_without_a_question(tmp_path):
 
 def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     (tmp_path / "base").mkdir()
+    (tmp_path / "top").mkdir()
     undeclared = '<surface><fdir1 gz:expressed_in="hull">1 1 0</fdir1></surface></model>'
     (tmp_path / "base/base.sdf").write_text(SDF.replace("</model>", undeclared))
     (tmp_path / "base/model.config").write_text("<model><sdf version='1.9'>base.sdf</sdf></model>")
@@ -67,8 +68,8 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     <child>lift</child><axis><xyz expressed_in="hull">0 0 -2</xyz></axis></joint>
     <plugin><jointName>lift_rotor</jointName><turningDirection>ccw</turningDirection></plugin>
     <include><name>eye</name><uri>base</uri><pose>0 0 5 0 0 0</pose></include></model></sdf>"""
-    (tmp_path / "top.sdf").write_text(top)
-    found, triangles = joints(tmp_path / "top.sdf", tmp_path)
+    (tmp_path / "top/top.sdf").write_text(top)
+    found, triangles = joints(tmp_path / "top/top.sdf", tmp_path)
     assert set(found) == {"pusher", "lift", "eye pusher"}
     # The link's own turn by a quarter about y takes its z, and the joint's shift along it, to the front.
     np.testing.assert_allclose(found["pusher"].hinge, [-0.28, 0, 1], atol=1e-9)
@@ -79,7 +80,7 @@ def test_an_sdf_s_includes_frames_and_joint_poses_are_followed(tmp_path):
     np.testing.assert_allclose(triangles["pusher"].mean(axis=(0, 1))[:2], [-0.3, 0], atol=1e-9)
     np.testing.assert_allclose(np.ptp(triangles["pusher"].reshape(-1, 3), axis=0), [0.01, 0.2, 0.2], atol=1e-3)
     assert triangles["body"].reshape(-1, 3)[:, 1].max() == pytest.approx(0.3)  # the aileron is held
-    words = [str(tmp_path / "top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
+    words = [str(tmp_path / "top/top.sdf"), "--inputs", str(tmp_path), "--out", str(tmp_path / "a")]
     assert main(["target", "new", *words]) == 0
     parts = yaml.safe_load((tmp_path / "a").read_text())["top"]["parts"]
     assert parts["lift"]["sense"] == "cw"  # anticlockwise about an axis that points down
@@ -104,7 +105,7 @@ def test_an_mjcf_s_classes_angles_and_hinges_are_followed(tmp_path):
     assert np.ptp(body, axis=0)[0] == pytest.approx(0.3) and body[:, 1].max() == pytest.approx(0.21, abs=1e-6)
 
 
-def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
+def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path, capsys):
     wheels = "".join(
         f'<link name="wheel_{index}"><visual><origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.1" length="0.06"/>'
         f'</geometry></visual></link><joint name="axle_{index}" type="continuous"><origin xyz="{x} {y} 0.1"/>'
@@ -118,6 +119,23 @@ def test_a_rover_s_cylinders_become_wheels_with_a_row_of_its_size(tmp_path):
     assert row["category"] == "Vehicle" and row["wheel_diam_m"] == pytest.approx(0.2, rel=0.01)
     assert cloud.kinds == ("body", *("wheel",) * 4)
     np.testing.assert_allclose(np.ptp(cloud.points, axis=0), [0.46, 0.8, 0.35], rtol=0.02)
+    path = tmp_path / "two.urdf"
+    path.write_text((tmp_path / "rover.urdf").read_text().replace("continuous", "fixed", 2))
+    assert main(["target", "new", str(path), "--inputs", str(tmp_path), "--subtype", "AITO M9 2024"]) == 2
+    assert "2 wheels turn, AITO M9 2024 has 4" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "seen"), [("drum_", "neither rotors nor wheels"), ("wheel_", "both rotors and wheels")]
+)
+def test_a_description_whose_names_tell_no_category_is_refused_until_it_is_given(name, seen, tmp_path, capsys):
+    path = folder(tmp_path) / "craft/craft.urdf"
+    path.write_text(urdf().replace("rotor_", name, -1 if name == "drum_" else 6))
+    command = ["target", "new", str(path), "--inputs", str(tmp_path), "--out", str(tmp_path / "a.yaml")]
+    assert main(command) == 2
+    error = capsys.readouterr().err
+    assert seen in error and "--category Vehicle" in error and error.count("\n") == 1
+    assert main([*command, "--category", "UAV"]) == 0
 
 
 def test_a_published_target_with_another_number_of_rotors_is_refused_and_nothing_is_left(tmp_path, capsys):
@@ -146,6 +164,7 @@ def test_a_description_whose_propellers_are_fixed_is_looked_at_like_a_mesh(tmp_p
     command = ["target", "new", str(path), "--inputs", str(inputs), "--out"]
     assert main([*command, "named.yaml"]) == 0  # the links' names tell their number
     path.write_text(urdf().replace("continuous", "fixed").replace("rotor_", "disc_"))
+    command.insert(2, "--category=UAV")
     assert main([*command, "a.yaml"]) == 2
     assert f"error: {path}: 4 rotors found, expected --rotors 4 where that is all" in capsys.readouterr().err
     assert main([*command, "a.yaml", "--rotors", "4"]) == 0

@@ -209,11 +209,11 @@ def test_a_fold_in_several_shards_holds_each_sample_once_and_every_class_in_each
     rows, network = motion_rows("seen", 24), Network.from_settings(NETWORK)
     samples = ChunkSamples(rows, [3.0, math.inf], {"by": "motion", "train": 1, "val": 0, "test": 0}, 7, network)
     data = npy(np.ones((3, 400), np.complex64))
-    whole = write_shard(tmp_path / "whole.tar", samples, "train", kind, lambda number, level: data)
+    whole = write_shard(tmp_path / "whole.tar", samples, "train", kind, lambda number, level: (data, {}))
     tables = []
     for number in range(3):
         path = tmp_path / f"part{number}.tar"
-        write_shard(path, samples, "train", kind, lambda number, level: data, (number, 3))
+        write_shard(path, samples, "train", kind, lambda number, level: (data, {}), (number, 3))
         tables.append(map_samples(table_path(path)))
     keys = np.concatenate([table["key"] for table in tables])
     assert len(keys) == whole["samples"] and set(keys) == set(map_samples(tmp_path / "whole.npz")["key"])

@@ -127,7 +127,7 @@ def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
     assert content["description"] == "256 x 512 palette PNG: rows are stations, columns TRP."
     rows, network = [motion_rows("seen")[0] | {"fold": "train"}], Network.from_settings(render["network"])
     chunk = ChunkSamples(rows, [3.0], SPLIT, SEED, network)
-    write_shard(tmp_path / "seen-train-0.tar", chunk, "train", "image", lambda *_: b"")
+    write_shard(tmp_path / "seen-train-0.tar", chunk, "train", "image", lambda *_: (b"", {}))
     index_of([tmp_path / "seen-train-0.tar"], render, tmp_path / "index.json")
     shards = ShardSet(tmp_path / "index.json")
     assert "1 samples as 2 x 1 tiles of" in card.description(shards)

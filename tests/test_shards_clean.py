@@ -21,6 +21,7 @@ from lowalt.shards.sigmf import main as sigmf
 from lowalt.shards.table import map_samples
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
+from lowalt.spectra import NAMES
 from pictures import NETWORK
 from test_shards_card import CONFIG
 
@@ -80,7 +81,10 @@ def test_every_sample_is_the_one_of_the_signal_shards_under_the_same_number(reci
 
 def test_training_sees_the_same_samples(recipes, noised, tmp_path):
     folds = {("seen", "train"), ("unseen", "train")}
-    pair = [ShardSamples(folder / "index.json", [0, 4, 8], folds, 24, True) for folder in (recipes, noised)]
+    pair = [
+        ShardSamples(folder / "index.json", [len(NAMES) * station for station in range(3)], folds, 24, True)
+        for folder in (recipes, noised)
+    ]
     for name in ("key", "label", "snr_db", "model", "range_m"):
         assert (getattr(pair[0].facts, name) == getattr(pair[1].facts, name)).all()
     some = np.array([3, 1, 2])
@@ -115,7 +119,7 @@ def test_splits_by_sample_give_each_fold_its_own_levels(tmp_path):
     for fold in ("train", "val", "test"):
         path = tmp_path / f"unseen-{fold}-00000.tar"
         chunk = ChunkSamples(rows, [3.0, 8.0, np.inf], split, SEED, network)
-        write_shard(path, chunk, fold, "recipe", lambda *_: npy(echoes))
+        write_shard(path, chunk, fold, "recipe", lambda *_: (npy(echoes), {}))
         with tarfile.open(path) as archive:
             for name in archive.getnames():
                 if name.endswith(".json"):
@@ -132,7 +136,7 @@ def test_powers_of_a_scene_with_effects_set_the_noise(tmp_path):
     split, network = {"by": "motion", "train": 1, "val": 1, "test": 1}, Network.from_settings(NETWORK)
     write_shard(
         tmp_path / "unseen-train-00000.tar", ChunkSamples(rows, [3.0], split, 3, network, powers=powers), "train",
-        "recipe", lambda *_: npy(echoes[:, 0]),
+        "recipe", lambda *_: (npy(echoes[:, 0]), {}),
     )  # fmt: skip
     with tarfile.open(tmp_path / "unseen-train-00000.tar") as archive:
         name = next(name for name in archive.getnames() if name.endswith(".json"))

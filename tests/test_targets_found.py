@@ -139,6 +139,22 @@ def test_wheels_tell_the_front_of_a_vehicle_that_is_wider_than_long(tmp_path):
     assert np.abs(cloud(path.with_suffix(".yaml")).axes[1:, 0]) == pytest.approx(1)
 
 
+def test_wheels_that_no_name_tells_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((1.2, 2.4, 0.3), (0, 0, 0.4))}
+    for index, (x, y) in enumerate([(0.5, 0.8), (0.5, -0.8), (-0.5, 0.8), (-0.5, -0.8)]):
+        drum = disc((0, 0, 0), 0.2, 0.1).apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+        shapes[f"drum{index}"] = drum.apply_translation((x, y, 0))
+    words = (saved(tmp_path / "rover.obj", shapes), "--category", "Vehicle", "--unit", "m", "--up", "z")
+    assert draft(*words)[0] == 2
+    assert "4 wheels found, expected --wheels 4 where that is all" in capsys.readouterr().err
+    assert draft(*words, "--wheels", "4")[0] == 0
+    assert cloud(tmp_path / "rover.yaml").kinds.count("wheel") == 4
+    bare = saved(tmp_path / "bare.obj", {"hull": shapes["hull"]})
+    assert draft(bare, *words[1:])[0] == 2 and "0 wheels found" in capsys.readouterr().err
+    assert draft(bare, *words[1:], "--wheels", "0")[0] == 0
+
+
 def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shapes = hull() | {f"part{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
@@ -154,6 +170,36 @@ def test_another_number_of_rotors_is_refused_with_a_picture_whose_numbers_help(t
     assert draft(path, "--category", "UAV", "--unit", "m", "--moving", *numbers)[0] == 0
     assert cloud(path.with_suffix(".yaml")).kinds.count("rotor") == 4
     assert draft(path, "--category", "UAV", "--moving", "99")[0] == 2 and "--moving is '99'" in capsys.readouterr().err
+
+
+def without_a_side(shape: trimesh.Trimesh, axis: int) -> trimesh.Trimesh:
+    """A shape without the triangles that lie lowest along an axis."""
+    heights = shape.triangles[:, :, axis]
+    return trimesh.Trimesh(shape.vertices, shape.faces[(heights > heights.min() + 1e-9).any(axis=1)])
+
+
+def test_one_half_of_a_craft_is_refused_and_a_whole_one_on_one_side_of_the_file_s_axes_is_not(tmp_path, capsys):
+    shapes = hull() | {f"rotor{index}": disc((x, y, 0.06)) for index, (x, y) in enumerate(HUBS)}
+    right = {name: shape for name, shape in shapes.items() if shape.bounds[0, 1] > -1e-9}
+    closed = right | {"hull": box((0.2, 0.06, 0.06), (0, 0.03, 0))}
+    open_half = right | {"hull": without_a_side(closed["hull"], 1)}
+    away = {name: shape.copy().apply_translation([0, 0.3, 0]) for name, shape in open_half.items()}
+    for name, half in (("closed", closed), ("open", open_half), ("away", away)):
+        assert draft(saved(tmp_path / f"{name}.obj", half), "--category", "UAV")[0] == 2
+        assert f"{name}.obj: one half of a target, cut off along y" in capsys.readouterr().err
+    corner = {name: shape.copy().apply_translation([0.23, 0.21, 0.1]) for name, shape in shapes.items()}
+    assert draft(saved(tmp_path / "corner.obj", corner), "--category", "UAV")[0] == 0
+    van = {"hull": without_a_side(box((4, 2, 2)), 0)}
+    words = (saved(tmp_path / "van.obj", van), "--category", "Vehicle", "--unit", "m", "--up", "z", "--wheels", "0")
+    assert draft(*words)[0] == 2 and "or give --front x where" in capsys.readouterr().err
+    assert draft(*words, "--front", "x")[0] == 0
+
+
+def test_a_mesh_alone_tells_no_category(tmp_path, capsys):
+    status, out = draft(saved(tmp_path / "lawnmower.obj", hull()))
+    error = capsys.readouterr().err
+    assert status == 2 and not out.exists()
+    assert "lawnmower.obj: its category cannot be seen, expected --category UAV" in error and len(error) < 300
 
 
 def test_a_craft_made_with_another_number_of_rotors_than_its_row_says_so(tmp_path):
@@ -196,6 +242,36 @@ def test_a_size_that_does_not_fit_is_refused_with_the_line_to_write(factor, word
     error = capsys.readouterr().err
     assert "is the unit 'm' right?" in error
     assert re.search(words, error)
+
+
+def test_a_bird_as_long_as_a_bridge_is_asked_for_its_unit(tmp_path, capsys):
+    path = bird(tmp_path, 0.3)
+    assert draft(path, "--category", "Bird", "--size", "717")[0] == 2
+    assert "expected 0.08 to 2.5 m for a Bird: give --unit or --size" in capsys.readouterr().err
+    assert not path.with_suffix(".yaml").exists()
+
+
+def test_blades_by_name_of_which_some_stand_alone_are_asked_for_by_number(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((0.2, 0.12, 0.06))}
+    for index, (x, y) in enumerate(HUBS):
+        for side in (-1, 1):
+            shape = box((0.1, 0.01, 0.004), (side * 0.055, 0, 0))
+            shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4 * (index == 0), [0, 0, 1]))
+            shapes[f"blade{index}{side}"] = shape.apply_translation([x, y, 0.06])
+    path = saved(tmp_path / "craft.obj", shapes)
+    assert draft(path, "--category", "UAV")[0] == 2
+    assert "5 rotors found, expected --rotors 5 where that is all" in capsys.readouterr().err
+    assert draft(path, "--category", "UAV", "--rotors", "4")[0] == 0
+
+
+def test_motors_without_propellers_are_no_rotors(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"hull": box((0.2, 0.12, 0.06))}
+    for kind, status in (("part", 0), ("MotorMount.", 2)):
+        found = shapes | {f"{kind}{index}": disc((x, y, 0.02)) for index, (x, y) in enumerate(HUBS)}
+        assert draft(saved(tmp_path / f"{kind}.obj", found), "--category", "UAV", "--rotors", "4")[0] == status
+    assert "0 rotors found, expected 4" in capsys.readouterr().err
 
 
 def bird(tmp_path: Path, long: float, lean: float = 0.0) -> Path:

@@ -91,7 +91,7 @@ def test_a_car_s_wheels_are_found_by_their_shape_among_other_pieces(tmp_path):
     wheels = [part for part in found.components if part.guess]
     assert {part.guess for part in wheels} == {"wheel"} and len(wheels) == 4
     assert sorted(tuple(np.sign(part.centre[:2])) for part in wheels) == [(-1, -1), (-1, 1), (1, -1), (1, 1)]
-    assert described(found).count("may be a wheel") == 4
+    assert described(found).count("may be a wheel") == 4 and "category Vehicle" in described(found)
 
 
 @pytest.mark.parametrize(
@@ -139,11 +139,14 @@ def test_inspection_leaves_a_picture(tmp_path, monkeypatch, capsys):
     assert picture.size[0] > 1000 and len(picture.convert("RGB").getcolors(1 << 24)) > 20
 
 
-def test_a_car_without_wheels_is_made_and_shown_with_a_warning(tmp_path):
+def test_a_car_without_wheels_is_asked_for_them_then_made_and_shown_with_a_warning(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     box((1.8, 4.5, 1.4), (0, 0, 0.7)).subdivide().export(tmp_path / "car.stl")
     out, made = tmp_path / "car.yaml", tmp_path / "car.npz"
     command = ["target", "new", str(tmp_path / "car.stl"), "--subtype", "AITO M9 2024", "--inputs", str(tmp_path)]
-    assert main([*command, "--out", str(out)]) == 0
+    assert main([*command, "--out", str(out)]) == 2 and not out.exists()
+    assert "car.stl: 0 wheels found, expected 4; otherwise name each wheel's pieces" in capsys.readouterr().err
+    assert main([*command, "--out", str(out), "--wheels", "0"]) == 0
     with pytest.warns(InputWarning, match="0 wheels, expected at least 3"):
         assert main(["target", "make", str(out), "--inputs", str(tmp_path), "--out", str(made)]) == 0
     assert made.with_suffix(".png").exists() and read(made).kinds == ("body",)
@@ -208,6 +211,7 @@ def test_groups_of_an_obj_and_instances_of_a_scene_have_names(tmp_path):
         (["new", "{folder}/craft.stl", "--subtype", "Crow", "--inputs", "{folder}/other"], "expected --inputs with it"),
         (["new", "{folder}/craft.stl", "--subtype", "Walking Pedestrian 1", "--inputs", "{folder}"], "a pedestrian"),
         (["inspect", "{folder}/nothing.stl"], "no file at"),
+        (["new", "{folder}/nothing.stl", "--subtype", "Crow", "--inputs", "{folder}"], "no file at"),
         (["make", "{folder}/two.yaml", "--inputs", "{folder}"], "--subtype is None, expected one of"),
         (["show", "{folder}/craft.stl"], "not a cloud file"),
     ],

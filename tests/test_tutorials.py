@@ -124,6 +124,12 @@ def test_a_trajectory(checkout, monkeypatch):
     shapes = {"signals": (3, 400), "velocity": (3, 256, 144), "time": (3, 1024, 392), "transfer": (123, 392)}
     assert {name: names[name].shape for name in shapes} == shapes
     assert names["tile"].shape == (768, 768) and len(set(names["tile"].ravel().tolist())) > 100
+    assert [(record["track"], record["look"]) for record in names["looks"]] == [
+        (names["looks"][0]["track"], look) for look in range(30)
+    ]
+    assert [(record["subtype"], record["track"], record["look"]) for record in names["flown"]] == [
+        ("DJI Mini 2", 0, look) for look in range(8)
+    ]
 
 
 def test_a_target(checkout, monkeypatch):

@@ -40,7 +40,6 @@ ODD = "o'brien läb $(touch y)"
 """Name of a folder that a shell would take apart."""
 WHOLE = {
     "recognition": {"schemes": ["A:VRP+TRP+VT"], "protocols": ["seen"], "training": {"steps": 2, "validate_every": 1}},
-    "report": {"cost": False},
 }
 
 

@@ -32,7 +32,6 @@ GIVEN = {
     "clouds": ({"clouds": ["a"]}, ["--clouds", "a"]),
     "content": ({"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
     "reduced_chunk": ({"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
-    "fidelity": ({"fidelity": "a"}, ["--fidelity", "a"]),
     "samples": ({"views": ["a", "b"]}, ["--views", "a", "b"]),
 }
 

@@ -14,7 +14,6 @@ from configured import parts, run_of
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow import options
-from lowalt.workflow.products import FIDELITY
 
 ROOT = Path(__file__).parent.parent
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
@@ -42,7 +41,7 @@ def test_the_chunks_with_the_first_motion_models_tell_of_every_subtype():
 
 
 def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
-    run, products, _ = parts({"report": {"cost": False, "accuracy": "", "measured": ""}})
+    run, products, _ = parts({"report": {"cost": "", "accuracy": "", "measured": ""}})
     base, page = "results/default", products.report(CHUNK)
     named = ("index", "gallery", "motion", "distances", "seeds")
     assert {name: page[name] for name in named} == {
@@ -54,12 +53,11 @@ def test_a_report_reads_the_files_of_its_run_and_others_only_where_asked():
     assert page["predictions"] == [f"{base}/predictions/{training}.csv" for training in run.trainings]
     assert not {"transfer", "echo_cost", "accuracy_cost", "measured"} & set(page)
     accuracy, measured = "config/cost/accuracy.csv", "config/schemes.csv"
-    _, products, _ = parts({"report": {"cost": True, "accuracy": accuracy, "measured": measured},
+    _, products, _ = parts({"report": {"cost": accuracy, "accuracy": accuracy, "measured": measured},
                             "recognition": {"transfer": ["other"]}})  # fmt: skip
     more = {name: path for name, path in products.report(CHUNK).items() if name not in page}
     assert more == {
-        "transfer": f"{base}/transfer.csv", "echo_cost": f"{base}/cost.csv", "echo_pixels": f"{base}/cost_pixels.csv",
-        "echo_cost_figure": f"{base}/cost.png", "accuracy_cost": accuracy, "measured": measured,
+        "transfer": f"{base}/transfer.csv", "echo_cost": accuracy, "accuracy_cost": accuracy, "measured": measured,
     }  # fmt: skip
 
 
@@ -112,7 +110,7 @@ def test_stages_before_the_first_training_do_without_torch():
     """In a process of its own: torch is not to be found there, as while `make` is still fetching it."""
     stages = ["targets", "targets.gallery", "motion", "echo", "noise", "tiles", "shards", "shards.card", "recognition"]
     stages += ["recognition.views", "recognition.freeze", "recognition.distances", "measure.echo_cost"]
-    stages += ["measure.echo_pixels", "report.figures.echo_cost", "config.layers", "workflow.run"]
+    stages += ["report.figures.cost_plots", "config.layers", "workflow.run"]
     program = "import sys; sys.modules['torch'] = sys.modules['timm'] = None; import importlib as i"
     program += f"; [i.import_module('lowalt.' + name) for name in {stages}]"
     environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
@@ -182,9 +180,9 @@ def test_views_come_from_the_tiles_stage_at_its_sizes_alone_and_never_for_signal
 
 def test_training_reads_images_of_the_scheme_s_own_size():
     run, products, _ = parts(
-        {"recognition": {"table": "config/cost/accuracy.csv", "schemes": ["base", "48 pixels"], "timed": []}}
+        {"recognition": {"table": "config/cost/accuracy.csv", "schemes": ["default", "48 pixels"], "timed": []}}
     )
-    for scheme, size in (("base", 24), ("48-pixels", 48)):
+    for scheme, size in (("default", 24), ("48-pixels", 48)):
         views = products.samples(SimpleNamespace(scheme=scheme))["views"]
         assert views == [f"results/default/views/{size}/{shard}.npz" for shard in run.plan.shards]
     _, uncached, _ = parts({"recognition": {"cache": False}})
@@ -211,14 +209,16 @@ def test_a_run_on_another_s_data_reads_there_and_refuses_other_settings(tmp_path
         run_of(overlay)
 
 
-def test_the_table_of_other_runs_is_named_with_its_command_where_it_is_missing(tmp_path, monkeypatch):
-    _, products, _ = parts()
+def test_predictions_of_a_study_are_named_with_its_command_where_they_are_missing(tmp_path, monkeypatch):
+    _, products, _ = parts({"recognition": {"seeds": [0, 4]}})
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(InputError, match="make accuracy-cost"):
-        products.fidelity(CHUNK)
-    Path(FIDELITY).parent.mkdir(parents=True)
-    Path(FIDELITY).touch()
-    assert products.fidelity(CHUNK) == FIDELITY
+    folder = Path("results/default-heights-invented/predictions/unseen/abc-vrp-trp-vt-with-height")
+    with pytest.raises(InputError, match=rf"no {folder}/0\.csv: `make study NAME=heights` makes it first"):
+        products.studied(CHUNK)
+    folder.mkdir(parents=True)
+    for seed in (0, 4):
+        (folder / f"{seed}.csv").touch()
+    assert products.studied(CHUNK) == [f"{folder}/{seed}.csv" for seed in (0, 4)]
 
 
 def test_a_run_that_transfers_from_itself_is_refused():

@@ -119,7 +119,7 @@ def test_a_wrong_configuration_makes_no_run(overlay, words):
 @pytest.mark.workflow
 @pytest.mark.parametrize(("overlay", "target", "sentence"), [
     ({"seed": -1}, "data", r"error: configuration refused: seed: value -1, expected at least 0.*"),
-    ({}, "accuracy_cost", r"error: no results/fidelity-exact/transfer\.csv: .* `make accuracy-cost` makes it first"),
+    ({}, "accuracy_cost", r"error: no results/default-heights-invented/.*: `make study NAME=heights` makes it first"),
     ({"run": "mine", "recognition": {"transfer": ["missing"]}}, "results/mine/transfer.csv",
      r"error: recognition\.transfer: no results/missing/config\.yaml, expected a finished run 'missing' .*"),
 ])  # fmt: skip

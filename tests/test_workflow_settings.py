@@ -42,11 +42,11 @@ def checkout(monkeypatch):
 @pytest.mark.parametrize(
     ("overlay", "changed"),
     [
-        ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table", "cost_pixels"}),
+        ({"motion": {"tilt_deg": 10.0}}, {"motion", "cost_table"}),
         ({"noise": {"snr_db": [9]}}, {"noise", "shard", "views"}),
         ({"tiles": {"reduced": [48]}}, {"views"}),
-        ({"images": {"gamma": 0.7}}, {"images", "cost_pixels"}),
-        ({"images": {"colour_map": "magma"}}, {"images", "cost_pixels", "training"}),
+        ({"images": {"gamma": 0.7}}, {"images"}),
+        ({"images": {"colour_map": "magma"}}, {"images", "training"}),
         ({"recognition": {"training": {"steps": 7}}}, {"training"}),
         ({"recognition": {"evaluation": {"batch": 7}}}, {"evaluation"}),
         ({"split": {"val": 2, "train": 7}}, {"shard"}),
@@ -56,7 +56,7 @@ def checkout(monkeypatch):
 def test_a_changed_value_changes_the_settings_of_the_stages_that_read_it(overlay, changed):
     job = SimpleNamespace(**vars(CHUNK), subtype="crow", size="24", train_seed="3", get=lambda key, default: 3)
     names = (
-        "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "cost_pixels", "views",
+        "cloud", "motion", "echo", "echo_in_scene", "noise", "images", "shard", "cost_table", "views",
         "training", "evaluation", "seed",
     )  # fmt: skip
     before, after = parts()[2], parts(overlay)[2]
@@ -104,30 +104,28 @@ def test_a_job_s_settings_do_not_depend_on_the_jobs_asked_about_before():
         assert (len(set(told)) > 1) == (stage not in ("images", "index"))
 
 
-def test_tiles_with_range_profiles_follow_the_seed_and_the_snrs():
+def test_tiles_of_range_cells_follow_the_seed_and_the_snrs():
     """Their noise is drawn from both; tiles of signals alone need neither."""
-    job, profiled = (
+    job, cells = (
         Job(run="default", group="seen", part="00000"),
         {"spectra": {"hrrp": {"window": 1, "hop": 1, "cells": 9}}},
     )
     changes = [{}, {"seed": 2}, {"noise": {"snr_db": [3.0]}}]
-    plain, with_profiles = (
-        [parts({**block, **change})[2].images(job) for change in changes] for block in ({}, profiled)
-    )
-    assert len(set(plain)) == 1 and len(set(with_profiles)) == 3
+    plain, of_cells = ([parts({**block, **change})[2].images(job) for change in changes] for block in ({}, cells))
+    assert len(set(plain)) == 1 and len(set(of_cells)) == 3
 
 
 def test_the_report_s_files_are_a_manifest_that_the_report_takes():
     shown = {
-        "cost": True,
+        "cost": "config/schemes.csv",
         "accuracy": "config/cost/accuracy.csv",
         "published": "config/published_accuracy.csv",
     }
     for overlay, names in (
-        ({"report": {"cost": False}}, set()),
+        ({"report": {"cost": None}}, set()),
         (
             {"report": shown, "recognition": {"transfer": ["other"]}},
-            {"transfer", "accuracy_cost", "echo_cost", "echo_pixels", "echo_cost_figure"},
+            {"transfer", "accuracy_cost", "echo_cost"},
         ),
     ):
         _, products, _ = parts(overlay)

@@ -83,7 +83,7 @@ def build(folder, kind, inputs=True):
 def pack(path, rows, fold="train"):
     """A shard of these rows' signals at 3 dB, all dealt to one fold."""
     chunk = ChunkSamples([row | {"fold": fold} for row in rows], [3.0], SPLIT, SEED, Network.from_settings(NETWORK))
-    write_shard(path, chunk, fold, "signal", lambda number, _: npy(echoes(number)))
+    write_shard(path, chunk, fold, "signal", lambda number, _: (npy(echoes(number)), {}))
     return path
 
 

@@ -8,7 +8,6 @@ OVERLAY = {
     "targets": {"select": ["Crow", "NIO ET5T 2023", "DJI Mini 2", "Walking Pedestrian 5"]},
     "motion": {"models": 20, "models_per_chunk": 10},
     "noise": {"snr_db": [8, float("inf")]},
-    "report": {"cost": False},
 }
 # The region is given, so that it does not follow from the stations.
 OVERLAY["motion"]["region"] = {"polygon_m": [[100, 60], [400, 60], [250, 300]], "mast_clearance_m": 10.0}

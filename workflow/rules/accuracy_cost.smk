@@ -1,7 +1,7 @@
 # Accuracy: what recognition accuracy costs in time, over the schemes trained and the networks only timed.
-# REQUIRED INPUTS: predictions of the run in the unseen protocol; results/fidelity-exact/transfer.csv, which other runs make
+# REQUIRED INPUTS: predictions of the run in the unseen protocol; those of the presets that a study trains
 #                  (`make accuracy-cost` does all); a quiet machine
-# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.png
+# OUTPUTS: results/{run}/speed/{scheme}.json, results/{run}/accuracy_cost.csv, results/{run}/accuracy_cost.svg
 
 
 rule speed:
@@ -30,10 +30,12 @@ rule accuracy_cost_table:
     input:
         code=code("lowalt.measure.accuracy_cost"),
         predictions=expand("results/{{run}}/predictions/{training}.csv", training=RUN.priced),
+        studied=products.studied,
         about=expand("results/{{run}}/predictions/{training}.json", training=RUN.priced),
         speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=RUN.schemes_by_slug),
         index=f"{DATA}/shards/index.json",
-        fidelity=products.fidelity,
+        data_jobs=products.data_benchmarks,
+        presets=products.presets,
         schemes=config["recognition"]["table"],
     output:
         report("results/{run}/accuracy_cost.csv", caption="../report/accuracy_cost.rst", category="Cost"),
@@ -45,19 +47,18 @@ rule accuracy_cost_table:
         "../../envs/environment.yaml"
     params:
         settings=settings.seed,
-        fidelity=options.fidelity,
     shell:
         "python -m lowalt.measure.accuracy_cost --settings {params.settings:q} --predictions {input.predictions:q}"
-        " --speeds {input.speeds:q} --index {input.index:q} {params.fidelity:q}"
-        " --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
+        " {input.studied:q} --speeds {input.speeds:q} --data-jobs {input.data_jobs:q} --index {input.index:q}"
+        " --presets {input.presets:q} --schemes {input.schemes:q} --out {output:q} 2> {log:q}"
 
 
 rule accuracy_cost_figure:
     input:
-        code=code("lowalt.report.figures.accuracy_cost"),
+        code=code("lowalt.report.figures.cost_plots"),
         table="results/{run}/accuracy_cost.csv",
     output:
-        report("results/{run}/accuracy_cost.png", caption="../report/accuracy_cost.rst", category="Cost"),
+        report("results/{run}/accuracy_cost.svg", caption="../report/accuracy_cost.rst", category="Cost"),
     log:
         "results/{run}/logs/accuracy_cost_figure.log",
     benchmark:
@@ -65,4 +66,4 @@ rule accuracy_cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.accuracy_cost --table {input.table:q} --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots recognition --table {input.table:q} --figure {output:q} 2> {log:q}"

@@ -1,6 +1,6 @@
-# Cost: what the echo's accuracy costs in time, and how many pixels change at each tolerance; one cloud a category.
+# Cost: what the echo's accuracy costs in time, one cloud a category.
 # REQUIRED INPUTS: results/{run}/clouds/*.npz of those subtypes; a quiet machine (nothing else of this workflow runs meanwhile)
-# OUTPUTS: results/{run}/cost.csv, results/{run}/cost_pixels.csv, results/{run}/cost.png
+# OUTPUTS: results/{run}/cost.csv, results/{run}/cost.svg
 
 
 rule cost_table:
@@ -24,33 +24,12 @@ rule cost_table:
         " --out {output:q} 2> {log:q}"
 
 
-rule cost_pixels:
-    input:
-        code=code("lowalt.measure.echo_pixels"),
-        table="results/{run}/cost.csv",
-        clouds=products.cost_clouds,
-    output:
-        "results/{run}/cost_pixels.csv",
-    log:
-        "results/{run}/logs/cost_pixels.log",
-    benchmark:
-        "results/{run}/benchmarks/cost_pixels.jsonl"
-    conda:
-        "../../envs/environment.yaml"
-    params:
-        settings=settings.cost_pixels,
-    shell:
-        "python -m lowalt.measure.echo_pixels --settings {params.settings:q} --table {input.table:q}"
-        " --clouds {input.clouds:q} --out {output:q} 2> {log:q}"
-
-
 rule cost_figure:
     input:
-        code=code("lowalt.report.figures.echo_cost"),
+        code=code("lowalt.report.figures.cost_plots"),
         table="results/{run}/cost.csv",
-        pixels="results/{run}/cost_pixels.csv",
     output:
-        report("results/{run}/cost.png", caption="../report/cost.rst", category="Cost"),
+        report("results/{run}/cost.svg", caption="../report/cost.rst", category="Cost"),
     log:
         "results/{run}/logs/cost_figure.log",
     benchmark:
@@ -58,5 +37,4 @@ rule cost_figure:
     conda:
         "../../envs/environment.yaml"
     shell:
-        "python -m lowalt.report.figures.echo_cost --table {input.table:q} --pixels {input.pixels:q}"
-        " --figure {output:q} 2> {log:q}"
+        "python -m lowalt.report.figures.cost_plots echo --table {input.table:q} --figure {output:q} 2> {log:q}"

@@ -1,5 +1,5 @@
-# Motion: the table of motion models of one chunk, one row a model, every parameter drawn from its own stream.
-# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes
+# Motion: the table of motion models of one chunk, one row a model, every parameter drawn from its own stream; of a track, one row a look.
+# REQUIRED INPUTS: results/{run}/clouds/*.npz of the chunk's subtypes; the flight log that motion.track names
 # OUTPUTS: results/{run}/motion/{group}-{part}.csv
 
 
@@ -7,6 +7,7 @@ rule motion:
     input:
         code=code("lowalt.motion"),
         clouds=products.chunk_clouds,
+        track=products.track,
     output:
         "results/{run}/motion/{group}-{part}.csv",
     log:

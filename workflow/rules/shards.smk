@@ -1,5 +1,5 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to it, and one index.
-# REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals, or its clean echoes
+# REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals (for cubes with clouds and surfaces), or its clean echoes
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz, results/{run}/shards/index.json,
 #          and next to them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
 #          SHA256SUMS
@@ -8,7 +8,7 @@
 rule shard:
     input:
         unpack(products.shard_content),
-        code=code("lowalt.shards"),
+        code=code("lowalt.shards", *options.shard_modules(config)),
         motion=products.motion,
     output:
         tar="results/{run}/shards/{group}-{fold}-{part}{piece}.tar",

@@ -1,6 +1,6 @@
 # Tiles: three spectra a station, nine images a sample, tiled 3 x 3 and encoded without loss.
 # REQUIRED INPUTS: results/{run}/noisy/{group}-{part}.npy; the motion table where spectra know late symbols' instants,
-#                  and with it the clouds where spectra show range profiles
+#                  and with it clouds and surfaces where spectra show range cells
 # OUTPUTS: results/{run}/tiles/{group}-{part}.npz, gone once its shards are written, and for every size of tiles.reduced
 #          results/{run}/reduced/{size}/{group}-{part}.npy
 
@@ -11,6 +11,7 @@ rule tiles:
         signals="results/{run}/noisy/{group}-{part}.npy",
         motion=products.tile_motion,
         clouds=products.tile_clouds,
+        occluders=products.tile_occluders,
     output:
         tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
         reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
@@ -25,7 +26,8 @@ rule tiles:
         reduced=options.reduced,
         motion=options.motion,
         clouds=options.clouds,
+        occluders=options.occluders,
     shell:
         "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced:q}"
-        " {params.motion:q} {params.clouds:q}"
+        " {params.motion:q} {params.clouds:q} {params.occluders:q}"
         " --out {output.tiles:q} 2> {log:q}"

@@ -11,7 +11,8 @@ from lowalt.config.layers import overlaid
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import median_s
 from lowalt.spectra import spectrum, windows, zero_index
-from lowalt.spectra.interface import OfProfiles
+from lowalt.spectra.cube import Cube
+from lowalt.spectra.interface import OfCells
 from lowalt.tiles.render import Renderer, normalised
 
 REPEATS = 5
@@ -36,16 +37,17 @@ def facts(config: dict) -> list[dict]:
         # A look without gaps would take the time of even symbols.
         signal[3::4] = 0
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
+    still, no_truth = np.zeros(symbols, np.int64), np.zeros((symbols, 0))
     found = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
-        given = signal
-        if isinstance(kind, OfProfiles):
-            given = np.repeat(np.abs(signal)[None], kind.rows(settings), axis=0)
+        cells = isinstance(kind, OfCells)
+        count = kind.columns(settings, symbols) if cells else windows(symbols, settings.window, settings.hop, name)
+        given = Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth) if cells else signal
         renderer.image(given, 0, name, image)
         found.append({
             "name": name, "title": kind.TITLE, "rows": kind.rows(settings),
-            "windows": windows(symbols, settings.window, settings.hop, name), "zero_index": zero_index(name),
+            "windows": count, "zero_index": zero_index(name),
             "image_ms": 1e3 * median_s(lambda name=name, given=given: renderer.image(given, 0, name, image), REPEATS),
             "settings": asdict(settings), "source": kind.SOURCE,
         })  # fmt: skip

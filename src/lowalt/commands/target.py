@@ -17,13 +17,13 @@ from lowalt.files.shipped import SHIPPED
 from lowalt.targets.cloud import read, write
 from lowalt.targets.dimensions import estimates
 from lowalt.targets.draft import chosen, drafted, refuse_miscount, row_lines
-from lowalt.targets.guesses import box_of
+from lowalt.targets.guesses import UNUSUAL, USUAL_M, box_of
 from lowalt.targets.inspection import described, inspect_mesh
 from lowalt.targets.mesh_files import UNITS_M
 from lowalt.targets.mesh_record import MOVING_KIND, body_axes
 from lowalt.targets.records import load_table, merge, read_records, with_row
 from lowalt.targets.robot_files import is_description, read_robot
-from lowalt.targets.robots import drafted_robot, parts_of, turning, write_parts
+from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
 
 AXES = ("x", "-x", "y", "-y", "z", "-z")
 TABLE = SHIPPED / "config/targets.csv"
@@ -74,7 +74,8 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         new.add_argument(
             f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
         )
-    new.add_argument("--rotors", type=int, help="number of rotors of a target with a row of its own")
+    new.add_argument("--rotors", "--wheels", type=int, dest="count", metavar="N",
+                     help="number of its rotors or wheels, 0 for none")  # fmt: skip
     new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
                      "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
@@ -132,8 +133,11 @@ def _target(given: argparse.Namespace, table: dict[str, dict]) -> tuple[str, dic
     if row.get("category") == "Pedestrian":
         raise InputError(f"--subtype is {name!r}, a pedestrian, expected a UAV, a bird or a vehicle")
     if not (row or given.category or is_description(given.file)):
-        raise InputError(f"--subtype is {given.subtype!r}, expected one of {list(table)}, or --category for a row of "
-                         "its own")  # fmt: skip
+        if given.subtype:
+            raise InputError(f"--subtype is {name!r}, expected one of {list(table)}, or --category for a row of its "
+                             "own")  # fmt: skip
+        raise InputError(f"{given.file}: its category cannot be seen, expected --category UAV, --category Bird or "
+                         "--category Vehicle, or --subtype with a published target")  # fmt: skip
     return name, row
 
 
@@ -141,10 +145,8 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
     """The record of a robot's description and the bytes of the GLB of its parts."""
     file = f"{(given.out or given.file).stem}.glb"
     robot = read_robot(given.file, given.inputs)
-    category = row.get("category") or given.category
-    if category is None:
-        category = "Vehicle" if turning(robot, "wheel") and not turning(robot, "rotor") else "UAV"
     try:
+        category = row.get("category") or given.category or category_of(robot)
         joints, triangles = parts_of(robot, MOVING_KIND[category])
     except InputError as error:
         raise InputError(f"{given.file}: {error}") from None
@@ -155,9 +157,9 @@ def _robot(given: argparse.Namespace, name: str, row: dict, table: dict) -> tupl
         path = Path(folder) / file
         write_parts(path, triangles)
         if joints:
-            count = row.get("n_rotors_or_wings", len(joints))
-            if category == "UAV" and count != len(joints):
-                raise InputError(f"{given.file}: {len(joints)} rotors turn, {name} has {count}: leave --subtype out "
+            count, kind = row.get("n_rotors_or_wings", len(joints)), MOVING_KIND[category]
+            if kind != "wing" and count != len(joints):
+                raise InputError(f"{given.file}: {len(joints)} {kind}s turn, {name} has {count}: leave --subtype out "
                                  "for a row of its own, or choose a target with as many")  # fmt: skip
             names = (name, given.file.name, file)
             return drafted_robot(robot, joints, triangles, category, table, names, not row), path.read_bytes()
@@ -170,13 +172,17 @@ def _draft(
     given: argparse.Namespace, path: Path, file: str, name: str, row: dict, category: str, table: dict
 ) -> str:  # fmt: skip
     """The record of a mesh file."""
-    known = row or {"n_rotors_or_wings": given.rotors}
+    count = row.get("n_rotors_or_wings") if given.count is None else given.count
+    known = row | {"n_rotors_or_wings": count}
     found = inspect_mesh(path, category, given.unit, known, given.size_m, (given.up, given.front))
     found = replace(found, path=given.file)  # of a description, not the file that its parts lie in for now
     if not found.sides_seen:
         raise InputError(f"{path}: left and right of the bird cannot be seen, expected --up and --front")
+    if found.cut:
+        raise InputError(f"{given.file}: one half of a target, cut off along {found.cut}: join it with its mirror "
+                         f"image first, or give --front {found.cut} where a whole one ends flat there")  # fmt: skip
     groups = chosen(found, given.moving) if given.moving else found.groups
-    count = known["n_rotors_or_wings"] or (len(groups) if given.moving else None)
+    count = len(groups) if given.moving and count is None else count
     picture = Path(f"{(given.out or given.file).stem}-pieces.png")
     try:
         refuse_miscount(found, groups, count, str(picture))
@@ -201,18 +207,21 @@ def _new(given: argparse.Namespace) -> str:
     name, row = _target(given, table)
     if given.size_m is not None and not 0 < given.size_m < 1e6:
         raise InputError(f"--size is {given.size_m}, expected metres")
-    try:
-        file = existing(given.file, "mesh or description").resolve().relative_to(given.inputs.resolve()).as_posix()
-    except ValueError:
-        raise InputError(
-            f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it"
-        ) from None
+    path = existing(given.file, "mesh or description").resolve()
+    if not path.is_relative_to(given.inputs.resolve()):
+        raise InputError(f"{given.file}: not inside the folder of inputs {given.inputs}, expected --inputs with it")
+    file = path.relative_to(given.inputs.resolve()).as_posix()
     if is_description(given.file):
         text, data = _robot(given, name, row, table)
     else:
         text = _draft(given, given.file, file, name, row, row.get("category") or given.category, table)
     record = yaml.safe_load(text)[name]
     cells = record.pop("row", None)
+    if cells:
+        (low, high), size = USUAL_M[cells["category"]], cells.get("len_m", cells.get("size_m"))
+        if not low / UNUSUAL < size < high * UNUSUAL:
+            raise InputError(f"{given.file}: measures {size:.4g} m in the unit {record['unit']!r}, expected {low} to "
+                             f"{high} m for a {cells['category']}: give --unit or --size")  # fmt: skip
     merge(with_row(None, name, cells, "draft") if cells else row, record, f"draft: {name}")
     moving, marks = len(record["parts"]) - 1, text.count("GUESSED")
     glb = given.inputs / f"{(given.out or given.file).stem}.glb"

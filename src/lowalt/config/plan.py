@@ -19,6 +19,8 @@ PART = r"\d{5}(?:t\d+)?(?:s\d+)?"
 """Regular expression of a chunk's part."""
 PIECE = r"(?:p\d+)?"
 """Regular expression of a shard's piece, where a fold of a chunk is packed in several shards."""
+JUMPING = ("rotor_spread", "gusts", "companions")
+"""Effects that draw a motion of their own for each look."""
 RECORD_BYTES = 2048
 """Space of a sample's JSON record in the tar, padded."""
 PIXEL_BYTES = 0.5
@@ -37,6 +39,22 @@ def snrs_of(config: dict) -> tuple[float, ...]:
     return snrs
 
 
+def motion_block(config: dict) -> dict:
+    """Return the block `motion` of a configuration; where it has `looks`, with look_s, the length of a look (s)."""
+    motion, network = config["motion"], config["network"]
+    return motion | ({"look_s": network["symbols"] * network["symbol_interval_s"]} if "looks" in motion else {})
+
+
+def _refuse_tracks(config: dict) -> None:
+    """Refuse tracks that a split takes apart, or whose targets a scene would make jump from look to look."""
+    if "looks" not in config["motion"]:
+        return
+    if config["split"]["by"] != "motion":
+        raise InputError(f"split.by: {config['split']['by']!r} together with motion.looks, expected 'motion'")
+    if jumping := sorted(set(JUMPING) & set(config["effects"])):
+        raise InputError(f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}")
+
+
 def sample_bytes(config: dict) -> int:
     """Return the approximate bytes of a sample in a shard, padding included, by its kind; of recipes, its share."""
     kind, stations = config["shards"]["kind"], len(config["network"]["stations"])
@@ -45,6 +63,9 @@ def sample_bytes(config: dict) -> int:
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
     else:
         data = 128 + 8 * stations * config["network"]["symbols"]
+    if kind == "cube":
+        # The truth of a symbol takes some 60 bytes of the record.
+        data = data * config["network"]["subcarriers"] + 60 * stations * config["network"]["symbols"]
     whole = 2 * BLOCKSIZE + RECORD_BYTES + data + -data % BLOCKSIZE
     return whole // len(snrs_of(config)) if kind == "recipe" else whole
 
@@ -66,7 +87,8 @@ class Plan:
     """Chunks and shards of a run; `groups` maps a group to its subtypes in the table's order.
 
     groups, snrs: all of them; steps: the subtypes and SNRs of the configuration's lists and of each step added to them;
-    largest: samples that a shard holds.
+    models: rows of the motion table of each subtype, one a look; looks: at each motion model; largest: samples that a
+    shard holds.
     """
 
     groups: dict[str, tuple[str, ...]]
@@ -77,6 +99,7 @@ class Plan:
     seed: int
     steps: tuple[tuple[tuple[str, ...], tuple[float, ...]], ...]
     largest: float = float("inf")
+    looks: int = 1
 
     @classmethod
     def of(cls, config: dict, published: dict[str, dict]) -> "Plan":
@@ -86,6 +109,7 @@ class Plan:
         breaks the blocks of the split.
         """
         select, motion, split = config["targets"]["select"], config["motion"], config["split"]
+        _refuse_tracks(config)
         later = [tuple(step.get("subtypes", [])) for step in config.get("added", [])]
         more = [name for step in later for name in step]
         unknown = [name for name in (*select, *more) if name not in published]
@@ -112,8 +136,9 @@ class Plan:
         largest = float("inf")
         if config.get("shards", {}).get("largest_mb"):
             largest = max(1, 1e6 * config["shards"]["largest_mb"] // sample_bytes(config))
-        numbers = motion["models"], motion["models_per_chunk"], snrs_of(config), split, config["seed"]
-        return cls(groups, *numbers, steps, largest)
+        looks = motion.get("looks", 1)
+        numbers = looks * motion["models"], looks * motion["models_per_chunk"], snrs_of(config), split, config["seed"]
+        return cls(groups, *numbers, steps, largest, looks)
 
     @cached_property
     def _chunks(self) -> dict[str, Chunk]:
@@ -161,12 +186,12 @@ class Plan:
     def folds(self, chunk: str) -> list[str]:
         """Folds that have a sample in this chunk; each becomes one shard."""
         held = self._chunks[chunk]
-        if held.count % sum(self.split[name] for name in FOLDS) == 0:
+        if held.count // self.looks % sum(self.split[name] for name in FOLDS) == 0:
             return [name for name in FOLDS if self.split[name]]
         found = {
-            fold(self.split, self.seed, subtype, model, snr)
+            fold(self.split, self.seed, subtype, model // self.looks, snr)
             for subtype in held.members
-            for model in range(held.first, held.first + held.count)
+            for model in range(held.first, held.first + held.count, self.looks)
             for snr in held.snrs
         }
         return [name for name in FOLDS if name in found]

@@ -27,8 +27,8 @@ def fold(split: dict, seed: int, subtype: str, model: int, snr_db: float | None 
 
     split: the configuration's block, `by` ("motion": all SNRs of a motion model share its fold, nothing leaks;
     "sample": the paper's way, each SNR assigned separately) and the whole-number shares `train`, `val`, `test` of a
-    block. snr_db matters only for "sample". Raises: InputError naming the key that is wrong. Source: paper, section
-    V-A.
+    block. model: number of the motion model, which all looks of a track share. snr_db matters only for "sample".
+    Raises: InputError naming the key that is wrong. Source: paper, section V-A.
     """
     shares = tuple(split[name] for name in FOLDS)
     if any(not isinstance(share, int) or share < 0 for share in shares) or shares[0] < 1:

@@ -13,7 +13,7 @@ SHIPPED = PACKAGE / "shipped" if (PACKAGE / "shipped/Snakefile").is_file() else 
 """The folder that holds `Snakefile`, `config/`, `workflow/` and `profiles/`."""
 
 KEYS = (
-    ("targets", "table"), ("targets", "records"), ("targets", "own"),
+    ("targets", "table"), ("targets", "records"), ("targets", "own"), ("motion", "track"),
     ("recognition", "table"), ("report", "published"),
     ("report", "accuracy"),
 )  # fmt: skip

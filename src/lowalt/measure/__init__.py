@@ -1,1 +1,1 @@
-"""Measuring: the time that accuracy, effects and networks cost. Nothing here makes data or draws."""
+"""Measuring: the time that accuracy and larger scales cost. Nothing here makes data or draws."""

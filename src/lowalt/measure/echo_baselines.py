@@ -1,8 +1,7 @@
 """Other methods for the same signal, for comparison: none of them is used to make data.
 
 Each takes (network, station, motion, rcs_m2, aim_m) like `echo_signal` and does the same work, geometry and gains
-included: the direct sum over subcarriers, the same sum factored for matrix products, one FINUFFT a symbol, and the
-closed form in plain numpy. `judge` is the slow truth: plain sums whose phases start in extended precision.
+included: the paper's closed form written down in NumPy, in either precision, and one non-uniform FFT a symbol.
 """
 
 import numpy as np
@@ -12,64 +11,58 @@ from lowalt.echo.scene import Rigid
 
 
 def positions(motion: Rigid) -> np.ndarray:
-    """All positions (N, L, 3) in metres."""
+    """All positions (N, L, 3) in metres, in the precision of the motion's arrays."""
     turned = np.einsum("nlij,lj->nli", motion.rotation[:, motion.part], motion.points)
     return np.ascontiguousarray(turned + motion.translation[:, motion.part])
 
 
 def _ratio(x: np.ndarray, count: int) -> np.ndarray:
-    """Return sin(count x) / sin(x) with its limit, written apart from the echo engine that it judges."""
+    """Return sin(count x) / sin(x) with its limit."""
     s = np.sin(x)
     small = abs(s) < 1e-12
-    return np.where(small, count, np.sin(count * x) / np.where(small, 1.0, s))
+    return np.where(small, x.dtype.type(count), np.sin(count * x) / np.where(small, x.dtype.type(1), s))
 
 
 def amplitudes(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m) -> tuple[np.ndarray, np.ndarray]:
-    """Ranges (N, L) in m and complex amplitudes (N, L), array gains included, in vectorised float64."""
-    d = positions(motion) - np.array(station.position_m)
+    """Ranges (N, L) in m and complex amplitudes (N, L), array gains included, in the precision of the motion."""
+    place, horizontal, aim, rcs = (
+        np.asarray(value, motion.points.dtype) for value in (station.position_m, station.horizontal, aim_m, rcs_m2)
+    )
+    d = positions(motion) - place
     r = np.sqrt(np.einsum("nli,nli->nl", d, d))
-    aim = np.asarray(aim_m) - np.array(station.position_m)
-    aim = aim / np.sqrt(aim @ aim)
+    aim = (aim - place) / np.linalg.norm(aim - place)
     kappa = station.frequency_hz / network.carrier_hz
-    psi, omega = d @ station.horizontal / r - aim @ station.horizontal, d[..., 2] / r - aim[2]
-    gain = np.ones_like(r)
-    phase = np.zeros_like(r)
+    psi, omega = d @ horizontal / r - aim @ horizontal, d[..., 2] / r - aim[2]
+    gain, phase = np.ones_like(r), np.zeros_like(r)
     for counts in (network.transmit, network.receive):
         for count, x in zip(counts, (psi, omega), strict=True):
             u = np.pi * kappa / 2 * x
             gain *= _ratio(u, count)
             phase += (count - 1) * u
     elements = np.prod(network.transmit) * np.prod(network.receive)
-    scale = np.sqrt(network.power / elements) * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi) ** 1.5
-    return r, scale * np.sqrt(rcs_m2) / r**2 * gain * np.exp(1j * phase)
+    scale = float(np.sqrt(network.power / elements)) * SPEED_OF_LIGHT / network.carrier_hz / (4 * np.pi) ** 1.5
+    return r, scale * np.sqrt(rcs) / r**2 * gain * np.exp(1j * phase)
 
 
-def _strongest(subcarriers: np.ndarray) -> complex:
-    """Value of the strongest range cell of one symbol's subcarriers (M,)."""
-    cells = np.fft.ifft(subcarriers)
-    return cells[abs(cells).argmax()]
+def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, dtype: type = np.float64) -> np.ndarray:
+    """Signal (N,): the closed form in plain NumPy over the cells around the target (arg max not certified).
 
-
-def direct(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m) -> np.ndarray:
-    """Signal (N,): every subcarrier's exponential of every point, a matrix product a symbol, an inverse FFT."""
-    r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)
-    frequency = station.frequency_hz + np.arange(network.subcarriers) * network.subcarrier_spacing_hz
-    wave = -4j * np.pi / SPEED_OF_LIGHT * frequency
-    return np.array([_strongest(np.exp(wave[:, None] * r[n]) @ amplitude[n]) for n in range(len(r))])
-
-
-def factored(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m) -> np.ndarray:
-    """Signal (N,): as `direct`, subcarrier m = 16 a + b split into two short tables and one matrix product."""
-    r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)
-    amplitude = amplitude * np.exp(-4j * np.pi / SPEED_OF_LIGHT * station.frequency_hz * r)
-    step = -4j * np.pi / SPEED_OF_LIGHT * network.subcarrier_spacing_hz
-    fine, coarse = np.arange(16), 16 * np.arange(-(-network.subcarriers // 16))
-    result = []
-    for n in range(len(r)):
-        one = np.exp(step * coarse[:, None] * r[n]) * amplitude[n]
-        two = np.exp(step * fine[:, None] * r[n])
-        result.append(_strongest((one @ two.T).ravel()[: network.subcarriers]))
-    return np.array(result)
+    dtype: precision of every step, from the positions on.
+    """
+    arrays = {name: getattr(motion, name).astype(dtype) for name in ("rotation", "translation", "points")}
+    r, amplitude = amplitudes(network, station, motion._replace(**arrays), rcs_m2, aim_m)
+    count = network.subcarriers
+    rho = r / network.cell_m
+    low, high = np.floor(rho.min(axis=1)).astype(int), np.ceil(rho.max(axis=1)).astype(int)
+    centre = station.frequency_hz + (count - 1) / 2 * network.subcarrier_spacing_hz
+    wave = amplitude * np.exp(-4j * np.pi / SPEED_OF_LIGHT * centre * r)
+    best = np.zeros(len(r), wave.dtype)
+    for j in range(int((high - low).max()) + 1):
+        cell = (low + j).astype(dtype)
+        value = (wave * _ratio(np.pi / count * (cell[:, None] - rho), count)).sum(axis=1) / count
+        value = value * np.exp(1j * np.pi * (count - 1) / count * cell)
+        best = np.where(abs(value) > abs(best), value, best)
+    return best
 
 
 def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, tolerance: float = 1e-9) -> np.ndarray:
@@ -87,53 +80,6 @@ def finufft(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, to
     result = np.empty(len(r), np.complex128)
     for n in range(len(r)):
         plan.setpts(angle[n])
-        result[n] = _strongest(plan.execute(strength[n]))
+        cells = np.fft.ifft(plan.execute(strength[n]))
+        result[n] = cells[abs(cells).argmax()]
     return result
-
-
-def closed(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m) -> np.ndarray:
-    """Signal (N,): the closed form in plain numpy over the cells around the target (arg max not certified)."""
-    r, amplitude = amplitudes(network, station, motion, rcs_m2, aim_m)
-    count = network.subcarriers
-    rho = r / network.cell_m
-    low, high = np.floor(rho.min(axis=1)).astype(int), np.ceil(rho.max(axis=1)).astype(int)
-    centre = station.frequency_hz + (count - 1) / 2 * network.subcarrier_spacing_hz
-    wave = amplitude * np.exp(-4j * np.pi / SPEED_OF_LIGHT * centre * r)
-    best = np.zeros(len(r), np.complex128)
-    for j in range(int((high - low).max()) + 1):
-        cell = low + j
-        value = (wave * _ratio(np.pi / count * (cell[:, None] - rho), count)).sum(axis=1) / count
-        value = value * np.exp(1j * np.pi * (count - 1) / count * cell)
-        best = np.where(abs(value) > abs(best), value, best)
-    return best
-
-
-def judge(network: Network, station: Station, motion: Rigid, rcs_m2, aim_m, n: int) -> np.ndarray:
-    """All cells (M,) of symbol n by plain sums over array elements and subcarriers, ranges in extended precision."""
-    wide = np.longdouble
-    place = np.array(station.position_m, wide)
-    turned = (motion.rotation[n, motion.part].astype(wide) * motion.points[:, None, :].astype(wide)).sum(axis=2)
-    offset = (motion.translation[n, motion.part].astype(wide) - place) + turned
-    kappa = wide(station.frequency_hz) / wide(network.carrier_hz)
-    sine, cosine = np.sin(wide(station.normal_rad)), np.cos(wide(station.normal_rad))
-
-    def look(d):
-        """Return range and both direction cosines of vectors d (..., 3) from the station."""
-        r = np.sqrt((d * d).sum(axis=-1))
-        return r, (cosine * d[..., 1] - sine * d[..., 0]) / r, d[..., 2] / r
-
-    r, psi, omega = look(offset)
-    _, psi0, omega0 = look(np.asarray(aim_m, wide) - place)
-    gain = np.ones(len(r), complex)
-    for counts in (network.transmit, network.receive):
-        for number, cosines in zip(counts, (psi - psi0, omega - omega0), strict=True):
-            step = (kappa * cosines / 2).astype(float)
-            gain *= np.exp(2j * np.pi * np.outer(np.arange(number), step)).sum(axis=0)
-    light = wide(299792458)
-    start, step = 2 * wide(station.frequency_hz) * r / light, 2 * wide(network.subcarrier_spacing_hz) * r / light
-    start, step = (start - np.rint(start)).astype(float), (step - np.rint(step)).astype(float)
-    amplitude = np.sqrt(rcs_m2) / ((4 * np.pi) ** 1.5 * r.astype(float) ** 2) * SPEED_OF_LIGHT / network.carrier_hz
-    wave = amplitude * gain * np.exp(-2j * np.pi * start)
-    y = np.exp(-2j * np.pi * np.outer(np.arange(network.subcarriers), step)) @ wave
-    elements = np.prod(network.transmit) * np.prod(network.receive)
-    return np.sqrt(network.power / elements) * np.fft.ifft(y)

@@ -11,30 +11,45 @@ C = 299_792_458
 """Speed of light (m/s), exact."""
 
 
-def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
-    """The cells listed of one symbol, mpmath complex numbers; arguments as `cell_mp`.
+def _run(step, length: int):
+    """Return the sum of step^k over k = 0..length - 1, its terms doubled bit by bit of the length."""
+    total, power = mpmath.mpc(0), mpmath.mpc(1)
+    for bit in f"{length:b}":
+        total, power = total * (1 + power), power * power
+        if bit == "1":
+            total, power = total * step + 1, power * step
+    return total
 
-    Each point's steering and subcarrier sums are plain geometric sums over exactly given phases; a run of equal
-    steps is summed by Horner's rule.
+
+def places_mp(motion, n: int, digits: int = 50) -> list[list]:
+    """Return the positions (L, 3) of symbol n of a rigid motion as mpmath numbers, without a rounding in float64."""
+    with mpmath.workdps(digits):
+        return [
+            [
+                mpmath.fdot(motion.rotation[n, part, axis].tolist(), point) + float(motion.translation[n, part, axis])
+                for axis in range(3)
+            ]
+            for point, part in zip(motion.points.tolist(), motion.part, strict=True)
+        ]
+
+
+def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
+    """The cells listed of one symbol, mpmath complex numbers; points_m: L positions of three numbers, taken as exact.
+
+    Each point's steering and subcarrier sums are plain geometric sums over exactly given phases.
     """
     with mpmath.workdps(digits):
         mpf, pi = mpmath.mpf, mpmath.pi
         carrier, low = mpf(network.carrier_hz), mpf(station.frequency_hz)
         spacing, count = mpf(network.subcarrier_spacing_hz), network.subcarriers
         normal = mpf(station.normal_rad)
+        ahead, across = mpmath.cos(normal), mpmath.sin(normal)
 
         def look(position):
             """Return range and both direction cosines of a position, seen from the station."""
             d = [mpf(a) - mpf(b) for a, b in zip(position, station.position_m, strict=True)]
             r = mpmath.sqrt(sum(v * v for v in d))
-            return r, (-mpmath.sin(normal) * d[0] + mpmath.cos(normal) * d[1]) / r, d[2] / r
-
-        def run(step, length):
-            """Return the sum of step^k over k = 0..length - 1 by Horner's rule."""
-            total = mpmath.mpc(0)
-            for _ in range(length):
-                total = total * step + 1
-            return total
+            return r, (-across * d[0] + ahead * d[1]) / r, d[2] / r
 
         _, psi0, omega0 = look(aim_m)
         n_t, n_r = (int(np.prod(a)) for a in (network.transmit, network.receive))
@@ -46,10 +61,10 @@ def cells_mp(network, station, points_m, rcs_m2, aim_m, cells, digits=50):
             step_v = mpmath.expjpi(low / carrier * (omega - omega0))
             gain = mpmath.mpc(alpha)
             for array in (network.transmit, network.receive):
-                gain *= run(step_h, array[0]) * run(step_v, array[1])
+                gain *= _run(step_h, array[0]) * _run(step_v, array[1])
             gain *= mpmath.expjpi(-4 * low * r / mpf(C))
             for place, cell in enumerate(cells):
                 step = mpmath.expjpi(2 * mpf(int(cell)) / count - 4 * spacing * r / mpf(C))
-                sums[place] += gain * run(step, count) / count
+                sums[place] += gain * _run(step, count) / count
         scale = mpmath.sqrt(mpf(network.power) / (n_t * n_r))
         return [scale * value for value in sums]

@@ -5,33 +5,41 @@ import sys
 import numpy as np
 
 from lowalt.config.command import parser, pick, run
-from lowalt.motion.sample import draw, region_polygon
+from lowalt.motion.sample import region_polygon
 from lowalt.motion.table import write_table
-from lowalt.numerics.streams import stream
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import model_rows
 from lowalt.targets.cloud import read
 
 
 def main(arguments: list[str]) -> None:
-    """Draw models `--first` .. `--first + --count - 1` of every cloud's subtype, model-major, and write the table."""
+    """Draw rows `--first` .. `--first + --count - 1` of every cloud's subtype, row-major, and write the table.
+
+    Where the settings' block `motion` has `looks`, each motion model has so many rows, one a look.
+    """
     options = parser("lowalt.motion", __doc__)
     options.add_argument("--clouds", nargs="+", required=True, help="cloud files, in the order of the rows")
     options.add_argument("--group", required=True, choices=("seen", "unseen"))
-    options.add_argument("--first", type=int, required=True, help="first model number")
-    options.add_argument("--count", type=int, required=True, help="models of each subtype")
+    options.add_argument("--first", type=int, required=True, help="first row of each subtype")
+    options.add_argument("--count", type=int, required=True, help="rows of each subtype")
     options.add_argument("--out", required=True, help="motion table to write (.csv)")
     given = options.parse_args(arguments)
     seed, masts_m, motion, published = pick(given.settings, "seed", "masts_m", "motion", "published")
     masts_m = np.array(masts_m, dtype=float).reshape(-1, 2)
     corners = region_polygon(masts_m, motion["region"]["polygon_m"])
     clouds = [read(path) for path in given.clouds]
-    rows = []
-    for model in range(given.first, given.first + given.count):
-        for cloud in clouds:
-            rng = stream(seed, "motion", cloud.subtype, model)
-            row = draw(rng, cloud, published[cloud.subtype], masts_m, corners, motion)
-            rows.append({**row, "group": given.group, "model": model})
+    rows, looks, path = [], motion.get("looks", 1), path_of(motion, corners, masts_m)
+    for model in range(given.first // looks, (given.first + given.count) // looks):
+        drawn = [
+            model_rows(seed, cloud, published[cloud.subtype], masts_m, corners, motion, model, path) for cloud in clouds
+        ]
+        rows += [
+            {**row, "group": given.group, "model": model * looks + look}
+            for look, of_subtypes in enumerate(zip(*drawn, strict=True))
+            for row in of_subtypes
+        ]
     write_table(given.out, rows)
-    print(f"{given.out}: {len(rows)} motion models", file=sys.stderr)
+    print(f"{given.out}: {len(rows)} rows", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ import numpy as np
 
 from lowalt.files.errors import InputError
 from lowalt.motion.rotations import attitude, compiled, rodrigues, turns
+from lowalt.motion.table import PATH
 from lowalt.numerics.portable import applied, product
 from lowalt.targets.cloud import Cloud
 
@@ -147,6 +148,14 @@ def _attitudes(row: dict, tilt_rad: np.ndarray) -> np.ndarray:
     return product(product(rodrigues(up, yaw), rodrigues(right, pitch)), rodrigues(front, roll))
 
 
+def _curved(row: dict, times_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """How far a track's path has left its tangent (N, 3) m, and the turn of its yaw, pitch and roll (N, 3) rad."""
+    bent, bending = (np.array([row[name] for name in PATH[start : start + 3]]) for start in (0, 3))
+    turned_rad = np.zeros((len(times_s), 3))
+    turned_rad[:, 0] = row["turn_radps"] * times_s
+    return (times_s**2)[:, None] * (bent / 2 + times_s[:, None] * (bending / 6)), turned_rad
+
+
 def _track(cloud: Cloud, row: dict, times_s: np.ndarray, body: np.ndarray) -> np.ndarray:
     """Return the nodes' positions (N, L, 3) in a recording turned by `body`, linear between frames (paper Eq. 22)."""
     frames = len(cloud.track)
@@ -176,6 +185,10 @@ def poses(cloud: Cloud, row: dict, times_s: np.ndarray, perturbation: Perturbati
     if not np.isfinite([*origin, *velocity, *body.flat]).all():
         raise InputError(f"motion of {cloud.subtype}, model {row['model']}: position, velocity or attitude not finite")
     path = origin + times_s[:, None] * velocity
+    if "turn_radps" in row:
+        course, turned_rad = _curved(row, times_s)
+        path += course
+        tilt = turned_rad if tilt is None else tilt + turned_rad
     if offset is not None:
         path += offset
     if tilt is not None:

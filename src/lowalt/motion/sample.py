@@ -68,7 +68,7 @@ def _distance_m(point: np.ndarray, corners: np.ndarray) -> float:
     return float(np.hypot(*(away - share[:, None] * side).T).min())
 
 
-def _place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
+def place(rng: np.random.Generator, corners: np.ndarray, masts: np.ndarray, clearance_m: float) -> np.ndarray:
     """Draw a place (2,) m inside the polygon `corners` and at least `clearance_m` from every mast.
 
     Raises: InputError where 10,000 draws find none.
@@ -88,15 +88,26 @@ def heights(settings: dict, subtype: str, category: str, like: str) -> list[floa
     return next(block[name] for name in (subtype, category, like) if name in block)
 
 
+def follow_speed(cloud: Cloud, row: dict, speed: float, cadence: str) -> None:
+    """Set what a row's speed over ground (m/s) decides: the rate of wheels, and how fast a recording plays.
+
+    cadence: "free", or "tied" to the speed.
+    """
+    if cloud.parts_of("wheel"):
+        row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
+    if "node" in cloud.kinds:
+        tied = "tied" in (cadence, cloud.record.get("cadence"))
+        row["playback"] = speed / cloud.record["track_speed_mps"] if tied else 1.0
+
+
 def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dict, speed: float, cadence: str) -> None:
     """Fill in a row's rate, phases and place in a recording; speed: over ground (m/s); cadence: "free", or "tied" to
     the speed.
 
     Raises: InputError for more moving parts than the motion table has phases.
     """
-    if cloud.parts_of("wheel"):
-        row["rate_hz"] = speed / (math.pi * cloud.record["wheel_diameter_m"])
-    elif cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
+    follow_speed(cloud, row, speed, cadence)
+    if not cloud.parts_of("wheel") and cloud.like in AIRBORNE and published["freq_lo_hz"] is not None:
         row["rate_hz"] = rng.uniform(published["freq_lo_hz"], published["freq_hi_hz"])
     moving = len(cloud.parts_of("rotor")) + len(cloud.parts_of("wheel")) + bool(cloud.parts_of("wing"))
     if moving > PHASES:
@@ -108,9 +119,6 @@ def draw_rates(rng: np.random.Generator, cloud: Cloud, published: dict, row: dic
     if "node" in cloud.kinds:
         duration = len(cloud.track) / cloud.record["track_rate_hz"]
         row["start_s"] = rng.uniform(0.0, duration)
-        row["playback"] = 1.0
-        if "tied" in (cadence, cloud.record.get("cadence")):
-            row["playback"] = speed / cloud.record["track_speed_mps"]
 
 
 def _resize(rng: np.random.Generator, cloud: Cloud, low_m: float, high_m: float, row: dict) -> None:
@@ -143,7 +151,7 @@ def draw(
     Raises: InputError where no place satisfies the region or the target has too many parts.
     """
     row = dict.fromkeys(NUMBERS, math.nan)
-    row["x_m"], row["y_m"] = map(float, _place(rng, corners, masts_m, settings["region"]["mast_clearance_m"]))
+    row["x_m"], row["y_m"] = map(float, place(rng, corners, masts_m, settings["region"]["mast_clearance_m"]))
     row["yaw_rad"] = rng.uniform(0.0, 2 * math.pi)
     row["pitch_rad"] = row["roll_rad"] = 0.0
     speed = 0.0

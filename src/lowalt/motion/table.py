@@ -2,6 +2,7 @@
 
 import csv
 import math
+from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.files.atomic import text_file
@@ -18,34 +19,44 @@ NUMBERS = (
     "rate_hz", *(f"phase_{index}_rad" for index in range(PHASES)), "start_s", "playback",
 )  # fmt: skip
 COLUMNS = (*TEXTS, "model", *NUMBERS)
+TRACK = ("track", "look")
+PATH = ("ax_mps2", "ay_mps2", "az_mps2", "jx_mps3", "jy_mps3", "jz_mps3", "turn_radps")
+"""Further columns of tables whose targets are looked at again and again: numbers of the track in its subtype and of the
+look in its track; acceleration at the first symbol, its rate of change, and the rate at which the heading turns."""
 SCALE = "scale"
-"""A last column of tables whose targets have drawn sizes: how many times as large as its cloud a target is."""
+"""A further column of tables whose targets have drawn sizes: how many times as large as its cloud a target is."""
 
 
 def write_table(path: str | Path, rows: list[dict]) -> None:
     """Write rows (a dict a motion model, NaN where a column does not apply) as CSV; equal rows, equal bytes.
 
-    Rows of targets with drawn sizes all have the key SCALE, which becomes the last column.
+    Rows of targets with drawn sizes all have the key SCALE, those of tracks the keys TRACK and PATH.
     """
-    more = (SCALE,) if rows and SCALE in rows[0] else ()
+    more = _further(rows[0] if rows else ())
     write_csv(path, (*COLUMNS, *more), (_cells(row, (*NUMBERS, *more)) for row in rows))
+
+
+def _further(names: Collection[str]) -> tuple[str, ...]:
+    """The columns after COLUMNS of a table that has these names."""
+    return (*(SCALE,) * (SCALE in names), *(*TRACK, *PATH) * (TRACK[0] in names))
 
 
 def _cells(row: dict, names: tuple[str, ...]) -> list:
     """Return the cells of a row: texts, the model's number, then numbers in full precision, empty where NaN."""
-    numbers = ("" if math.isnan(row[name]) else repr(float(row[name])) for name in names)
+    numbers = (int(row[name]) if name in TRACK else "" if math.isnan(row[name]) else repr(float(row[name]))
+               for name in names)  # fmt: skip
     return [*(row[name] for name in TEXTS), int(row["model"]), *numbers]
 
 
 def read_table(path: str | Path) -> list[dict]:
-    """Read a motion table: a list of dicts, `model` an int, numbers floats, NaN where a cell is empty.
+    """Read a motion table: dicts with `model`, `track`, `look` as ints, numbers as floats, NaN where a cell is empty.
 
     Raises: InputError naming the file, line and column that is wrong.
     """
     with text_file(path, "motion table") as file:
         reader = csv.reader(file)
         header = tuple(next(reader, ()))
-        if header not in (COLUMNS, (*COLUMNS, SCALE)):
+        if header != (*COLUMNS, *_further(header)):
             raise InputError(f"{path}: columns {sorted(set(header) ^ set(COLUMNS))} missing, unknown or out of order")
         return [_row(path, line, header, cells) for line, cells in enumerate(reader, start=2)]
 
@@ -58,7 +69,7 @@ def _row(path: str | Path, line: int, header: tuple[str, ...], cells: list[str])
     for name in header[len(TEXTS) :]:
         text = row[name]
         try:
-            row[name] = int(text) if name == "model" else float(text) if text else math.nan
+            row[name] = int(text) if name in ("model", *TRACK) else float(text) if text else math.nan
             infinite = math.isinf(row[name])
         except (ValueError, OverflowError):
             raise InputError(f"{path}, line {line}, column {name}: {text!r}, expected a number") from None

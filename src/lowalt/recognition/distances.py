@@ -22,6 +22,7 @@ from scipy.spatial.distance import cdist
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.motion import positions
+from lowalt.motion.table import PATH
 from lowalt.targets.cloud import Cloud
 
 COLUMNS = (
@@ -34,7 +35,7 @@ INSTANTS, POINTS = 16, 1200
 def still_row(row: dict) -> dict:
     """Return the motion row without place, velocity and attitude, so that only the parts' own motion is left."""
     names = ("x_m", "y_m", "z_m", "vx_mps", "vy_mps", "vz_mps", "yaw_rad", "pitch_rad", "roll_rad")
-    return {**row, **dict.fromkeys(names, 0.0)}
+    return {name: 0.0 if name in (*names, *PATH) else value for name, value in row.items()}
 
 
 def cycle_s(cloud: Cloud, row: dict) -> float:

@@ -25,9 +25,8 @@ from lowalt.shards.maker import Maker
 from lowalt.shards.record import record, sample_key
 from lowalt.shards.write import select
 from lowalt.spectra import Spectra
-from lowalt.spectra.catalogue import named
+from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.cloud import Cloud
-from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.resample import resize
 
 CLEAN_BYTES = 2**30
@@ -55,10 +54,10 @@ def cloud_sha256(cloud: Cloud) -> str:
 
 
 def stations_of(maker: Maker, columns: list[int]) -> list[int] | None:
-    """Return the numbers of the stations that images show, None where range profiles need all of them."""
+    """Return the numbers of the stations that images show, None where range cells are shown, which need all of them."""
     spectra = Spectra.from_settings(maker.render["spectra"])
     shown = sorted({number // len(spectra) for number in columns})
-    return None if profile_cells(spectra, maker.network) else shown
+    return None if of_cells(spectra) else shown
 
 
 def views_of(
@@ -69,7 +68,7 @@ def views_of(
     stations: those that the images show (`stations_of`), the only ones that are computed; all by default.
     """
     signal = maker.signal(row, snr_db, stations)
-    images = maker.renderer.some(signal, columns, maker.late(row), maker.profiles(row, snr_db, signal))
+    images = maker.renderer.some(signal, columns, maker.late(row), maker.shown(row, snr_db, signal))
     return images if images.shape[-1] == size else resize(images, size)
 
 

@@ -71,9 +71,8 @@ def write(record: Record, twin: Twin, images: dict, folder: str | Path) -> int:
     if record.label is not None:
         rows = [_row(record, number) | {"fold": "test"} for number in range(len(tiles))]
         shard = folder / "shards" / "recording.tar"
-        write_shard(
-            shard, ChunkSamples(rows, [math.inf], SPLIT, 0, network), "test", "image", lambda number, _: tiles[number]
-        )  # fmt: skip
+        chunk = ChunkSamples(rows, [math.inf], SPLIT, 0, network)
+        write_shard(shard, chunk, "test", "image", lambda number, _: (tiles[number], {}))
         build(
             [shard],
             {"network": block(own), "spectra": spectra_block(own), "images": images},

@@ -2,8 +2,8 @@
 
     python -m lowalt.report.documents DOCUMENT NAME=FOLDER/PREFIX ...
 
-replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`; NAME is `schemes`: accuracy of every scheme
-next to the paper's, and which orderings hold.
+replaces the text between `<!-- NAME -->` and `<!-- end of NAME -->`. NAME is `schemes`: accuracy of every scheme
+next to the paper's, and which orderings hold; or `presets`: those of `make accuracy-cost`, their time and accuracy.
 """
 
 from pathlib import Path
@@ -12,6 +12,7 @@ from lowalt.config.command import run
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
+from lowalt.report.figures import cost_plots
 from lowalt.report.sections.orderings import ordering_words
 from lowalt.report.tables import by_scheme
 
@@ -52,7 +53,22 @@ def schemes(prefix: str) -> str:
     return text + f"\nMeasured on {rows[0]['hardware']}.\n"
 
 
-MAKERS = {"schemes": schemes}
+def presets(prefix: str) -> str:
+    """Return the table of presets from {prefix}accuracy_cost.csv, the quickest first; "" where it has none."""
+    rows = read_csv(f"{prefix}accuracy_cost.csv", *cost_plots.RECOGNITION, *cost_plots.PRESET)
+    rows = sorted((row for row in rows if row["preset"]), key=cost_plots.seconds)
+    text = _head(["preset", "core-seconds, data + training", "unseen, % (95 % interval)", "command"]) if rows else ""
+    for row in rows:
+        data, training, *percents = (
+            float(row[name])
+            for name in ("core_s_data", "core_s_training", "unseen_percent", "macro_f1_low", "macro_f1_high")
+        )
+        cells = [f"{data:.0f} + {training:.0f}", "{:.1f} ({:.1f} to {:.1f})".format(*percents), f"`{row['command']}`"]
+        text += _line([row["preset"], *cells])
+    return text
+
+
+MAKERS = {"schemes": schemes, "presets": presets}
 
 
 def fill(document: str, name: str, table: str) -> str:

@@ -20,15 +20,9 @@ FILES = (
 """Names of which every manifest has one file."""
 LISTS = ("clouds", "benchmarks")
 """Names of which every manifest has a list of files."""
-KEPT = {
-    "accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv",
-    "echo_pixels": "default-cost_pixels.csv",
-}  # fmt: skip
+KEPT = {"accuracy_cost": "default-accuracy_cost.csv", "echo_cost": "default-cost.csv"}
 """Tables in results/reference that the page shows where the run has none of its own: file by the own table's name."""
-OPTIONAL = (
-    "published", "transfer", "echo_cost_figure", "measured", *KEPT,
-    *(f"kept_{name}" for name in KEPT),
-)  # fmt: skip
+OPTIONAL = ("published", "transfer", "measured", *KEPT, *(f"kept_{name}" for name in KEPT))
 """Names that a manifest leaves out where the run has no such file; the page then has no such section."""
 OPTIONAL_LISTS = ("predictions",)
 """Names of lists that a manifest may leave out."""

@@ -117,6 +117,8 @@
     const still = figure.querySelector("div"), live = document.createElement("div");
     live.setAttribute("aria-label", spec.description);
     figure.prepend(live);
+    // Beside the axis and its title, so that a narrow screen shows the whole of a single panel.
+    if (typeof spec.width === "number") spec.width = Math.min(spec.width, figure.clientWidth - 125);
     const options = { renderer: "svg", actions: { export: true, source: false, compiled: false, editor: false } };
     window.vegaEmbed(live, spec, options).then(() => { still.hidden = true; }, () => { live.remove(); });
   }

@@ -107,20 +107,22 @@ def motion(cloud: Cloud, row: dict) -> dict:
 
 
 def panels(renderer: Renderer) -> list[dict]:
-    """Return what the images of a tile show, station by station: names, seconds, speeds of the edges, ticks."""
+    """Return what the images of a tile show, station by station: names, axes, ticks."""
     found = []
     for row, station in enumerate(renderer.network.stations):
         for column, name in enumerate(renderer.spectra):
             axes = axes_of(name, station, renderer)
-            low, high = sorted((axes.bottom_mps, axes.top_mps))
+            low, high = sorted(axes.upwards[1:])
+            (across, left, right), (upwards, first, last) = axes
             folds = largest_speed(station.frequency_hz, renderer.network.symbol_interval_s)
             ticks = {
                 key: [float(f"{t:g}") for t in MaxNLocator(4).tick_values(*ends) if ends[0] <= t <= ends[1]]
-                for key, ends in (("x", (0.0, axes.seconds)), ("y", (low, high)))
+                for key, ends in (("x", (left, right)), ("y", (low, high)))
             }
             found.append(
                 {"row": row, "column": column, "station": station.name, "title": spectrum(name).TITLE, "low": low,
-                 "high": high, "seconds": axes.seconds, "turned": axes.bottom_mps > axes.top_mps,
+                 "high": high, "left": left, "right": right, "across": across, "upwards": upwards.partition("\n")[0],
+                 "turned": first > last,
                  "folds": folds, **ticks}
             )  # fmt: skip
     return found

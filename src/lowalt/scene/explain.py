@@ -13,9 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from lowalt.config.network import Network, Station, masts_m
+from lowalt.config.plan import motion_block
 from lowalt.files.errors import InputError
-from lowalt.motion.sample import draw, region_polygon
-from lowalt.numerics.streams import stream
+from lowalt.motion.sample import region_polygon
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import model_rows
 from lowalt.scene.catalogue import PLACES, NamedEffect, called
 from lowalt.scene.chain import SceneSample, received_signal
 from lowalt.scene.checks import check
@@ -100,12 +102,13 @@ def samples(config: dict, inputs: Path | None, named: list[tuple[str, int]]) -> 
         named = list(firsts.values())
     masts = np.array(masts_m(config["network"]), dtype=float)
     corners = region_polygon(masts, config["motion"]["region"]["polygon_m"])
-    result = []
+    motion, result = motion_block(config), []
+    path = path_of(motion, corners, masts)
     for name, model in named:
         record = records[name]
         cloud = make(record, inputs, config["seed"])
-        rng = stream(config["seed"], "motion", name, model)
-        row = draw(rng, cloud, record["published"], masts, corners, config["motion"])
+        track, look = divmod(model, motion.get("looks", 1))
+        row = model_rows(config["seed"], cloud, record["published"], masts, corners, motion, track, path)[look]
         try:
             surfaces = occluders.make(record, inputs, config["seed"]) | {"subtype": name}
         except InputError:

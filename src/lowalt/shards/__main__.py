@@ -8,19 +8,22 @@ from lowalt.config.command import dispatch, parser, pick, run
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.motion import read_table
-from lowalt.shards.content import clean_content, noisy_content
+from lowalt.shards.content import clean_content, cube_content, noisy_content
 from lowalt.shards.index import build
 from lowalt.shards.record import accompanied
 from lowalt.shards.table import KINDS
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
+from lowalt.targets.cloud import read as read_cloud
+from lowalt.targets.occluders import read_all
+from lowalt.tiles.cubes import Cubes
 
 
 def write(arguments: list[str]) -> None:
     """Write one shard and its table.
 
     Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions in a scene that has them, and
-    those of canceller for recipe shards.
+    those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
     """
     options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
     options.add_argument("--motion", required=True, help="the chunk's motion table")
@@ -32,6 +35,8 @@ def write(arguments: list[str]) -> None:
     options.add_argument(
         "--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station; recipe shards"
     )
+    options.add_argument("--clouds", nargs="*", default=[], help="clouds of the chunk's subtypes; cube shards")
+    options.add_argument("--occluders", nargs="*", default=[], help="surfaces of the chunk's subtypes; cube shards")
     options.add_argument("--fold", required=True, help="train, val or test")
     options.add_argument("--piece", nargs=2, type=int, default=(0, 1), metavar=("NUMBER", "COUNT"),
                          help="the shard's place among the shards of the fold")  # fmt: skip
@@ -40,6 +45,7 @@ def write(arguments: list[str]) -> None:
     classes = _classes(given.settings)
     canceller = given.settings.pop("canceller", None)
     added = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
+    echo = given.settings.pop("echo", {})
     seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
     kind, _ = pick({"largest_mb": None, **shards}, "kind", "largest_mb")
     if not 0 <= given.piece[0] < given.piece[1]:
@@ -47,11 +53,16 @@ def write(arguments: list[str]) -> None:
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
     rows = [accompanied(row, added, seed) for row in read_table(given.motion)]
+    scene, powers = {"seed": seed, "network": network, **echo}, None
     snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
-    if kind == "recipe":
+    if kind == "cube":
+        clouds = {cloud.subtype: cloud for cloud in map(read_cloud, given.clouds)}
+        cubes = Cubes.from_settings(scene, clouds, read_all(given.occluders) if given.occluders else None)
+        content = cube_content(given.signals, cubes, rows, snrs, network)
+    elif kind == "recipe":
         content, powers = clean_content(given.echoes, given.powers, network, len(rows))
     else:
-        content, powers = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs))), None
+        content = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs)))
     samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
     write_shard(given.out, samples, given.fold, kind, content, tuple(given.piece))
 

@@ -27,7 +27,7 @@ def write_run(dataset: Dataset, folder: str | Path, kind: str, clouds: bool = Tr
     """Write the shards of all groups and folds of a data set, its motion tables and clouds below `folder`, as the
     workflow does; return the index.
 
-    kind: "image", "signal" or "recipe"; clouds: whether cloud files are written too.
+    kind: "image", "signal", "recipe" or "cube"; clouds: whether cloud files are written too.
     Raises: InputError naming the sample that cannot be computed.
     """
     folder, plan = Path(folder), dataset.plan
@@ -64,12 +64,12 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     # A shard's samples are shuffled, so the echoes of all its motion models are kept until it is written.
     maker.kept = len(rows)
 
-    def content(number: int, level: int) -> bytes:
-        """Bytes of the data member of one sample: row `number` at SNR `level` of the chunk."""
+    def content(number: int, level: int) -> tuple[bytes, dict]:
+        """The data of one sample, row `number` at SNR `level` of the chunk, and what its record tells of its cubes."""
         if kind == "recipe":
-            return npy(maker.received(rows[number])[0])
+            return npy(maker.received(rows[number])[0]), {}
         signal = maker.signal(rows[number], levels[level])
-        return npy(signal) if kind == "signal" else maker.png(signal, rows[number], levels[level])
+        return maker.data(kind, signal, rows[number], levels[level])
 
     powers, effects = None, maker.echo["effects"]
     canceller = (effects["canceller"] or {}) if "canceller" in effects else None

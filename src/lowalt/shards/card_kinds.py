@@ -3,12 +3,13 @@
 WHAT and READING leave the numbers of stations and spectra, and the names of the spectra, to `str.format`.
 """
 
-MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
+MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy", "cube": "cube.npy"}
 """Extension of the member next to the record."""
 
 WHAT = {
     "image": "{stations} x {columns} tiles of time-frequency images",
     "signal": "complex symbol-domain signals",
+    "cube": "all range cells of every symbol, complex, with noise",
     "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
 }
 """Name of the data in the description."""
@@ -28,6 +29,12 @@ READING = {
     "signal": _SAMPLE.format(
         extension="npy",
         meaning="the noisy signals, float32 (stations, symbols, 2: real and imaginary part), which make the tiles",
+    ),
+    "cube": _SAMPLE.format(
+        extension="cube.npy",
+        meaning="the range cells of every symbol with noise, float32 (stations, symbols, cells, 2: real and imaginary "
+        "part); the record's `cube` tells at every symbol the cell that the receiver chose (-1: none received), which "
+        "holds the signal, and the target's true range, radial speed, direction and cell",
     ),
     "recipe": """\
 Each shard is a plain tar in the WebDataset layout. A motion model, with the samples of all its SNRs, has two members:

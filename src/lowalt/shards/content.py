@@ -1,6 +1,6 @@
 """The files of a chunk from earlier stages, as a function from (motion model, SNR) to a shard member's bytes."""
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -8,11 +8,11 @@ from lowalt.config.network import Network
 from lowalt.files.atomic import existing
 from lowalt.files.errors import InputError
 from lowalt.noise.__main__ import load_echoes, load_powers
-from lowalt.shards.record import npy
+from lowalt.shards.record import npy, of_cubes
+from lowalt.shards.write import Content
+from lowalt.tiles.cubes import Cubes
 from lowalt.tiles.files import Tiles
 from lowalt.tiles.signals import load_signals
-
-Content = Callable[[int, int], bytes]
 
 
 def noisy_content(
@@ -30,13 +30,13 @@ def noisy_content(
     if found.shape[:2] != expected:
         raise InputError(f"{signals}: shape {found.shape}, expected {models} models and {levels} SNRs")
     if kind == "signal":
-        return lambda number, level: npy(found[number, level])
+        return lambda number, level: (npy(found[number, level]), {})
     if tiles is None:
         raise InputError("--tiles: missing, image shards are packed from them")
     images = Tiles(tiles)
     if len(images) != models * levels:
         raise InputError(f"{tiles}: {len(images)} images, expected {models * levels}")
-    return lambda number, level: images[number * levels + level]
+    return lambda number, level: (images[number * levels + level], {})
 
 
 def clean_content(
@@ -55,5 +55,30 @@ def clean_content(
         raise InputError(
             f"{existing(echoes[0], 'echo')}: {found[0].dtype} {found[0].shape}, expected complex64 {wanted[1:]}"
         )
-    content = lambda number, level: npy(np.stack([echo[number] for echo in found]))  # noqa: E731
+
+    def content(number: int, level: int) -> tuple[bytes, dict]:
+        """The clean echoes of one motion model."""
+        return npy(np.stack([echo[number] for echo in found])), {}
+
     return content, load_powers(powers, stations, models) if powers else None
+
+
+def cube_content(
+    signals: str | None, cubes: Cubes, rows: Sequence[dict], snrs: Sequence[float], network: Network
+) -> Content:
+    """Return the content of cube shards from the chunk's noisy signals and what makes their cubes.
+
+    Raises: InputError naming the option or file that is missing or does not fit.
+    """
+    if signals is None:
+        raise InputError("--signals: missing, cube shards are packed from them")
+    found = load_signals(signals, network)
+    if found.shape[:2] != (len(rows), len(snrs)):
+        raise InputError(f"{signals}: shape {found.shape}, expected {len(rows)} models and {len(snrs)} SNRs")
+
+    def content(number: int, level: int) -> tuple[bytes, dict]:
+        """The cubes of one sample and what its record tells of them."""
+        heard = zip(network.stations, found[number, level], strict=True)
+        return of_cubes([cubes.of(rows[number], snrs[level], *each) for each in heard], network)
+
+    return content

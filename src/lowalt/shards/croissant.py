@@ -73,13 +73,18 @@ MEDIA = {
         "sc:Text",
         "Signals (stations, symbols, re and im), float32, as an .npy file.",
     ),
+    "cube": (
+        "application/octet-stream",
+        "sc:Text",
+        "Range cells with noise (stations, symbols, cells, re and im), float32, as an .npy file.",
+    ),
     "recipe": (
         "application/octet-stream",
         "sc:Text",
         "Echoes without noise of a motion model (stations, symbols, re and im), float32, as an .npy file.",
     ),
 }
-OF = {"image": "sample", "signal": "sample", "recipe": "motion model"}
+OF = {"image": "sample", "signal": "sample", "cube": "sample", "recipe": "motion model"}
 """The set of records that one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
 
 

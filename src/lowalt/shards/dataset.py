@@ -16,16 +16,18 @@ import numpy as np
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan
+from lowalt.config.plan import GROUPS, Plan, motion_block
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
 from lowalt.files.yaml_files import load_yaml
-from lowalt.motion.sample import draw, region_polygon
-from lowalt.numerics.streams import stream
+from lowalt.motion.sample import region_polygon
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
-from lowalt.shards.record import accompanied, npy, record, sample_key
+from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
+from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.records import records_of
 
@@ -111,6 +113,9 @@ class Dataset:
         self.clouds = clouds if isinstance(clouds, Mapping) else CloudFolder(clouds)
         self._masts = np.array(masts_m(config["network"]), float)
         self._corners = region_polygon(self._masts, config["motion"]["region"]["polygon_m"])
+        self._motion = motion_block(located(config))
+        self._path = path_of(self._motion, self._corners, self._masts)
+        self._drawn: tuple[tuple, list[dict]] = (), []
         render = {key: config[key] for key in ("network", "spectra", "images")}
         echo = {"tolerance": config["echo"]["tolerance"], "effects": config["effects"]}
         self.maker = Maker(render, echo, config["seed"], self.clouds, occluders)
@@ -154,25 +159,27 @@ class Dataset:
 
     def _fold(self, place: Place) -> str:
         """Fold of a sample."""
-        return fold(self.plan.split, self.plan.seed, place.subtype, place.model, place.snr_db)
+        return fold(self.plan.split, self.plan.seed, place.subtype, place.model // self.plan.looks, place.snr_db)
 
     def row(self, place: Place) -> dict:
         """Return the motion table's row of a sample; models beyond the configuration's count are drawn too."""
-        rng = stream(self.plan.seed, "motion", place.subtype, place.model)
-        published, settings = self.published[place.subtype], self.config["motion"]
-        cloud = self.clouds[place.subtype]
-        row = draw(rng, cloud, published, self._masts, self._corners, settings)
-        row = {**row, "group": place.group, "model": place.model}
+        track, look = divmod(place.model, self.plan.looks)
+        name = place.subtype, track
+        # The looks of a track are drawn together, and most often asked for one after the other.
+        if self._drawn[0] != name:
+            sources = self.clouds[place.subtype], self.published[place.subtype], self._masts, self._corners
+            self._drawn = name, model_rows(self.plan.seed, *sources, self._motion, track, self._path)
+        row = {**self._drawn[1][look], "group": place.group, "model": place.model}
         return accompanied(row, self.config["effects"], self.plan.seed)
 
     def made_signal(self, place: Place) -> np.ndarray:
         """Return the noisy signals of a sample, (stations, symbols) complex64."""
         return self.maker.signal(self.row(place), place.snr_db)
 
-    def made_record(self, place: Place) -> bytes:
-        """Return the JSON record of a sample."""
+    def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
+        """Return the JSON record of a sample; cubes: what it tells of each station's cube."""
         row, told = self.row(place), self._fold(place)
-        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes)
+        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes, cubes)
 
     def made(self, place: Place) -> Sample:
         """Return a sample by its group, subtype, motion model and SNR.
@@ -207,12 +214,16 @@ class Dataset:
         return json.loads(self.made_record(self.place(number)))
 
     def members(self, number: int, kind: str) -> tuple[bytes, bytes]:
-        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", or "signal" and
-        "recipe", which hold the same)."""
+        """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", "cube", or
+        "signal" and "recipe", which hold the same)."""
         place = self.place(number)
-        signal = self.made_signal(place)
-        data = self.maker.png(signal, self.row(place), place.snr_db) if kind == "image" else npy(signal)
-        return self.made_record(place), data
+        data, told = self.maker.data(kind, self.made_signal(place), self.row(place), place.snr_db)
+        return self.made_record(place, told), data
+
+    def cubes(self, number: int) -> list[Cube]:
+        """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and the truth."""
+        place = self.place(number)
+        return self.maker.cubes(self.row(place), place.snr_db, self.made_signal(place))
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""

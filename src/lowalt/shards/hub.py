@@ -74,7 +74,11 @@ def features(shards: ShardSet) -> list[dict]:
             return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
         return {"name": name, "dtype": DTYPES[type(value)]}
 
-    data = {"list": {"list": {"list": "float32"}}} if shards.kind != "image" else {"dtype": "image"}
+    data: dict = {"dtype": "image"}
+    if shards.kind != "image":
+        # Numbers lie in as many lists as the array has axes.
+        axes = {"list": {"list": {"list": "float32"}}}
+        data = {"list": axes} if shards.kind == "cube" else axes
     record = typed("json", json.loads(shards.stored(0, "record")))
     return [typed("__key__", ""), typed("__url__", ""), record, {"name": EXTENSIONS[shards.kind], **data}]
 

@@ -10,14 +10,16 @@ import numpy as np
 
 from lowalt.config.network import Network
 from lowalt.echo.chunk import clean_signals
-from lowalt.files.errors import InputError
 from lowalt.noise.chunk import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
+from lowalt.shards.record import npy, of_cubes
 from lowalt.spectra import Spectra
+from lowalt.spectra.catalogue import of_cells
+from lowalt.spectra.cube import Cube
 from lowalt.targets.cloud import Cloud
+from lowalt.tiles.cubes import Cubes
 from lowalt.tiles.png import encode
-from lowalt.tiles.profiles import Profiles, profile_cells
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.settings import Images
 
@@ -46,7 +48,7 @@ class Maker:
     def __getstate__(self) -> dict:
         """State for pickle, without tables and kept echoes."""
         # Workers prepare tables of their own.
-        kept = {name: value for name, value in self.__dict__.items() if name not in ("renderer", "_profiles")}
+        kept = {name: value for name, value in self.__dict__.items() if name not in ("renderer", "_cubes")}
         return {**kept, "_received": {}}
 
     @functools.cached_property
@@ -55,17 +57,23 @@ class Maker:
         return Renderer(self.network, Spectra.from_settings(self.render["spectra"]), self.images)
 
     @functools.cached_property
-    def _profiles(self) -> Profiles | None:
-        """What makes range profiles, where a spectrum shows them."""
-        cells = profile_cells(Spectra.from_settings(self.render["spectra"]), self.network)
-        if cells and self.echo["effects"]:
-            raise InputError(f"spectra: range profiles together with effects {sorted(self.echo['effects'])}")
-        return Profiles(self.network, self.clouds, self.seed, cells, self.kept) if cells else None
+    def _cubes(self) -> Cubes:
+        """What makes the cubes of samples."""
+        scene = {"seed": self.seed, "network": self.render["network"], **self.echo}
+        return Cubes.from_settings(scene, self.clouds, self.occluders)
 
-    def profiles(self, row: dict, snr_db: float, signal: np.ndarray) -> np.ndarray | None:
-        """Return the magnitudes of the range profiles of one sample, (stations, cells, symbols); None where no spectrum
-        shows them. signal: its noisy signals (stations, symbols)."""
-        return self._profiles.magnitudes(row, snr_db, signal) if self._profiles else None
+    def cubes(self, row: dict, snr_db: float, signal: np.ndarray) -> list[Cube]:
+        """Return the cube of each station of a sample of the motion model `row` at an SNR (dB); signal: its noisy
+        signals (stations, symbols).
+
+        Raises: InputError naming the sample that cannot be computed.
+        """
+        pairs = zip(self.network.stations, signal, strict=True)
+        return [self._cubes.of(row, snr_db, station, heard) for station, heard in pairs]
+
+    def shown(self, row: dict, snr_db: float, signal: np.ndarray) -> list[Cube] | None:
+        """Return the cubes that images are made of, as `cubes`; None where no spectrum is made of range cells."""
+        return self.cubes(row, snr_db, signal) if of_cells(self.render["spectra"]) else None
 
     def received(
         self, row: dict, snr_db: float | None = None, stations: Sequence[int] | None = None
@@ -132,8 +140,19 @@ class Maker:
 
     def tile(self, signal: np.ndarray, row: dict, snr_db: float) -> np.ndarray:
         """Return the tile of one sample of the motion model `row` at an SNR (dB); signal: (stations, symbols)."""
-        return self.renderer.tile(signal, late=self.late(row), profiles=self.profiles(row, snr_db, signal))
+        return self.renderer.tile(signal, late=self.late(row), cubes=self.shown(row, snr_db, signal))
 
     def png(self, signal: np.ndarray, row: dict, snr_db: float) -> bytes:
         """Return the PNG file of the tile of one sample of the motion model `row` at an SNR (dB)."""
         return encode(self.tile(signal, row, snr_db), self.images.palette)
+
+    def data(self, kind: str, signal: np.ndarray, row: dict, snr_db: float) -> tuple[bytes, dict]:
+        """Return the data of one sample as a shard of a kind holds it, and what its record tells of its cubes.
+
+        kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols).
+        """
+        if kind == "image":
+            return self.png(signal, row, snr_db), {}
+        if kind == "cube":
+            return of_cubes(self.cubes(row, snr_db, signal), self.network)
+        return npy(signal), {}

@@ -21,9 +21,10 @@ from lowalt.files.errors import InputError
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
-from lowalt.shards.record import npy, row_of
+from lowalt.shards.record import cubes_of, npy, row_of
 from lowalt.shards.table import map_samples, table_path
-from lowalt.spectra.catalogue import named
+from lowalt.spectra.catalogue import named, of_cells
+from lowalt.spectra.cube import Cube
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
@@ -187,16 +188,31 @@ class ShardSet:
         return self.stored(number, "data")
 
     def signal(self, number: int) -> np.ndarray:
-        """Return the signals of a sample of a signal or recipe shard, (stations, symbols) complex64.
+        """Return the signals of a sample of a signal, recipe or cube shard, (stations, symbols) complex64.
 
         Raises: InputError where these are image shards, or naming shard and sample where it is damaged.
         """
-        self._need("signal", "recipe")
+        self._need("signal", "recipe", "cube")
+        if self.kind == "cube":
+            return np.stack([cube.signal for cube in self.cubes(number)])
         stored = complex_signals(np.lib.format.read_array(io.BytesIO(self.stored(number, "data"))))
         if self.kind == "signal":
             return stored
         stations = station_names(self.index["render"]["network"])
         return noisy(json.loads(self.stored(number, "record")), stored, stations, self._snr_db(number))
+
+    def cubes(self, number: int) -> list[Cube]:
+        """Return the cube of each station of a sample of a cube shard.
+
+        Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
+        """
+        self._need("cube")
+        cells = complex_signals(np.lib.format.read_array(io.BytesIO(self.stored(number, "data"))))
+        return cubes_of(self.record(number), cells)
+
+    def _shown(self, number: int) -> list[Cube] | None:
+        """The cubes of a sample where images are made of them."""
+        return self.cubes(number) if of_cells(self.spectra) else None
 
     def late(self, number: int) -> np.ndarray | None:
         """Return how late the symbols of a sample are, (stations, symbols) intervals; None where images do not ask."""
@@ -212,7 +228,7 @@ class ShardSet:
         Raises: InputError naming shard and sample where it is damaged.
         """
         if self.kind != "image":
-            return self.renderer.tile(self.signal(number), late=self.late(number))
+            return self.renderer.tile(self.signal(number), late=self.late(number), cubes=self._shown(number))
         return decode(self.png(number))[0]
 
     def images(
@@ -230,7 +246,7 @@ class ShardSet:
         """
         numbers = self.columns(stations, views)
         if self.kind != "image":
-            images = self.renderer.some(self.signal(number), numbers, self.late(number))
+            images = self.renderer.some(self.signal(number), numbers, self.late(number), self._shown(number))
         else:
             images = split(self.tile(number), len(self.spectra))[numbers]
         return images if size in (None, images.shape[-1]) else resize(images, size)

@@ -5,6 +5,7 @@ Every field has one type in all records, and no value is missing, so that tables
 
 import json
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,9 +14,13 @@ from lowalt.config.classes import CATEGORIES, label
 from lowalt.config.network import Network, Station
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
+from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
+from lowalt.spectra.cube import TRUTH, Cube
 from lowalt.tiles.files import npy_header
+
+NAMES = ("subtype", "category", "group", "model")
 
 
 def snr_label(snr_db: float) -> str:
@@ -97,17 +102,19 @@ def _seen(row: dict, station: Station) -> dict[str, float]:
 
 
 def record(
-    row: dict, snr_db: float, fold: str, seed: int, network: Network, classes: tuple[str, ...] = CATEGORIES
-) -> bytes:
+    row: dict, snr_db: float, fold: str, seed: int, network: Network, classes: tuple[str, ...] = CATEGORIES,
+    cubes: dict | None = None,
+) -> bytes:  # fmt: skip
     """Return the JSON record of one sample: name, class, motion, geometry for each station, seed and versions.
 
     row: a row of the motion table; a number that does not apply to the target is NaN there and 0 here. `noise` says
     whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
-    targets in the beam, the record has it too; the label is the row's own target's. classes: in the order of their
-    labels. Raises: InputError where the row's category is no class.
+    targets in the beam, the record has it too; the label is the row's own target's. A row of a track adds its track
+    and look. classes: in the order of their labels; cubes: what is told of each station's cube (`of_cubes`).
+    Raises: InputError where the row's category is no class.
     """
-    names = ("subtype", "category", "group", "model")
+    names = NAMES + TRACK * (TRACK[0] in row)
     motion = {name: value for name, value in row.items() if name not in (*names, "fold", "companions")}
     added = {"companions": list(row["companions"])} if "companions" in row else {}
     blank = None if math.isnan(row["x_m"]) else 0.0
@@ -125,9 +132,31 @@ def record(
             station: {name: None if math.isnan(value) else value for name, value in seen.items()}
             for station, seen in geometry(row, network).items()
         },
+        **({"cube": cubes} if cubes else {}),
         "versions": versions(),
     }
     return encoded(content)
+
+
+def of_cubes(cubes: Sequence[Cube], network: Network) -> tuple[bytes, dict]:
+    """Return the cubes of a sample as the bytes of an .npy file, (stations, symbols, cells, 2) float32, and what its
+    record tells of each station: the chosen cells and the truth of each symbol, to six decimals."""
+    told = {
+        station.name: {
+            "chosen": cube.chosen.tolist(),
+            **{name: cube.truth[:, place].round(6).tolist() for place, name in enumerate(TRUTH)},
+        }
+        for station, cube in zip(network.stations, cubes, strict=True)
+    }
+    return npy(np.stack([cube.cells for cube in cubes])), told
+
+
+def cubes_of(entry: dict, cells: np.ndarray) -> list[Cube]:
+    """Return the cubes that a record and its range cells (stations, symbols, cells) complex64 hold."""
+    return [
+        Cube(held, np.array(told["chosen"]), np.column_stack([told[name] for name in TRUTH]))
+        for held, told in zip(cells, entry["cube"].values(), strict=True)
+    ]
 
 
 def accompanied(row: dict, effects: dict, seed: int) -> dict:
@@ -148,7 +177,7 @@ def row_of(entry: dict) -> tuple[dict, float]:
     if "noise" not in entry:
         made_by = entry.get("versions", {}).get("lowalt", "an unknown version")
         raise InputError(f"sample {entry.get('key')}: record of lowalt {made_by}, expected of 0.2 or later")
-    names = ("subtype", "category", "group", "model")
+    names = NAMES + TRACK * (TRACK[0] in entry)
     snr_db = entry["snr_db"] if entry["noise"] else math.inf
     return {**{name: entry[name] for name in names}, **entry["motion"]}, snr_db
 

@@ -13,7 +13,7 @@ from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
-from lowalt.shards.record import accompanied, npy, record, row_of
+from lowalt.shards.record import accompanied, record, row_of
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.occluders import read_all
 
@@ -83,9 +83,9 @@ class Remaker:
         row, snr_db = row_of(entry)
         seed = entry["seed"]
         maker, signal = self._maker(seed), self.signal(entry)
-        data = maker.png(signal, row, snr_db) if self.shards.kind == "image" else npy(signal)
+        data, told = maker.data(self.shards.kind, signal, row, snr_db)
         row = accompanied(row, self.shards.index["echo"]["effects"], seed)
-        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes), data
+        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, told), data
 
     def faults(self, number: int) -> list[str]:
         """Return one line for each member of a sample that differs from the stored one.

@@ -69,7 +69,7 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
     Raises: InputError where the shards hold images, or naming a damaged sample.
     """
     if shards.kind == "image":
-        raise InputError(f"{shards.index_path}: shards of kind 'image', expected 'signal' or 'recipe'")
+        raise InputError(f"{shards.index_path}: shards of kind 'image', expected 'signal', 'recipe' or 'cube'")
     network = Network.from_settings(shards.index["render"]["network"])
     written = []
     for place, station in enumerate(network.stations):

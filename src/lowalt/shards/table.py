@@ -32,9 +32,10 @@ SAMPLE = np.dtype(
         ("sha256", "u1", (32,)),
     ]
 )
-KINDS = ("image", "signal", "recipe")
-"""Tiles as PNG files, noisy signals, or clean echoes from which noisy signals are made (`lowalt.shards.clean`)."""
-EXTENSIONS = {"image": "png", "signal": "npy", "recipe": "clean.npy"}
+KINDS = ("image", "signal", "recipe", "cube")
+"""Tiles as PNG files, noisy signals, clean echoes from which noisy signals are made (`lowalt.shards.clean`), or
+all range cells with noise."""
+EXTENSIONS = {"image": "png", "signal": "npy", "recipe": "clean.npy", "cube": "cube.npy"}
 
 
 def table_path(shard: str | Path) -> Path:

@@ -17,6 +17,8 @@ from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
 from lowalt.shards.table import write as write_table
 from lowalt.shards.tar import Span, Writer
 
+Content = Callable[[int, int], tuple[bytes, dict]]
+
 
 class ChunkSamples(NamedTuple):
     """The samples of a chunk: every motion model at every SNR.
@@ -42,7 +44,7 @@ def select(rows: list[dict], snrs: list[float], split: dict, seed: int, wanted: 
     for number, row in enumerate(rows):
         for level, snr_db in enumerate(snrs):
             # A measured sample's row names its fold; a simulated sample's fold is drawn.
-            dealt = row.get("fold") or fold(split, seed, row["subtype"], row["model"], snr_db)
+            dealt = row.get("fold") or fold(split, seed, row["subtype"], row.get("track", row["model"]), snr_db)
             if dealt == wanted:
                 chosen.append((rank(seed, row["subtype"], row["model"], snr_db), number, level))
     return [(number, level) for _, number, level in sorted(chosen)]
@@ -55,15 +57,15 @@ def _entry(key: str, number: int, model: int, snr_db: float, span: Span) -> tupl
 
 
 def write_shard(
-    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Callable[[int, int], bytes],
+    path: str | Path, chunk: ChunkSamples, wanted: str, kind: str, content: Content,
     piece: tuple[int, int] = (0, 1),
 ) -> dict:  # fmt: skip
     """Write the samples of the fold `wanted` to `path` (.tar) and their table next to it; return the table's header.
 
-    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy (kind
-    "signal"), or of the row's clean echoes (kind "recipe"). A recipe shard holds each motion model once, at the place
-    of its first sample; all its samples point there. piece: number and count of the pieces that the fold is packed in;
-    the samples of a motion model stay together.
+    content: a function of (row, SNR index) that returns the bytes of the sample's .png (kind "image") or .npy, or of
+    the row's clean echoes (kind "recipe"), and what the record tells of the sample's cubes, {} for other kinds. A
+    recipe shard holds each motion model once, at the place of its first sample; all its samples point there.
+    piece: number and count of the pieces that the fold is packed in; the samples of a motion model stay together.
     Raises: InputError where the chunk mixes groups, has a sample twice, or fold or kind is unknown.
     """
     if wanted not in FOLDS or kind not in KINDS:
@@ -90,12 +92,13 @@ def write_shard(
                 key = sample_key(row["subtype"], row["model"], snr_db)
                 span = spans.get(number)
                 if span is None:
-                    name, text = key, record(row, snr_db, wanted, seed, network, classes)
+                    data, told = content(number, level)
+                    name, text = key, record(row, snr_db, wanted, seed, network, classes, told)
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]
                         text = packed(text, name, sorted(levels[number]), power_w, canceller)
-                    span = tar.add(name, text, EXTENSIONS[kind], content(number, level))
+                    span = tar.add(name, text, EXTENSIONS[kind], data)
                     if kind == "recipe":
                         spans[number] = span
                 table[place] = _entry(key, label(classes, row), row["model"], snr_db, span)

@@ -13,7 +13,7 @@ from typing import Any
 
 from lowalt.config.command import pick
 from lowalt.files.errors import InputError
-from lowalt.spectra.interface import KnowsTimes, OfProfiles, Spectrum
+from lowalt.spectra.interface import KnowsTimes, OfCells, Spectrum
 from lowalt.spectra.settings import windows
 
 LISTED = ("vrp", "trp", "vt")
@@ -27,7 +27,7 @@ INSTANTS = ("even", "known")
 
 
 @functools.cache
-def spectrum(name: str) -> Spectrum:
+def spectrum(name: str) -> Any:
     """Return the module of a spectrum.
 
     Raises: InputError for a name that belongs to none, or a module that lacks a name of the interface.
@@ -35,8 +35,8 @@ def spectrum(name: str) -> Spectrum:
     if name not in NAMES:
         raise InputError(f"spectra: unknown spectrum {name!r}, expected some of {list(NAMES)}")
     module = importlib.import_module(f"lowalt.spectra.kinds.{name}")
-    if not isinstance(module, Spectrum):
-        raise InputError(f"{module.__file__}: lacks a name of lowalt.spectra.interface.Spectrum")
+    if not isinstance(module, (Spectrum, OfCells)):
+        raise InputError(f"{module.__file__}: lacks a name of lowalt.spectra.interface, Spectrum or OfCells")
     return module
 
 
@@ -54,9 +54,9 @@ def named(block: Iterable[str]) -> tuple[str, ...]:
     return found
 
 
-def profiled(block: Iterable[str]) -> bool:
-    """Return whether one of a configuration's spectra is made of range profiles."""
-    return any(isinstance(spectrum(name), OfProfiles) for name in NAMES if name in set(block))
+def of_cells(block: Iterable[str]) -> list[str]:
+    """Return the names of those of a configuration's spectra that are made of all range cells."""
+    return [name for name in NAMES if name in set(block) and isinstance(spectrum(name), OfCells)]
 
 
 def zero_index(name: str) -> int:
@@ -113,13 +113,20 @@ class Spectra(Mapping[str, Any]):
         """Number of spectra."""
         return len(self._settings)
 
-    def check(self, symbols: int, stations: int = 1) -> None:
-        """Refuse signals too short for a window, and spectra that take gigabytes.
+    def check(self, symbols: int, stations: int = 1, subcarriers: int | None = None) -> None:
+        """Refuse signals too short for a window, spectra that take gigabytes, and more range cells than a band has.
 
         Raises: InputError naming the spectrum whose window is no shorter than the signal, or that is too large.
         """
         for name, settings in self.items():
-            windows(symbols, settings.window, settings.hop, name)
-            values = spectrum(name).rows(settings) * (symbols + stations * settings.window)
+            if isinstance(spectrum(name), OfCells):
+                if subcarriers is not None and settings.cells > subcarriers:
+                    raise InputError(
+                        f"spectra.{name}.cells is {settings.cells}, expected at most the {subcarriers} of the band"
+                    )
+                values = settings.cells * spectrum(name).columns(settings, symbols)
+            else:
+                windows(symbols, settings.window, settings.hop, name)
+                values = spectrum(name).rows(settings) * (symbols + stations * settings.window)
             if values > MOST_VALUES:
                 raise InputError(f"spectrum {name}: {values} values with its tables, expected at most {MOST_VALUES}")

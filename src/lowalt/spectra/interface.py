@@ -8,6 +8,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from lowalt.config.network import Network, Station
+from lowalt.spectra.cube import Cube
+
 
 @runtime_checkable
 class Spectrum(Protocol):
@@ -65,12 +68,32 @@ class KnowsTimes(Protocol):
 
 
 @runtime_checkable
-class OfProfiles(Protocol):
-    """A spectrum that is made of range profiles instead of signals; its rows are range cells, its `speeds` ranges."""
+class OfCells(Protocol):
+    """An image that is made of all range cells, a `Cube`, instead of the signal of the chosen ones."""
 
-    AXIS: str
-    """Name and unit of its rows in figures."""
+    TITLE: str
+    SOURCE: str
+    SIGNED: bool
+    ZERO_FIRST: bool
+    Settings: type
+    DEFAULTS: Any
 
-    def fill_profile(self, profile: np.ndarray, settings: Any, out: np.ndarray) -> None:
-        """Fill out (rows, starts) as `fill`, of magnitudes (cells, symbols) float32 of one profile, at most 1."""
+    def rows(self, settings: Any) -> int:
+        """Return the number of rows."""
+        ...
+
+    def columns(self, settings: Any, symbols: int) -> int:
+        """Return the number of columns for a look of so many symbols."""
+        ...
+
+    def axes(self, settings: Any, network: Network, station: Station) -> tuple[tuple[str, float, float], ...]:
+        """Return name with unit, first and last value of the columns and of the rows."""
+        ...
+
+    def definition(self, cube: Cube, settings: Any) -> np.ndarray:
+        """Return the image of a cube in float64, (rows, columns)."""
+        ...
+
+    def fill_cells(self, cube: Cube, settings: Any, out: np.ndarray) -> None:
+        """Fill out (rows, columns) float32 with the image of a cube whose values are below 1."""
         ...

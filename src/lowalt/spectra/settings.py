@@ -85,7 +85,20 @@ class RangeCells:
         whole("window", self.window, 1)
         whole("hop", self.hop, 1)
         if whole("cells", self.cells, 3) % 2 == 0:
-            raise InputError(f"cells is {self.cells}, expected an odd number: the strongest is the middle")
+            raise InputError(f"cells is {self.cells}, expected an odd number: the chosen one is the middle")
+
+
+@dataclass(frozen=True)
+class Doppler:
+    """A range-Doppler map: `cells` of range, odd, and `points` of the zero-padded FFT over the symbols of a look."""
+
+    cells: int
+    points: int
+
+    def __post_init__(self) -> None:
+        whole("points", self.points, 2)
+        if whole("cells", self.cells, 3) % 2 == 0:
+            raise InputError(f"cells is {self.cells}, expected an odd number: the chosen one is the middle")
 
 
 def windows(symbols: int, window: int, hop: int, name: str) -> int:

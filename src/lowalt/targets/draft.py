@@ -109,18 +109,21 @@ def alternating(hubs: np.ndarray) -> list[str]:
 
 
 def refuse_miscount(found: Inspection, groups: list[list[Component]], count: int | None, picture: str) -> None:
-    """Refuse a craft whose rotors are not as many as they should be; where that is not known, names must tell them.
+    """Refuse a target whose rotors or wheels are not as many as they should be; where that is not known, names must
+    tell them.
 
     Raises: InputError naming what was found, the numbered picture and the option to write.
     """
-    named = bool(groups) and all(TURNING["rotor"].search(part.piece) for group in groups for part in group)
-    if found.category != "UAV" or (len(groups) == count if count else named):
+    kind = MOVING_KIND[found.category]
+    named = len({len(group) for group in groups}) == 1  # else some blades may be taken for rotors
+    named &= all(TURNING[kind].search(part.piece) for group in groups for part in group)
+    if kind == "wing" or (named if count is None else len(groups) == count):
         return
-    unknown = f"expected --rotors {len(groups)} where that is all" if groups else "expected at least one"
-    wanted = f"expected {count}" if count else unknown
+    unknown = f"--{kind}s {len(groups)} where that is all" if groups else f"at least one, or --{kind}s 0"
     raise InputError(
-        f"{found.path}: {len(groups)} rotors found, {wanted}; otherwise name each rotor's pieces as numbered in "
-        f"{picture}, such as --moving 3 5+6 7 9. A rotor that has no number is joined to the body: separate it first"
+        f"{found.path}: {len(groups)} {kind}s found, expected {unknown if count is None else count}; otherwise name "
+        f"each {kind}'s pieces as numbered in {picture}, such as --moving 3 5+6 7 9. A {kind} that has no number is "
+        "joined to the body: separate it first"
     )
 
 
@@ -171,8 +174,6 @@ def drafted(
     ]
     if category == "Bird":
         lines += _wings(found)
-    elif not groups:
-        lines.append(f"    # No {kind} was found: give --moving, or add parts of kind {kind} (design/targets.md).")
     names: dict[str, int] = {}
     for group, sense in zip(groups, alternating(hubs), strict=True):
         place = f"{_place(group, found)} {kind}"

@@ -8,10 +8,13 @@ import numpy as np
 from scipy.cluster.hierarchy import fcluster, linkage
 from scipy.spatial import cKDTree
 
-from lowalt.targets.mesh_files import UNITS_M
+from lowalt.targets.mesh_files import UNITS_M, Mesh, edges_of
 
 USUAL_M = {"UAV": (0.08, 8.0), "Bird": (0.08, 2.5), "Vehicle": (2.5, 13.0)}
 """Usual range (m) of the largest extent of a whole target, by category."""
+
+UNUSUAL = 20
+"""A target of a row of its own is at most so many times smaller or larger than that."""
 
 
 ALIKE = 0.1
@@ -30,6 +33,10 @@ blades have a quarter."""
 
 SYMMETRIC = 0.02
 """Mean distance of a mirrored body from itself, in parts of its size, up to which it is symmetric."""
+
+IN_PLANE, AT_ZERO, CUT, OPEN_CUT = 1e-3, 0.01, 0.05, 0.15
+"""A half ends in a plane: distances from it and from the file's zero in parts of the size (at most), and the rectangle
+that its edges there span in parts of that of the extents (at least), in the file's zero and where all are open."""
 
 SLENDER, RADIAL, INWARD = 0.35, 0.95, 0.4
 """An arm's spread across by that along (at most), the cosine of its angle to the line from the craft's middle (at
@@ -53,6 +60,9 @@ TURNING = {
     "wing": re.compile(r"wing", re.I),
 }
 """Words in the names of joints and links, and of pieces of meshes, that say what a part is."""
+
+FIXED = re.compile(r"(?<![a-z])(motor|mount|arm(?![a-z])|leg|skid|land|frame|guard|duct)", re.I)
+"""Words in the names of pieces that do not turn."""
 
 
 @dataclass(frozen=True)
@@ -95,17 +105,42 @@ def guessed_unit(size: float, category: str, wanted_m: float | None = None) -> s
     return min(UNITS_M, key=lambda name: abs(np.log(size * UNITS_M[name] / usual)))
 
 
-def mirror_axis(points: np.ndarray) -> int | None:
-    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
-    cannot be seen: left and right of a bird."""
-    size = float(np.ptp(points, axis=0).max())
+def _off_mirror(points: np.ndarray) -> np.ndarray:
+    """Mean distance (3,) of a body of points (N, 3) from its mirror image along each axis, in parts of its size."""
     tree, off = cKDTree(points), []
     for axis in range(3):
         mirrored = points.copy()
         mirrored[:, axis] = points[:, axis].min() + points[:, axis].max() - points[:, axis]
-        off.append(float(np.mean(tree.query(mirrored)[0])) / max(size, 1e-300))
+        off.append(float(np.mean(tree.query(mirrored)[0])))
+    return np.array(off) / max(float(np.ptp(points, axis=0).max()), 1e-300)
+
+
+def mirror_axis(points: np.ndarray) -> int | None:
+    """Return the axis along which a body of points (N, 3) is its own mirror image and along no other, None where that
+    cannot be seen: left and right of a bird."""
+    off = _off_mirror(points)
     best, second = np.sort(off)[:2]
     return int(np.argmin(off)) if best < SYMMETRIC and best < second / 2 else None
+
+
+def cut_axis(mesh: Mesh, points: np.ndarray, axes: Sequence[int]) -> int | None:
+    """Return which of the axes a half of a target is cut along, None where it seems whole.
+
+    points: (N, 3) m on its surface. A half ends flat in one plane, open or in the file's zero, and is not its own
+    mirror image along that axis.
+    """
+    edges, _, uses = edges_of(mesh.faces)
+    ends, extent = mesh.vertices[edges], np.ptp(mesh.vertices, axis=0)
+    off, size = _off_mirror(points), extent.max()
+    for axis in axes:
+        for limit in (mesh.vertices[:, axis].min(), mesh.vertices[:, axis].max()):
+            there = (np.abs(ends[:, :, axis] - limit) < IN_PLANE * size).all(axis=1)
+            if off[axis] < SYMMETRIC or not there.any():
+                continue
+            span = np.prod(np.delete(np.ptp(ends[there].reshape(-1, 3), axis=0) / extent, axis))
+            if (span > CUT and abs(limit) < AT_ZERO * size) or (span > OPEN_CUT and (uses[there] == 1).all()):
+                return axis
+    return None
 
 
 def guessed_axes(extent: np.ndarray, category: str, up: int | None = None, right: int | None = None) -> tuple[str, str]:
@@ -203,6 +238,9 @@ def rotors(
     for up in ups if count is None or count > 2 else ():  # two alike pieces may be two blades, or skids
         flat = [part for part in parts if part.extent[up] < FLAT * np.delete(part.extent, up).max()]
         flat = [part for part in flat if np.delete(part.extent, up).max() > 0.04 * whole.max()]
+        flat = (
+            [part for part in flat if not FIXED.search(part.piece)] if len({part.piece for part in parts}) > 1 else flat
+        )
         sets = [clusters(flat, up, touching=not count), *(_bladed(flat, up, count) if count else [])]
         sets = [[group for group in groups if _is_rotor(group, [up], whole)] for groups in sets]
         found = _alike_set(sets, up, whole, count)

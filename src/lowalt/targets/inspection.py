@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from lowalt.files.atomic import existing
-from lowalt.targets.guesses import Component, box_of, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
+from lowalt.targets.guesses import Component, box_of, cut_axis, guessed_axes, guessed_unit, mirror_axis, rotors, wheels
 from lowalt.targets.mesh_files import UNITS_M, Mesh, read_mesh, stated_unit_m
 from lowalt.targets.mesh_scene import Piece, pieces
 
@@ -26,7 +26,8 @@ class Inspection:
     `unit` as a record takes it and how it is known (`unit_from`), `low` and `high` (3,), `up` and `front` as guessed,
     `pieces` the names with triangles and extents (3,), `components` from the largest down; `points` (K, 3) m the
     middles of some of the triangles, `owner` (K,) the number of each one's component; `groups` of components that may
-    be one moving part each; `sides_seen`: whether a bird's left and right are given or mirror one another.
+    be one moving part each; `sides_seen`: whether a bird's left and right are given or mirror one another; `cut`: the
+    axis that a half of a target is cut off along, empty for a whole one.
     """
 
     path: Path
@@ -44,6 +45,7 @@ class Inspection:
     owner: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     groups: list[list[Component]] = field(default_factory=list)
     sides_seen: bool = True
+    cut: str = ""
 
     @property
     def shoulder_m(self) -> float:
@@ -135,8 +137,10 @@ def inspect_mesh(
     up, front = (name and "xyz".index(name[-1]) for name in axes)
     ups = [up] if up is not None else [int(axis) for axis in np.argsort(high - low, kind="stable") if axis != front]
     groups: list[list[Component]] = []
-    if category == "UAV":
-        count = row.get("n_rotors_or_wings")
+    count = row.get("n_rotors_or_wings")
+    if count == 0:
+        pass
+    elif category == "UAV":
         best, groups = rotors(parts, ups, high - low, count)
         up = best if up is None and groups else up
     elif category == "Vehicle":
@@ -153,6 +157,7 @@ def inspect_mesh(
         hubs = np.mean([np.mean(box_of(group), axis=0) for group in groups], axis=0)
         # Rotors stand in the upper half; some files have their down axis first.
         guessed = ("-" * bool(hubs[axis] < (low + high)[axis] / 2 - 1e-9) + guessed[0], guessed[1])
+    cut = cut_axis(mesh, points, [axis for axis in range(3) if axis not in ("xyz".index(guessed[0][-1]), front)])
     kind = {"UAV": "rotor", "Vehicle": "wheel"}.get(category, "")
     moving = {part.number for group in groups for part in group}
     parts = [replace(part, guess=kind if part.number in moving else "") for part in parts]
@@ -161,6 +166,7 @@ def inspect_mesh(
     return Inspection(
         path, unit, source, low, high, len(mesh.faces), axes[0] or guessed[0], axes[1] or guessed[1], named, parts,
         category, points, mesh.component[some], groups, seen,
+        "" if cut is None else "xyz"[cut],
     )  # fmt: skip
 
 
@@ -173,11 +179,13 @@ def described(found: Inspection, most: int = 30) -> str:
     """Return an inspection as text, at most `most` components, the largest and those with a guess first."""
     lines = [
         f"{found.path}: {found.triangles} triangles, {len(found.components)} connected components",
+        f"category {found.category} (give --category where it is another)",
         f"unit     {found.unit} ({found.unit_from})",
         f"extent   {_size(found.high - found.low)} m along x, y, z, from {np.round(found.low, 4).tolist()} to "
         f"{np.round(found.high, 4).tolist()}",
         f"up       {found.up} (unless given, guessed from rotors or the smallest extent; the sign is unknown)",
         f"front    {found.front} (unless given, guessed; the sign is unknown)",
+        *([f"half     it ends flat along {found.cut}, as one half of a target does"] if found.cut else []),
         *(
             [f"wings    may begin {found.shoulder_m:.4g} m right and left of the middle"]
             if found.category == "Bird"

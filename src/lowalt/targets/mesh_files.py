@@ -132,13 +132,20 @@ def components(faces: np.ndarray, vertices: int) -> np.ndarray:
     return np.unique(label[faces[:, 0]], return_inverse=True)[1]
 
 
+def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the edges (E, 2) of triangles (F, 3) by their vertices, one triangle that each bounds, and how many do."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    key = edges[:, 0] * (int(faces.max()) + 1) + edges[:, 1]
+    _, first, uses = np.unique(key, return_index=True, return_counts=True)
+    return edges[first], first % len(faces), uses
+
+
 def _outward(vertices: np.ndarray, faces: np.ndarray, component: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the faces with closed components turned outward, and whether each component is closed (C,)."""
     count = int(component.max()) + 1
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    _, first, uses = np.unique(edges[:, 0] * len(vertices) + edges[:, 1], return_index=True, return_counts=True)
+    _, face, uses = edges_of(faces)
     closed = np.ones(count, bool)
-    closed[component[first[uses != 2] % len(faces)]] = False
+    closed[component[face[uses != 2]]] = False
     a, b, c = np.moveaxis(vertices[faces], 1, 0)
     volume = np.bincount(component, portable.dot(a, np.cross(b, c)), minlength=count)
     inverted = closed & (volume < 0)

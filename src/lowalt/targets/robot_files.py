@@ -161,7 +161,9 @@ class _Sdf:
 
     def include(self, element: Element, base: Path, scope: str, above: str, depth: int) -> None:
         """Take the model that an element `include` names."""
-        folder = self.files.find(element.findtext("uri") or "", base)
+        uri = (element.findtext("uri") or "").strip()
+        named = "/" not in uri and not (base / uri).exists()  # Gazebo looks for such a name among its models
+        folder = self.files.find(f"model://{uri}" if named else uri, base)
         path = folder
         if folder.is_dir():
             config = folder / "model.config"

@@ -4,7 +4,6 @@
 formats have axes x front, y left, z up, metres.
 """
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -50,19 +49,33 @@ class Robot:
         return found
 
 
+def _called(joint: Joint, kind: str) -> bool:
+    """Whether a joint or its link is called a rotor, wheel or wing."""
+    return any(TURNING[kind].search(name) for name in (joint.name, joint.child.rsplit("::", 1)[-1]))
+
+
 def turning(robot: Robot, kind: str) -> list[Joint]:
     """Return the joints of a robot whose links are parts of a kind: those that its names call so, else all that turn
     without end and are called nothing else."""
-    others = [pattern for word, pattern in TURNING.items() if word != kind]
-
-    def called(joint: Joint, pattern: re.Pattern) -> bool:
-        """Whether a joint or its link has such a name."""
-        return bool(pattern.search(joint.name) or pattern.search(joint.child.rsplit("::", 1)[-1]))
-
     able = [joint for joint in robot.joints if joint.endless or kind == "wing"]
     able = [joint for joint in able if any(robot.surfaces.get(link) for link in robot.below(joint.child))]
-    named = [joint for joint in able if called(joint, TURNING[kind])]
-    return named or [joint for joint in able if joint.endless and not any(called(joint, one) for one in others)]
+    named = [joint for joint in able if _called(joint, kind)]
+    return named or [joint for joint in able if joint.endless and not any(_called(joint, word) for word in TURNING)]
+
+
+def category_of(robot: Robot) -> str:
+    """Return "UAV" where parts called rotors turn, "Vehicle" where wheels do; where none turns, the links' names tell.
+
+    Raises: InputError where both or neither are there.
+    """
+    kinds = ("rotor", "wheel")
+    told = [kind for kind in kinds if any(joint.endless and _called(joint, kind) for joint in robot.joints)]
+    told = told or [kind for kind in kinds if any(TURNING[kind].search(link) for link in robot.surfaces)]
+    if len(told) == 1:
+        return "UAV" if told == ["rotor"] else "Vehicle"
+    seen = "both rotors and wheels" if told else "neither rotors nor wheels"
+    raise InputError(f"its category cannot be seen, the names of its parts tell {seen}: expected --category UAV, "
+                     "--category Bird or --category Vehicle")  # fmt: skip
 
 
 def parts_of(robot: Robot, kind: str) -> tuple[dict[str, Joint], dict[str, np.ndarray]]:

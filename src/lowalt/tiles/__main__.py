@@ -1,11 +1,13 @@
 """`python -m lowalt.tiles`: noisy signals of a chunk in, its encoded tiles out, and reduced images where asked for."""
 
+import argparse
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from lowalt.config.command import parser, pick, run
 from lowalt.machine.progress import reported
+from lowalt.spectra.cube import Cube
 from lowalt.tiles import files, reduced
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
@@ -15,16 +17,16 @@ from lowalt.tiles.signals import load_signals
 def encoded(
     signals: np.ndarray, tiles: Renderer, seen: Callable[[int, np.ndarray], None],
     late: Callable[[int], np.ndarray | None] = lambda model: None,
-    profiles: Callable[[int, int, np.ndarray], np.ndarray | None] = lambda model, level, sample: None,
+    cubes: Callable[[int, int, np.ndarray], list[Cube] | None] = lambda model, level, sample: None,
 ) -> Iterator[bytes]:  # fmt: skip
     """Yield the PNG of every sample, model by model, SNR by SNR; `seen` is called with its number and its tile.
 
-    late: how late a model's symbols are, profiles: range profiles of a model at an SNR, both as in `Renderer.tile`.
+    late: how late a model's symbols are, cubes: those of a model at an SNR, both as in `Renderer.tile`.
     """
     palette, models = tiles.images.palette, reported(signals, len(signals), "models")
     samples = ((place, level, one) for place, model in enumerate(models) for level, one in enumerate(model))
     for number, (place, level, sample) in enumerate(samples):
-        tile = tiles.tile(sample, late=late(place), profiles=profiles(place, level, sample))
+        tile = tiles.tile(sample, late=late(place), cubes=cubes(place, level, sample))
         seen(number, tile)
         yield encode(tile, palette)
 
@@ -41,13 +43,14 @@ def main(arguments: list[str]) -> None:
         metavar="SIZE=PATH",
         help="also write the images at SIZE pixels a side (.npy)",
     )
-    options.add_argument("--motion", help="the chunk's motion table, for late symbols and range profiles")
-    options.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range profiles")
+    options.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
+    options.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")
+    options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes, likewise")
     given = options.parse_args(arguments)
-    drawn, profiled = given.settings.pop("drawn", None), given.settings.pop("profiled", None)
+    drawn, seen_in = given.settings.pop("drawn", None), given.settings.pop("cubes", None)
     tiles = Renderer.from_settings(given.settings)
     late = _late(given.settings["spectra"], drawn, tiles, given.motion) if drawn else lambda model: None
-    more = {"profiles": _profiles(profiled, tiles, given.motion, given.clouds)} if profiled else {}
+    more = {"cubes": _cubes(seen_in, tiles, given)} if seen_in else {}
     signals = load_signals(given.signals, tiles.network)
     targets = [reduced.target(text) for text in given.reduced]
     with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
@@ -63,18 +66,23 @@ def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[
     return lambda model: lateness(spectra, effects, tiles.network, seed, rows[model])
 
 
-def _profiles(
-    profiled: dict, tiles: Renderer, motion: str, clouds: list[str]
-) -> Callable[[int, int, np.ndarray], np.ndarray | None]:
-    """The range profiles of a chunk's samples by model, SNR and signals; profiled: {seed, snr_db} of the noise."""
+def _cubes(
+    settings: dict, tiles: Renderer, given: argparse.Namespace
+) -> Callable[[int, int, np.ndarray], list[Cube] | None]:
+    """The cubes of a chunk's samples by model, SNR and signals; settings: {seed, tolerance, effects, snr_db}."""
     from lowalt.motion import read_table
     from lowalt.targets.cloud import read
-    from lowalt.tiles.profiles import Profiles, profile_cells
+    from lowalt.targets.occluders import read_all
+    from lowalt.tiles.cubes import Cubes
 
-    rows, (seed, snrs) = read_table(motion), pick(profiled, "seed", "snr_db")
-    found = {cloud.subtype: cloud for cloud in map(read, clouds)}
-    maker = Profiles(tiles.network, found, seed, profile_cells(tiles.spectra, tiles.network))
-    return lambda model, level, sample: maker.magnitudes(rows[model], float(snrs[level]), sample)
+    rows, snrs, stations = read_table(given.motion), settings.pop("snr_db"), tiles.network.stations
+    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
+    scene = settings | {"network": given.settings["network"]}
+    maker = Cubes.from_settings(scene, clouds, read_all(given.occluders) if given.occluders else None)
+    return lambda model, level, sample: [
+        maker.of(rows[model], float(snrs[level]), station, heard)
+        for station, heard in zip(stations, sample, strict=True)
+    ]
 
 
 if __name__ == "__main__":

@@ -14,13 +14,16 @@ from lowalt.config.command import pick
 from lowalt.config.network import Network
 from lowalt.files.errors import InputError
 from lowalt.spectra import Spectra, spectrum, windows
-from lowalt.spectra.interface import KnowsTimes, OfProfiles
+from lowalt.spectra.cube import Cube
+from lowalt.spectra.interface import KnowsTimes, OfCells
 from lowalt.spectra.known_times import even
 from lowalt.tiles.pixels import index_image
 from lowalt.tiles.resample import across_rows, along_rows, column_taps, row_taps
 from lowalt.tiles.scale import lookup
 from lowalt.tiles.settings import Images
 
+Source = np.ndarray | Cube
+"""What an image is made of: a normalised signal (symbols,) or a normalised cube."""
 MOST_PIXELS = 2**29
 """Pixels of a tile."""
 
@@ -34,11 +37,11 @@ class Renderer:
         Raises: InputError naming the spectrum whose window is no shorter than the signal, or what is too large.
         """
         self.network, self.spectra, self.images = network, spectra, images
-        spectra.check(network.symbols, len(network.stations))
+        spectra.check(network.symbols, len(network.stations), network.subcarriers)
         pixels = len(network.stations) * len(spectra) * images.size**2
         if pixels > MOST_PIXELS:
             raise InputError(f"images.size is {images.size}: a tile of {pixels} pixels, expected at most {MOST_PIXELS}")
-        self._of_profiles = {name for name in spectra if isinstance(spectrum(name), OfProfiles)}
+        self._of_cells = {name for name in spectra if isinstance(spectrum(name), OfCells)}
         self._plans = {name: self._plan(name) for name in spectra}
         self._tables = {
             name: [
@@ -46,6 +49,7 @@ class Renderer:
                 for station in network.stations
             ]
             for name in spectra
+            if name not in self._of_cells
         }
         steps = {name: lookup(images.scale, levels(name)) for name in spectra}
         self._lookup = {name: (t.lowest, t.shift, t.base, t.cut.view(np.int32)) for name, t in steps.items()}
@@ -64,15 +68,19 @@ class Renderer:
         """Taps of one spectrum's rows and columns, buffers for its values and between the axes, the axes' order."""
         setting, kind = self.spectra[name], spectrum(name)
         symbols, size = self.network.symbols, self.images.size
-        count = windows(symbols, setting.window, setting.hop, name)
-        points = kind.rows(setting)
+        points, hop = kind.rows(setting), getattr(setting, "hop", 1)
+        if name in self._of_cells:
+            starts = kind.columns(setting, symbols)
+            count = (starts - 1) // hop + 1
+        else:
+            count = windows(symbols, setting.window, hop, name)
+            starts = (count - 1) * hop + 1
         source, weights = row_taps(points, size)
         # Row 0 is the most positive value, so rows count down; FFT rows start at frequency zero.
         source = points - 1 - source
         if kind.ZERO_FIRST:
             source = (source + points // 2) % points
-        columns, shares = column_taps(count, size, setting.hop)
-        starts = (count - 1) * setting.hop + 1
+        columns, shares = column_taps(count, size, hop)
         # Rows that become fewer go first, so that there is less to do along time.
         rows_first = points > size
         between = np.empty((size, starts) if rows_first else (points, size), np.float32)
@@ -95,19 +103,17 @@ class Renderer:
         """Tables of one spectrum, a tuple of arrays a station."""
         return self._tables[name]
 
-    def values(
-        self, signal: np.ndarray, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None
-    ) -> None:
-        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,), or of a
-        profile (cells, symbols) float32 where the spectrum is made of profiles.
+    def values(self, signal: Source, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None) -> None:
+        """Fill out (S, S) float32 with the resampled spectrum `name` of one normalised signal (symbols,), or of a cube
+        where the spectrum is made of range cells.
 
         late: (symbols,), how many symbol intervals after its nominal instant each symbol came, None for 0. Where
         `spectra.times` is "known", symbols that are exactly zero were not received.
         """
         source, weights, columns, shares, values, between, rows_first = self._plans[name]
         setting, kind = self.spectra[name], spectrum(name)
-        if name in self._of_profiles:
-            kind.fill_profile(signal, setting, values)  # type: ignore[attr-defined]
+        if isinstance(signal, Cube):
+            kind.fill_cells(signal, setting, values)
         elif self.spectra.times == "even" or even(signal, late):
             re, im = np.ascontiguousarray(signal.real), np.ascontiguousarray(signal.imag)
             kind.fill(re, im, setting, self._tables[name][station], values)
@@ -134,28 +140,27 @@ class Renderer:
         if not np.isfinite(signals).all():
             raise InputError("tile: signals have a NaN or infinite value")
 
-    def image(
-        self, signal: np.ndarray, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None
-    ) -> None:
+    def image(self, signal: Source, station: int, name: str, out: np.ndarray, late: np.ndarray | None = None) -> None:
         """Fill out (S, S) uint8 with the index image of one normalised signal (symbols,); late: as in `values`."""
         self.values(signal, station, name, self._image, late)
         index_image(self._image, spectrum(name).SIGNED, *self._lookup[name], out)
 
-    def _source(self, name: str, signal: np.ndarray, profiles: np.ndarray | None, station: int) -> np.ndarray:
-        """What the spectrum `name` is made of at a station: its normalised signal, or its range profile."""
-        if name not in self._of_profiles:
+    def _source(self, name: str, signal: np.ndarray, cubes: Sequence[Cube] | None, station: int) -> Source:
+        """What the spectrum `name` is made of at a station: its normalised signal, or its cube."""
+        if name not in self._of_cells:
             return signal
-        if profiles is None:
-            raise InputError(f"spectrum {name}: made of range profiles, and a signal alone does not hold them")
-        return profiles[station]
+        if cubes is None:
+            raise InputError(f"spectrum {name}: made of range cells, and a signal alone does not hold them")
+        return cubes[station]._replace(cells=normalised(cubes[station].cells))
 
     def tile(
         self, signals: np.ndarray, out: np.ndarray | None = None, late: np.ndarray | None = None,
-        profiles: np.ndarray | None = None,
+        cubes: Sequence[Cube] | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Return the tile of one sample: (stations, symbols) complex64 -> (stations S, spectra S) uint8.
 
-        late: (stations, symbols), as in `values`, None for symbols on time; profiles: (stations, cells, symbols).
+        late: (stations, symbols), as in `values`, None for symbols on time; cubes: a cube a station, where
+        spectra are made of range cells.
         Raises: InputError where the shape does not fit the network or a value is not finite.
         """
         self.check(signals)
@@ -165,13 +170,13 @@ class Renderer:
             signal = normalised(signals[station])
             for view, name in enumerate(self.spectra):
                 part = out[station * size : (station + 1) * size, view * size : (view + 1) * size]
-                source = self._source(name, signal, profiles, station)
+                source = self._source(name, signal, cubes, station)
                 self.image(source, station, name, part, None if late is None else late[station])
         return out
 
     def some(
         self, signals: np.ndarray, numbers: Sequence[int], late: np.ndarray | None = None,
-        profiles: np.ndarray | None = None,
+        cubes: Sequence[Cube] | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Return images of one sample by number, spectra station + view: (stations, symbols) -> (n, S, S) uint8.
 
@@ -184,13 +189,13 @@ class Renderer:
         for place, number in enumerate(numbers):
             station, view = divmod(int(number), len(names))
             own = None if late is None else late[station]
-            source = self._source(names[view], normalised(signals[station]), profiles, station)
+            source = self._source(names[view], normalised(signals[station]), cubes, station)
             self.image(source, station, names[view], out[place], own)
         return out
 
 
 def normalised(signal: np.ndarray) -> np.ndarray:
-    """Return a signal (symbols,) as complex64, divided by the power of two that brings it just below 1."""
+    """Return a signal of any shape as complex64, divided by the power of two that brings it just below 1."""
     signal = np.asarray(signal)
     largest = max(np.abs(signal.real).max(), np.abs(signal.imag).max())
     if largest == 0:

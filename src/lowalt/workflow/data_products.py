@@ -7,7 +7,7 @@ from typing import Any
 
 from lowalt.files.atomic import slug
 from lowalt.scene.lateness import timed
-from lowalt.spectra.catalogue import profiled
+from lowalt.spectra.catalogue import of_cells
 from lowalt.targets.records import source_files
 from lowalt.workflow.run import Run
 
@@ -57,6 +57,10 @@ class DataProducts:
         """Name of the chunk whose motion and echoes a chunk uses: its own, or the one that it adds SNRs to."""
         return self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").source
 
+    def track(self, wildcards: Any) -> list[str]:
+        """The flight log whose path motion models follow; none where paths are drawn."""
+        return [self._config["motion"]["track"]] if "track" in self._config["motion"] else []
+
     def group_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of a group's subtypes, in the table's order."""
         return self._of_group("clouds", wildcards)
@@ -104,23 +108,29 @@ class DataProducts:
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
     def tile_motion(self, wildcards: Any) -> list[str]:
-        """The motion table of a chunk, where spectra know the instants of late symbols or show range profiles; none in
+        """The motion table of a chunk, where spectra know the instants of late symbols or show range cells; none in
         other runs."""
-        return [self.motion(wildcards)] if timed(self._config) or profiled(self._config["spectra"]) else []
+        return [self.motion(wildcards)] if timed(self._config) or of_cells(self._config["spectra"]) else []
 
     def tile_clouds(self, wildcards: Any) -> list[str]:
-        """The clouds of a chunk, where spectra show range profiles; none in other runs."""
-        return self.chunk_clouds(wildcards) if profiled(self._config["spectra"]) else []
+        """The clouds of a chunk, where spectra show range cells; none in other runs."""
+        return self.scene_clouds(wildcards) if of_cells(self._config["spectra"]) else []
+
+    def tile_occluders(self, wildcards: Any) -> list[str]:
+        """The surfaces of a chunk's subtypes, where spectra show range cells and the scene hides points."""
+        return self.chunk_occluders(wildcards) if of_cells(self._config["spectra"]) else []
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal) or clean
-        echoes (recipe)."""
+        """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal), clean
+        echoes (recipe), or noisy signals, clouds and surfaces (cube)."""
         base, chunk = f"results/{wildcards.run}", f"{wildcards.group}-{wildcards.part}"
         kind = self._config["shards"]["kind"]
         if kind == "recipe":
             return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
-        tiles = {"tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else {}
-        return {"signals": f"{base}/noisy/{chunk}.npy", **tiles}
+        signals = {"signals": f"{base}/noisy/{chunk}.npy"}
+        if kind == "cube":
+            return {**signals, "clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
+        return {**signals, "tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else signals
 
     def reduced(self, wildcards: Any) -> dict[str, str]:
         """Reduced images of a chunk and its motion table; nothing where the tiles stage makes none of this size."""

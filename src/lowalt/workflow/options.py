@@ -10,7 +10,7 @@ from typing import Any
 
 from lowalt.scene.catalogue import dotted
 from lowalt.scene.lateness import timed
-from lowalt.spectra.catalogue import profiled
+from lowalt.spectra.catalogue import of_cells
 
 
 def _option(name: str, files: str | list[str] | None) -> list[str]:
@@ -28,8 +28,8 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
     return words
 
 
-clouds, fidelity, motion, occluders, powers = map(of_inputs, ("clouds", "fidelity", "motion", "occluders", "powers"))
-content = of_inputs("signals", "tiles", "echoes", "powers")
+clouds, motion, occluders, powers = map(of_inputs, ("clouds", "motion", "occluders", "powers"))
+content = of_inputs("signals", "tiles", "echoes", "powers", "clouds", "occluders")
 """The files that a shard is packed from, by its kind."""
 reduced_chunk = of_inputs("reduced", "motion")
 """The reduced images of a chunk and its motion table, where the tiles stage makes them at the size asked for."""
@@ -47,7 +47,12 @@ def noise_modules(config: dict) -> list[str]:
     return ["lowalt.scene.set_noise", dotted("canceller")] if "canceller" in config["effects"] else []
 
 
+def shard_modules(config: dict) -> list[str]:
+    """The modules of effects that the shards stage loads where it makes the cubes of a scene."""
+    return [*map(dotted, config["effects"])] if config["shards"]["kind"] == "cube" else []
+
+
 def tile_modules(config: dict) -> list[str]:
-    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range profiles."""
+    """The modules that the tiles stage loads where spectra know the instants of late symbols or show range cells."""
     late = ["lowalt.scene.lateness", "lowalt.motion", dotted("slow_time")] if timed(config) else []
-    return [*late, "lowalt.tiles.profiles"] if profiled(config["spectra"]) else late
+    return [*late, "lowalt.tiles.cubes", *map(dotted, config["effects"])] if of_cells(config["spectra"]) else late

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import shipped
 from lowalt.files.street import PACKAGE
@@ -15,9 +16,8 @@ from lowalt.report.inputs import KEPT
 from lowalt.workflow.data_products import DataProducts
 from lowalt.workflow.sources import near
 
-FIDELITY = "results/fidelity-exact/transfer.csv"
-"""Table of the accuracy lost by training on echoes at a tolerance; other runs make it."""
-
+PRESETS = "config/cost/presets.csv"
+"""The presets of what recognition costs, some of them trained by a study."""
 REFERENCE = "results/reference"
 PAGE = (".html", ".css", ".js")
 """Endings of the files that the page is put together from."""
@@ -71,16 +71,22 @@ class Products(DataProducts):
         sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
 
-    def fidelity(self, wildcards: Any) -> str | list[str]:
-        """The table of models trained on echoes at a tolerance, made by other runs; none for a run on another's data.
+    def presets(self, wildcards: Any) -> str:
+        """The table of presets."""
+        return str(shipped(PRESETS))
 
-        Raises: InputError naming the command that makes it, where it is missing.
+    def studied(self, wildcards: Any) -> list[str]:
+        """Predictions of the presets that a study trains on this run's data, one a training seed.
+
+        Raises: InputError naming the command that makes them, where one is missing.
         """
-        if self._run.data != self._run.name:
-            return []
-        if not Path(FIDELITY).is_file():
-            raise InputError(f"no {FIDELITY}: it comes from runs of their own, `make accuracy-cost` makes it first")
-        return FIDELITY
+        found = []
+        for row in read_csv(shipped(PRESETS), "command", "predictions"):
+            for seed in self._config["recognition"]["seeds"] if row["predictions"] else ():
+                found.append(f"results/{self._run.data}-{row['predictions']}/{seed}.csv")
+                if not Path(found[-1]).is_file():
+                    raise InputError(f"no {found[-1]}: `{row['command']}` makes it first")
+        return found
 
     def transferred(self, wildcards: Any) -> list[str]:
         """Configurations of this run and of those whose models are tried on its test samples.
@@ -125,8 +131,7 @@ class Products(DataProducts):
         if block["measured"]:
             files["measured"] = block["measured"]
         if block["cost"]:
-            files["echo_cost"], files["echo_pixels"] = f"{base}/cost.csv", f"{base}/cost_pixels.csv"
-            files["echo_cost_figure"] = f"{base}/cost.png"
+            files["echo_cost"] = block["cost"]
         return files
 
     def manifest(self, wildcards: Any) -> str:
@@ -134,10 +139,7 @@ class Products(DataProducts):
         return json.dumps(self.report(wildcards), indent=1)
 
     def prepared(self, wildcards: Any) -> list[str]:
-        """Files that the run makes without torch before its first training; none where its data are another run's.
-
-        The echo's cost is left out: a download at the same time would falsify its times.
-        """
+        """Files that the run makes without torch before its first training; none where its data are another run's."""
         run, base = self._run, f"results/{self._run.name}"
         if run.data != run.name:
             return []
@@ -149,14 +151,14 @@ class Products(DataProducts):
         """The templates of the page and of its sections, its style and its scripts."""
         return [near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
 
-    def benchmarks(self, wildcards: Any) -> list[str]:
-        """Measurements of all jobs, in pipeline order."""
+    def data_benchmarks(self, wildcards: Any) -> list[str]:
+        """Measurements of the jobs of the data set, in pipeline order."""
         run, plan = self._run, self._run.plan
         kind = self._config["shards"]["kind"]
         cached = self._config["recognition"]["cache"]
         sizes = run.image_sizes if cached else []
         echoes = [f"{chunk}-{station}" for chunk in plan.sources for station in run.stations]
-        data = [
+        jobs = [
             *(f"cloud/{subtype}" for subtype in run.subtypes),
             *(f"motion/{chunk}" for chunk in plan.sources),
             *(f"echo/{name}" for name in (echoes if run.echo_per_station else plan.sources)),
@@ -166,14 +168,14 @@ class Products(DataProducts):
             "index",
             *(f"views/{size}/{shard}" for size in sizes for shard in plan.shards),
         ]
-        training = [
-            *(f"train/{training}" for training in run.trainings),
-            *(f"evaluate/{training}" for training in run.trainings),
-        ]
-        own, shared = f"results/{wildcards.run}/benchmarks", f"results/{run.data}/benchmarks"
+        return [f"results/{run.data}/benchmarks/{name}.jsonl" for name in jobs]
+
+    def benchmarks(self, wildcards: Any) -> list[str]:
+        """Measurements of all jobs, in pipeline order."""
+        trainings, own = self._run.trainings, f"results/{wildcards.run}/benchmarks"
         return [
-            *(f"{shared}/{name}.jsonl" for name in data),
-            *(f"{own}/{name}.jsonl" for name in training),
-            f"{shared}/distances.jsonl",
+            *self.data_benchmarks(wildcards),
+            *(f"{own}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
+            f"results/{self._run.data}/benchmarks/distances.jsonl",
             f"{own}/tables.jsonl",
         ]

@@ -17,7 +17,7 @@ from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
 from lowalt.shards.clean import refuse
-from lowalt.spectra.catalogue import named, profiled
+from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.records import missing_inputs, records_of
 
 TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
@@ -26,9 +26,10 @@ TRAINING_BLOCKS = ("run", "data", "inputs", "cost", "recognition", "report")
 
 def refuse_braces(config: dict, inputs: str | None) -> None:
     """Refuse paths with braces, which Snakemake takes for a wildcard or a format."""
-    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"))
+    keys = (("recognition", "table"), ("report", "published"), ("report", "accuracy"), ("report", "measured"),
+            ("motion", "track"))  # fmt: skip
     paths = {"inputs": inputs, "the folder of lowalt": str(SHIPPED)}
-    paths |= {f"{block}.{key}": config[block][key] for block, key in keys}
+    paths |= {f"{block}.{key}": config.get(block, {}).get(key) for block, key in keys}
     for name, path in paths.items():
         if path and {"{", "}"} & {*path}:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
@@ -69,19 +70,19 @@ def refuse_input(config: dict) -> None:
         raise InputError("recognition.input: 'dataset' together with recognition.cache true, expected cache: false")
 
 
-def refuse_profiles(config: dict) -> None:
-    """Refuse range profiles where no stage makes them: in scenes, of links, and of shards that hold signals alone."""
-    if not profiled(config["spectra"]):
-        return
-    links = sorted(name for name, place in config["network"]["stations"].items() if "transmit" in place)
-    kind = config["shards"]["kind"]
-    given = {"effects": sorted(config["effects"]), "links": links, "shards.kind": "" if kind == "image" else kind}
-    for key, value in given.items():
-        if value:
-            raise InputError(
-                f"spectra: {list(named(config['spectra']))} and {key} is {value!r}, expected no {key}: range profiles "
-                "are made of clean targets, by stations that hear themselves, where tiles are"
-            )
+def refuse_cells(config: dict) -> None:
+    """Refuse spectra of range cells where shards hold signals alone, and cubes of symbols that gaps interpolate."""
+    kind, shown = config["shards"]["kind"], of_cells(config["spectra"])
+    if shown and kind not in ("image", "cube"):
+        raise InputError(
+            f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold one cell"
+        )
+    regrid = (config["effects"].get("slow_time") or {}).get("regrid", "zero")
+    if (shown or kind == "cube") and regrid != "zero":
+        raise InputError(
+            f"effects.slow_time.regrid: {regrid!r} and range cells of all symbols, expected 'zero': cells of symbols "
+            "that were not received are zeros"
+        )
 
 
 def refuse_no_files(targets: dict, inputs: str | None) -> None:
@@ -121,6 +122,7 @@ def refuse_missing(config: dict) -> None:
     backbone, colon, _ = network["backbone"].rpartition(":")
     files = {
         "inputs": [config["inputs"]],
+        "motion.track": [config["motion"].get("track")],
         "recognition.table": [config["recognition"]["table"]],
         "recognition.network.backbone": [backbone] if colon and backbone.endswith(".py") else [],
         "recognition.network.weights": [] if network["weights"] in ("none", "hub") else [network["weights"]],

@@ -18,18 +18,17 @@ from lowalt.recognition.schemes import Scheme
 from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
-from lowalt.tiles.profiles import profile_cells
 from lowalt.tiles.settings import Images
 from lowalt.workflow.launch import Launch
 from lowalt.workflow.refusals import (
     refuse_braces,
+    refuse_cells,
     refuse_companions,
     refuse_data,
     refuse_heights,
     refuse_input,
     refuse_missing,
     refuse_no_files,
-    refuse_profiles,
     refuse_region,
     refuse_sizes,
     refuse_speeds,
@@ -66,9 +65,8 @@ class Run:
         refuse_heights(config["motion"]["height_m"], published, classes)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
         network, spectra = Network.from_settings(config["network"]), Spectra.from_settings(config["spectra"])
-        spectra.check(network.symbols, len(network.stations))
-        refuse_profiles(config)
-        profile_cells(spectra, network)
+        spectra.check(network.symbols, len(network.stations), network.subcarriers)
+        refuse_cells(config)
         Images.from_settings(config["images"])
         block = config["recognition"]
         refuse_missing(config)

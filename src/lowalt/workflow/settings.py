@@ -8,16 +8,16 @@ from typing import Any
 
 from lowalt.config.layers import canonical
 from lowalt.config.network import as_far_as, masts_m
-from lowalt.config.plan import Chunk
+from lowalt.config.plan import Chunk, motion_block
 from lowalt.files.shipped import as_named
 from lowalt.motion.sample import masts_in_reach
 from lowalt.scene.lateness import timed
 from lowalt.scene.set_noise import in_all_cells
-from lowalt.spectra.catalogue import profiled
+from lowalt.spectra.catalogue import of_cells
 from lowalt.workflow.run import Run
 
-MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m")
-"""Keys of the block `motion` that decide what is drawn; the last one may be left out."""
+MOTION = ("region", "height_m", "tilt_deg", "cadence", "sizes_m", "looks", "look_s", "track")
+"""Keys of the block `motion` that decide what is drawn; from `sizes_m` on they may be left out."""
 
 
 class Settings:
@@ -64,7 +64,7 @@ class Settings:
 
     def motion(self, wildcards: Any) -> str:
         """Data that a chunk's motion models are drawn from: region, masts in its reach, ranges of its subtypes."""
-        block, members = self._config["motion"], self._chunk(wildcards).members
+        block, members = motion_block(self._config), self._chunk(wildcards).members
         return self._text(
             "motion", members,
             seed=self._config["seed"],
@@ -92,16 +92,17 @@ class Settings:
         return self._text("noise", *snrs, **self._blocks("seed"), stations=self._run.stations, snr_db=snrs, **passed)
 
     def images(self, wildcards: Any) -> str:
-        """Network, spectra and images; what late symbols are drawn from, where spectra know their instants; what the
-        noise of range profiles is drawn from, where spectra show them."""
+        """Network, spectra and images; what late symbols are drawn from, where spectra know their instants; what
+        range cells are made from, where spectra show them."""
         blocks = self._blocks("network", "spectra", "images")
         if timed(self._config):
             given = {"slow_time": self._config["effects"]["slow_time"]}
             blocks["drawn"] = {"seed": self._config["seed"], "effects": given}
-        if not profiled(self._config["spectra"]):
+        if not of_cells(self._config["spectra"]):
             return self._text("images", **blocks)
-        snrs = self._snrs(wildcards)
-        return self._text("images", *snrs, **blocks, profiled={"seed": self._config["seed"], "snr_db": snrs})
+        snrs, tolerance = self._snrs(wildcards), self._config["echo"]["tolerance"]
+        cubes = {**self._blocks("seed", "effects"), "tolerance": tolerance, "snr_db": snrs}
+        return self._text("images", *snrs, **blocks, cubes=cubes)
 
     def index(self, wildcards: Any) -> str:
         """How motion becomes echoes and signals become tiles: with these and the clouds a sample can be made again."""
@@ -115,6 +116,8 @@ class Settings:
         added = {"companions": effects["companions"] or {}} if "companions" in effects else {}
         if self._config["shards"]["kind"] == "recipe" and "canceller" in effects:
             added["canceller"] = effects["canceller"] or {}
+        if self._config["shards"]["kind"] == "cube":
+            added["echo"] = {"tolerance": self._config["echo"]["tolerance"], "effects": effects}
         blocks = self._blocks("seed", "network", "split", "shards")
         return self._text("shard", *snrs, **blocks, snr_db=snrs, classes=self._run.classes, **added)
 
@@ -122,11 +125,6 @@ class Settings:
         """Settings with which the echo is timed, and the rows of the table of targets."""
         blocks = self._blocks("network", "motion", "seed", "cost")
         return self._text("cost_table", **blocks, published=self._published)
-
-    def cost_pixels(self, wildcards: Any) -> str:
-        """Settings with which the echo is timed, rows of the table of targets, and the images that are compared."""
-        blocks = self._blocks("network", "motion", "spectra", "images", "seed", "cost")
-        return self._text("cost_pixels", **blocks, published=self._published)
 
     def views(self, wildcards: Any) -> str:
         """Pixels a side of the shrunk images; the SNRs too, where the tiles stage makes them for a whole chunk."""

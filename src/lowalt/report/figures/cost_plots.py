@@ -1,85 +1,132 @@
-"""Plots of what accuracy costs: of the networks, of the echo, of the effects; and the time of each stage."""
+"""Plots of what accuracy costs in time: of the networks and of the echo.
 
+python -m lowalt.report.figures.cost_plots echo --table cost.csv --figure cost.svg
+"""
+
+import argparse
 import math
 
-from lowalt.report.plots import Plot
+from lowalt.config.command import run
+from lowalt.files.atomic import replacing
+from lowalt.files.csv_tables import read_csv
+from lowalt.report.plots import Plot, svg
 
-NAMES_BELOW = (30, -24, -44, 30, 48, -24)
-"""Pixels by which the names of the front's points stand below these, in turn, so that neighbours do not meet."""
+RECOGNITION = ("scheme", "kind", "unseen_percent", "low", "high", "core_s_data", "core_s_training", "front")
+PRESET = ("preset", "command", "macro_f1_low", "macro_f1_high")
+ECHO = ("method", "tolerance", "points", "seconds", "relative_error")
+STORED = 2.0**-24
+"""Half a unit of the last place of a stored value (complex64), relative to it."""
+COLOURS = ["#bc4c00", "#8250df", "#6e7781", "#0969da"]
 _PER_NAME = {"content": "data"}
-_BELOW = {"orient": "bottom", "title": None, "columns": 6}
+_TEXT = {"type": "text", "align": "right", "baseline": "middle"}
+
+
+def _log(field: str, title: str, values: list[float], room: float, **more) -> dict:
+    """A logarithmic axis of a field from half the least of its values to `room` times the largest."""
+    scale = {"type": "log", "domain": [min(values) / 2, room * max(values)], "nice": False}
+    return {"field": field, "type": "quantitative", "title": title, "scale": scale, **more}
 
 
 def recognition(rows: list[dict[str, str]]) -> Plot:
-    """Return accuracy on unseen subtypes over the time of a training, the front joined and named.
+    """Return unseen accuracy over the time of data and training, the front joined and named, the first scheme ringed.
 
-    rows: of accuracy_cost.csv, averages over the SNRs, trained rows only are drawn. Bars are 95 % intervals of the
-    difference to the first row; where they hold zero the point is grey: it cannot be told apart from the first.
+    rows: of accuracy_cost.csv (keys RECOGNITION), trained ones are drawn. Bars are 95 % intervals of the difference to
+    the first; where they hold zero the point is grey. The band spans all points that cannot be told apart from it.
     """
-    known = [row for row in rows if row["kind"] == "trained" and row["snr_db"] == "avg" and row["unseen_percent"]]
-    first, kinds = float(known[0]["unseen_percent"]) if known else 0.0, ("the base", "cannot be told apart", "differs")
-    data, named = (
-        [],
-        sorted((row for row in known if row["front"] == "yes"), key=lambda row: float(row["core_s_training"])),
-    )
+    known = sorted((row for row in rows if row["kind"] == "trained"), key=seconds)
+    base = next(row for row in rows if row["kind"] == "trained")
+    first, data = float(base["unseen_percent"]), []
+    kinds, level = (f"cannot be told apart from {base['scheme']}", "differs"), 0.0
     for row in known:
-        held = float(row["low"]) <= 0 <= float(row["high"])
+        low, high = float(row["low"]), float(row["high"])
         data.append({
-            "scheme": row["scheme"], "core_s": float(row["core_s_training"]), "front": row["front"],
-            "accuracy_percent": float(row["unseen_percent"]), "low": first + float(row["low"]),
-            "high": first + float(row["high"]), "told": kinds[0] if row is known[0] else kinds[1 if held else 2],
-            "side": named.index(row) % len(NAMES_BELOW) if row in named else -1,
+            "scheme": row["scheme"], "core_s": seconds(row), "accuracy_percent": float(row["unseen_percent"]),
+            "low": first + low, "high": min(first + high, 100.0), "front": row["front"],
+            "told": kinds[not low <= 0 <= high], "first": row is base,
         })  # fmt: skip
-    x = {"field": "core_s", "type": "quantitative", "title": "core-seconds of a training", "scale": {"type": "log"}}
+    least = min(row["low"] for row in data)
+    # Left of a point of the front and above it no point lies, so that names that rise from left to right meet nothing.
+    for row in data:
+        if row["front"] == "yes":
+            level = row["level"] = max(row["accuracy_percent"], level) + (100 - least) / 18
+    same = [row["accuracy_percent"] for row in data if row["told"] == kinds[0]]
+    band = {"values": [{"low": min(same), "high": max(same)}]}
+    x = _log("core_s", "processor-seconds of data and training", [row["core_s"] for row in data], 1.3)
     y = {"field": "accuracy_percent", "type": "quantitative", "title": "accuracy, unseen subtypes (%)",
-         "scale": {"zero": False}}  # fmt: skip
-    legend = {"orient": "bottom", "title": None, "columnPadding": 40}
-    colour = {"field": "told", "type": "nominal", "legend": legend,
-              "scale": {"domain": list(kinds), "range": ["#0550ae", "#8c959f", "#bc4c00"]}}  # fmt: skip
-    bar = {"y": {**y, "field": "low"}, "y2": {"field": "high"}, "color": colour}
+         "scale": {"domain": [math.floor(least), max(100.0, level + 1)], "nice": False}}  # fmt: skip
+    colour = {"field": "told", "type": "nominal", "scale": {"domain": list(kinds), "range": ["#6e7781", "#bc4c00"]},
+              "legend": {"orient": "bottom", "title": None, "columns": 1}}  # fmt: skip
+    span = {"y": {**y, "field": "low"}, "y2": {"field": "high"}}
+    front = {"transform": [{"filter": "datum.front == 'yes'"}]}
     layers = [
-        {"transform": [{"filter": "datum.front == 'yes'"}],
-         "mark": {"type": "line", "interpolate": "step-after", "color": "gray", "strokeWidth": 1}},
-        {"mark": {"type": "rule", "opacity": 0.5}, "encoding": bar},
-        {"mark": {"type": "point", "filled": True, "size": 70, "opacity": 1, "tooltip": _PER_NAME},
+        {"data": band, "mark": {"type": "rect", "color": "gray", "opacity": 0.2}, "encoding": {"x": None, **span}},
+        {**front, "mark": {"type": "line", "interpolate": "step-after", "color": "gray", "strokeWidth": 1}},
+        {**front, "mark": {"type": "rule", "color": "gray", "strokeWidth": 0.5},
+         "encoding": {"y": y, "y2": {"field": "level"}}},
+        {"mark": {"type": "rule", "opacity": 0.5}, "encoding": {**span, "color": colour}},
+        {"mark": {"type": "point", "filled": True, "size": 60, "opacity": 1, "tooltip": _PER_NAME},
          "encoding": {"color": colour}},
-        *({"transform": [{"filter": f"datum.side == {side}"}],
-           "mark": {"type": "text", "align": "left", "dx": -6, "dy": below},
-           "encoding": {"text": {"field": "scheme", "type": "nominal"}}} for side, below in enumerate(NAMES_BELOW)),
+        {"transform": [{"filter": "datum.first"}],
+         "mark": {"type": "point", "size": 260, "color": "#0969da", "strokeWidth": 2, "opacity": 1}},
+        {**front, "mark": {**_TEXT, "dx": 2, "dy": -6},
+         "encoding": {"text": {"field": "scheme"}, "y": {**y, "field": "level"}}},
     ]  # fmt: skip
-    words = "accuracy on unseen subtypes over the core-seconds of a training, with 95 % intervals of the difference"
-    spec = {"width": 720, "height": 340, "encoding": {"x": x, "y": y}, "layer": layers}
+    words = "accuracy on unseen subtypes over the processor-seconds of data and training, with 95 % intervals"
+    spec = {"width": 620, "height": 380, "encoding": {"x": x, "y": y}, "layer": layers}
     return Plot("accuracy_cost", words, spec, data)
 
 
-def echo(measured: list[dict[str, str]]) -> Plot:
-    """Return time a signal over the measured error, a panel a category and number of points.
+def seconds(row: dict[str, str]) -> float:
+    """Processor-seconds of a row's data and training."""
+    return float(row["core_s_data"]) + float(row["core_s_training"])
 
-    measured: rows of cost.csv. Errors of zero stand at 1e-17.
+
+def echo(measured: list[dict[str, str]]) -> Plot:
+    """Return the error of a signal over its time, a line a method and tolerance through the numbers of points.
+
+    measured: rows of cost.csv (keys ECHO).
     """
     rows = [
-        {"method": row["method"], "tolerance": row["tolerance"], "target": f"{row['category']}, {row['points']} points",
-         "range_m": float(row["range_m"]), "error": max(float(row["relative_error"]), 1e-17),
-         "ms": 1e3 * float(row["seconds"])}
+        {"method": row["method"], "name": ", ".join(filter(None, (row["method"], row["tolerance"]))),
+         "points": int(row["points"]), "ms": 1e3 * float(row["seconds"]), "error": float(row["relative_error"])}
         for row in measured
     ]  # fmt: skip
-    rows.sort(key=lambda row: (row["target"].partition(",")[0], int(row["target"].split()[-2])))
-    bounds = {name: _decades(row[name] for row in rows) for name in ("error", "ms")}
-    axes = {
-        axis: {"field": field, "type": "quantitative", "title": title, "axis": {"format": ".0e"} if axis == "x" else {},
-               "scale": {"type": "log", "domain": bounds[field]}}
-        for axis, field, title in (("x", "error", "error / largest value"), ("y", "ms", "ms a signal, one core"))
-    }  # fmt: skip
-    distance = {"field": "range_m", "type": "nominal", "legend": {**_BELOW, "title": "distance (m)"}}
-    encoding = {**axes, "color": {"field": "method", "type": "nominal", "legend": _BELOW}, "shape": distance}
-    order = list(dict.fromkeys(row["target"] for row in rows))
-    spec = {"facet": {"field": "target", "title": None, "sort": order}, "columns": 4,
-            "spec": {"width": 190, "height": 220, "mark": {"type": "point", "tooltip": _PER_NAME}, "encoding": encoding,
-                     "params": [{"name": "zoom", "select": "interval", "bind": "scales"}]}}  # fmt: skip
-    return Plot("echo_cost", "time of an echo signal over its error, by method, distance and target", spec, rows)
+    most, methods = max(row["points"] for row in rows), list(dict.fromkeys(row["method"] for row in rows))
+    times, errors = ([row[name] for row in rows] for name in ("ms", "error"))
+    axes = {"x": _log("ms", "ms a signal, one core", times, 2),
+            "y": _log("error", "error / largest value of the signal", errors, 4, axis={"format": ".0e"})}  # fmt: skip
+    colour = {"field": "method", "type": "nominal", "scale": {"domain": methods, "range": COLOURS}, "legend": None}
+    size = {"field": "points", "type": "ordinal", "scale": {"range": [20, 160]}, "legend": {"orient": "bottom"}}
+    stored = {"error": STORED, "ms": min(times) / 2, "name": "float32 rounding of what is stored"}
+    layers = [
+        {"data": {"values": [stored]}, "mark": {"type": "rule", "strokeDash": [4, 4], "color": "gray"},
+         "encoding": {"x": None}},
+        {"data": {"values": [stored]}, "mark": {**_TEXT, "align": "left", "dx": 4, "dy": 8, "color": "gray"},
+         "encoding": {"text": {"field": "name"}}},
+        {"mark": {"type": "line", "strokeWidth": 1},
+         "encoding": {"color": colour, "detail": {"field": "name"}, "order": {"field": "points"}}},
+        {"mark": {"type": "point", "filled": True, "opacity": 1, "tooltip": _PER_NAME},
+         "encoding": {"color": colour, "size": size}},
+        {"transform": [{"filter": f"datum.points == {most}"}], "mark": {**_TEXT, "dx": 8, "dy": -13},
+         "encoding": {"text": {"field": "name"}, "color": colour}},
+    ]  # fmt: skip
+    words = "error of an echo signal over its time, by method, tolerance and number of points"
+    return Plot("echo_cost", words, {"width": 620, "height": 380, "encoding": axes, "layer": layers}, rows)
 
 
-def _decades(values) -> list[float]:
-    """Powers of ten around positive values."""
-    found = list(values)
-    return [10.0 ** math.floor(math.log10(min(found))), 10.0 ** math.ceil(math.log10(max(found)))]
+def main(arguments: list[str]) -> None:
+    """Write one of the plots as SVG."""
+    options = argparse.ArgumentParser(prog="python -m lowalt.report.figures.cost_plots", description=__doc__)
+    options.add_argument("plot", choices=("echo", "recognition"), help="the echo, or the networks")
+    options.add_argument("--table", required=True, help="cost.csv or accuracy_cost.csv")
+    options.add_argument("--figure", required=True, help="picture to write (.svg)")
+    given = options.parse_args(arguments)
+    draw, columns = {"echo": (echo, ECHO), "recognition": (recognition, RECOGNITION)}[given.plot]
+    plot = draw(read_csv(given.table, *columns))
+    drawn = svg(plot._replace(spec={**plot.spec, "background": "white"}))
+    with replacing(given.figure) as temporary:
+        temporary.write_text(drawn)
+
+
+if __name__ == "__main__":
+    run(main)

@@ -7,24 +7,25 @@ import numpy as np
 from lowalt.config.network import Station
 from lowalt.report.figures.style import plt, png
 from lowalt.spectra import spectrum
-from lowalt.spectra.interface import OfProfiles
+from lowalt.spectra.interface import OfCells
 from lowalt.tiles.render import Renderer, split
 
 
 class Axes(NamedTuple):
-    """The scales of an image: its width (s), and the speeds (m/s) of its lowest and highest row; ranges (cells) for a
-    spectrum of range profiles."""
+    """The scales of an image: name, first and last value of its columns, and of its rows from below."""
 
-    seconds: float
-    bottom_mps: float
-    top_mps: float
+    across: tuple[str, float, float]
+    upwards: tuple[str, float, float]
 
 
 def axes_of(name: str, station: Station, renderer: Renderer) -> Axes:
     """Return the axes of the images of one spectrum at one station; a tile has a spectrum's first row at the bottom."""
-    settings, network = renderer.spectra[name], renderer.network
-    first, last = spectrum(name).speeds(settings, station.frequency_hz, network.symbol_interval_s)
-    return Axes((network.symbols - settings.window) * network.symbol_interval_s, first, last)
+    settings, network, kind = renderer.spectra[name], renderer.network, spectrum(name)
+    if isinstance(kind, OfCells):
+        return Axes(*kind.axes(settings, network, station))
+    first, last = kind.speeds(settings, station.frequency_hz, network.symbol_interval_s)
+    seconds = (network.symbols - settings.window) * network.symbol_interval_s
+    return Axes(("time (s)", 0.0, seconds), ("radial speed (m/s)\nreceding upwards", first, last))
 
 
 def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
@@ -45,14 +46,13 @@ def figure(tile: np.ndarray, renderer: Renderer, title: str) -> bytes:
         axes = axes_of(name, station, renderer)
         panel.imshow(
             images[number], cmap=renderer.images.colour_map, vmin=0, vmax=255, aspect="auto", interpolation="nearest",
-            extent=(0.0, axes.seconds, axes.bottom_mps, axes.top_mps),
+            extent=(*axes.across[1:], *axes.upwards[1:]),
         )  # fmt: skip
-        panel.set_ylim(sorted(axes[1:]))
-        most, kind = max(map(abs, axes[1:])), spectrum(name)
-        ranged = isinstance(kind, OfProfiles)
-        below = kind.AXIS if ranged else f"folds beyond {most:.1f} m/s"
-        panel.set_title(f"{station.name}: {kind.TITLE}\n{below}", fontsize=8)
-        panel.set_ylabel("" if column or ranged else "radial speed (m/s)\nreceding upwards", fontsize=8)
-        panel.set_xlabel("time (s)" if row == shape[0] - 1 else "", fontsize=8)
+        panel.set_ylim(sorted(axes.upwards[1:]))
+        cells = isinstance(spectrum(name), OfCells)
+        folds = "" if cells else f"folds beyond {max(map(abs, axes.upwards[1:])):.1f} m/s"
+        panel.set_title(f"{station.name}: {spectrum(name).TITLE}\n{folds}", fontsize=8)
+        panel.set_ylabel(axes.upwards[0] if cells or not column else "", fontsize=8)
+        panel.set_xlabel(axes.across[0] if cells or row == shape[0] - 1 else "", fontsize=8)
         panel.tick_params(labelsize=7)
     return png(drawn)

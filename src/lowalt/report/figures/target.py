@@ -19,7 +19,7 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition.distances import cycle_s, still_row
 from lowalt.report.figures.style import png
 from lowalt.spectra import Spectra, spectrum
-from lowalt.spectra.interface import OfProfiles
+from lowalt.spectra.interface import OfCells
 from lowalt.targets.cloud import Cloud
 from lowalt.targets.gallery import bones
 
@@ -108,7 +108,7 @@ def _spectra(panels, cloud: Cloud, row: dict, config: dict) -> None:
     given = (station.frequency_hz, network.symbol_interval_s)
     for panel, (name, windows) in zip(panels, settings.items(), strict=False):
         kind = spectrum(name)
-        if isinstance(kind, OfProfiles):
+        if isinstance(kind, OfCells):
             continue
         values = kind.definition(signal, windows, name, *given)
         values = values if kind.SIGNED else _decibel(values)

@@ -1,26 +1,18 @@
-"""Inputs on which a formula written down naively fails, each judged in fifty digits: the naive error, ours, our bound.
+"""Inputs of the echo on which a formula written down naively fails: one symbol of one station a case.
 
-    python -m lowalt.measure.hard_cases --out hard_cases.csv
-
-One symbol of one station a case. The truth is `lowalt.measure.fifty_digits`. Errors are relative to the true value of
-the range cell that the engine chose. Half a minute where kernels are compiled first; needs mpmath (extra `cost`).
+The truth is `lowalt.measure.fifty_digits`.
 """
 
-import argparse
 import dataclasses
-import warnings
 from typing import NamedTuple
 
+import mpmath
 import numpy as np
 
-from lowalt.config.command import run
 from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
 from lowalt.echo import echo_signal
-from lowalt.files.csv_tables import write_csv
-from lowalt.files.errors import InputError
-from lowalt.machine.hardware import describe
+from lowalt.measure.fifty_digits import cells_mp
 
-COLUMNS = ("case", "why", "naive_error", "error", "bound", "right_cell", "hardware")
 C = SPEED_OF_LIGHT
 
 
@@ -34,56 +26,11 @@ class Case(NamedTuple):
     aim_m: np.ndarray
 
 
-class Judged(NamedTuple):
-    """Values of one case in the cell that the engine chose, whether that cell is right, and the engine's bound."""
-
-    ours: complex
-    naive: complex
-    truth: complex
-    right: bool
-    bound: float
-
-
 def network(**changes) -> Network:
     """Return the cases' network: the default's radar with one station at the origin, with these fields changed."""
     station = Station("A", (0.0, 0.0, 25.0), 0.0, changes.get("carrier_hz", 4.9e9))
     base = Network(4.9e9, 120e3, 256, 10, 2.5e-3, 400, (16, 4), (16, 4), 1.0, (station,))
     return dataclasses.replace(base, **changes)
-
-
-def naive(net: Network, station: Station, points_m: np.ndarray, rcs_m2: np.ndarray, aim_m) -> complex:
-    """Return the strongest cell's value of one symbol by the closed form as first written down (paper, Eq. 24).
-
-    points_m (L, 3), rcs_m2 (L,), aim_m (3,). Angles, sin(N u) / sin(u) and one phase in float64: NaN at 0/0.
-    `terms.dirichlet` has the limits at 0/0; this formula leaves them out, because the table shows where it fails.
-    """
-    with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")
-
-        def look(p):
-            """Return range and both direction cosines of points p (..., 3) by their angles, as the paper writes
-            them."""
-            d = np.asarray(p, float) - np.array(station.position_m)
-            r, flat = np.sqrt((d * d).sum(-1)), np.sqrt(d[..., 0] ** 2 + d[..., 1] ** 2)
-            theta = np.pi / 2 - np.angle((d[..., 0] + 1j * d[..., 1]) / flat * np.exp(-1j * station.normal_rad))
-            phi = np.arcsin(d[..., 2] / r)
-            return r, np.cos(phi) * np.cos(theta), np.sin(phi)
-
-        r, psi, omega = look(points_m)
-        _, psi0, omega0 = look(aim_m)
-        kappa = station.frequency_hz / net.carrier_hz
-        gain = np.ones(len(r), complex)
-        for counts in (net.transmit, net.receive):
-            for number, x in zip(counts, (psi - psi0, omega - omega0), strict=True):
-                u = np.pi * kappa * x / 2
-                gain = gain * np.exp(1j * (number - 1) * u) * np.sin(number * u) / np.sin(u)
-        wave = C / net.carrier_hz * np.sqrt(rcs_m2) / (4 * np.pi) ** 1.5 / r**2 * gain
-        wave = wave * np.exp(-4j * np.pi * station.frequency_hz * r / C)
-        count = net.subcarriers
-        x = np.arange(count)[:, None] - r / net.cell_m
-        kernel = np.exp(1j * np.pi * (count - 1) / count * x) * np.sin(np.pi * x) / (count * np.sin(np.pi * x / count))
-        cells = np.sqrt(net.power / (np.prod(net.transmit) * np.prod(net.receive))) * (kernel @ wave)
-        return cells[np.argmax(abs(cells))]
 
 
 def away(distance: float, x: float = 1.0, y: float = 0.3, z: float = 0.1) -> np.ndarray:
@@ -146,48 +93,15 @@ CASES = {name: Case(*values) for name, values in _LISTED.items()}
 """The hard cases by name."""
 
 
-def judged(name: str) -> Judged:
-    """Return the values of one case by the engine, by the naive formula and in fifty digits.
-
-    Raises: InputError where mpmath is not installed.
-    """
-    try:
-        import mpmath
-
-        from lowalt.measure.fifty_digits import cells_mp
-    except ModuleNotFoundError as error:
-        raise InputError("hard cases: mpmath is not installed, expected the extra `cost`") from error
+def judged(name: str) -> tuple[complex, complex, bool, float]:
+    """Return one case's value by the engine and in fifty digits, whether its cell is the strongest, and its bound."""
     _, net, station, points, aim = CASES[name]
     rcs = np.linspace(0.5, 1.5, len(points)) if len(points) != 2 else np.ones(2)
     result = echo_signal(net, station, points[None], rcs, aim)
-    ours, cell = result.signal[0], int(result.cell[0])
+    cell = int(result.cell[0])
     # All cells about the target and some of the others: far cells of one cluster cannot be the strongest.
     near = {(cell + j) % net.subcarriers for j in range(-2, 3)}
     listed = sorted(near | set(range(0, net.subcarriers, max(1, net.subcarriers // 7))))
     values = dict(zip(listed, cells_mp(net, station, points.tolist(), rcs.tolist(), aim, listed), strict=True))
-    truth = complex(values[cell])
     right = all(abs(values[cell]) >= abs(other) * (1 - mpmath.mpf(10) ** -11) for other in values.values())
-    return Judged(ours, naive(net, station, points, rcs, aim), truth, right, result.bound)
-
-
-def rows() -> list[list]:
-    """Return the table of all cases, a row each with the columns COLUMNS."""
-    hardware, result = describe(), []
-    for name, case in CASES.items():
-        found = judged(name)
-        error, plain = (abs(value - found.truth) / abs(found.truth) for value in (found.ours, found.naive))
-        wrong = f"{plain:.0e}" if np.isfinite(plain) else "not a number"
-        cell = "yes" if found.right else "no"
-        result.append([name, case.why, wrong, f"{error:.0e}", f"{found.bound:.0e}", cell, hardware])
-    return result
-
-
-def main(arguments: list[str]) -> None:
-    """Write the table."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.measure.hard_cases", description=__doc__)
-    options.add_argument("--out", required=True, help="table to write (.csv)")
-    write_csv(options.parse_args(arguments).out, COLUMNS, rows())
-
-
-if __name__ == "__main__":
-    run(main)
+    return result.signal[0], complex(values[cell]), right, result.bound

@@ -1,0 +1,66 @@
+"""Range-Doppler map: the range cells of a look against radial speed, by one Fourier transform over all its symbols.
+
+It is made of the cube (`lowalt.tiles.cubes`), not of a station's signal, which holds one cell alone.
+"""
+
+import numpy as np
+from scipy import fft
+from scipy.signal.windows import hann
+
+from lowalt.config.network import SPEED_OF_LIGHT, Network, Station
+from lowalt.files.errors import InputError
+from lowalt.spectra.cube import Cube
+from lowalt.spectra.settings import Doppler as Settings
+
+TITLE = "range-Doppler map"
+SOURCE = "M. A. Richards, Fundamentals of Radar Signal Processing, 2nd ed. 2014, 5.3"
+SIGNED = False
+ZERO_FIRST = False
+DEFAULTS = Settings(33, 512)
+
+
+def rows(settings: Settings) -> int:
+    """Return the number of range cells."""
+    return settings.cells
+
+
+def columns(settings: Settings, symbols: int) -> int:
+    """Return the number of speeds. Raises: InputError where they are fewer than the symbols of a look."""
+    if settings.points < symbols:
+        raise InputError(
+            f"spectra.range_doppler.points is {settings.points}, expected at least the {symbols} symbols of a look"
+        )
+    return settings.points
+
+
+def axes(settings: Settings, network: Network, station: Station) -> tuple[tuple[str, float, float], ...]:
+    """Return name, first and last value of the columns (radial speed, m/s) and of the rows (range, m).
+
+    Ranges count from the cell that the receiver chose in the middle of the look; speeds are positive away from the
+    station.
+    """
+    fold = SPEED_OF_LIGHT / (4 * station.frequency_hz * network.symbol_interval_s)
+    reach = settings.cells // 2 * network.cell_m
+    return ("radial speed (m/s)", -fold, fold), ("range (m from the chosen cell)", -reach, reach)
+
+
+def definition(cube: Cube, settings: Settings) -> np.ndarray:
+    """Return magnitudes (ranges, speeds) of a cube, both ascending.
+
+    The look is weighted with a Hann window, whose sum makes an echo that stands still as large as in one symbol.
+    Raises: InputError where the look has more symbols than there are speeds.
+    """
+    cells, chosen = cube.cells, cube.chosen
+    count = columns(settings, len(cells))
+    middle, reach = chosen[len(chosen) // 2], settings.cells // 2
+    near = cells[:, np.arange(middle - reach, middle + reach + 1) % cells.shape[1]].astype(np.complex128)
+    weights = hann(len(cells), sym=False)
+    spectrum = fft.fftshift(fft.fft(near * (weights / weights.sum())[:, None], count, axis=0), axes=0)
+    # An echo that recedes turns backwards: the most negative frequency is the largest speed.
+    turned = spectrum[::-1].T
+    return np.sqrt(turned.real**2 + turned.imag**2)
+
+
+def fill_cells(cube: Cube, settings: Settings, out: np.ndarray) -> None:
+    """Fill out (ranges, speeds) float32 with the map of a cube."""
+    out[:] = definition(cube, settings)

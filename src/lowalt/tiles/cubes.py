@@ -1,0 +1,106 @@
+"""The cubes of samples: the range cells of every symbol with noise, before the receiver chooses one of them.
+
+A scene's canceller has acted on it; a scene without one gives the cells as they were received.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from lowalt.config.command import pick
+from lowalt.config.network import Network, Station
+from lowalt.noise.awgn import add_noise
+from lowalt.numerics.streams import stream
+from lowalt.scene.catalogue import called
+from lowalt.scene.chain import SceneSample
+from lowalt.scene.observe import Scene
+from lowalt.scene.set_noise import in_all_cells
+from lowalt.spectra.cube import Cube
+from lowalt.targets.cloud import Cloud, cloud_of
+
+
+class Cubes:
+    """Makes the cubes of samples; it keeps the clean ones of the last `kept` motion models and stations."""
+
+    def __init__(
+        self, scene: Scene, clouds: Mapping[str, Cloud], occluders: dict | None = None, every_cell: bool = False,
+        empty: bool = False, kept: int = 3,
+    ) -> None:  # fmt: skip
+        """Take the scene, clouds by subtype and each subtype's surfaces, where the scene hides points behind them.
+
+        every_cell: whether noise at the samples' SNRs is an effect of the scene (`set_noise.in_all_cells`); empty:
+        whether the targets reflect nothing, so that noise and land alone are left.
+        """
+        self.scene, self.clouds, self.occluders = scene, clouds, occluders or {}
+        self.every_cell, self.empty, self.kept = every_cell, empty, kept
+        self._clean: dict[tuple, tuple] = {}
+
+    @classmethod
+    def from_settings(
+        cls, settings: dict, clouds: Mapping[str, Cloud], occluders: dict | None = None, empty: bool = False
+    ) -> "Cubes":
+        """Build from a settings object with exactly seed, network, tolerance and effects.
+
+        Raises: InputError naming the key and value that is missing, unknown or out of range.
+        """
+        seed, network, tolerance, effects = pick(settings, "seed", "network", "tolerance", "effects")
+        scene = Scene(Network.from_settings(network), seed, tolerance, tuple(called(effects)))
+        return cls(scene, clouds, occluders, in_all_cells(effects), empty)
+
+    def of(self, row: dict, snr_db: float, station: Station, signal: np.ndarray | None = None) -> Cube:
+        """Return the cube of a row of the motion table at a station and an SNR (dB).
+
+        signal: the sample's noisy signal (N,) complex64 at this station, which is what the chosen cells then hold; the
+        noise of the other cells has the same power and a stream of its own for each subtype, model, station and SNR.
+        Raises: InputError naming the sample that cannot be computed.
+        """
+        clean, chosen, truth, power_w = self._seen(row, snr_db, station)
+        cells = clean.astype(np.complex64)
+        if not self.every_cell and not np.isposinf(snr_db):
+            rng = stream(self.scene.seed, "cells", row["subtype"], row["model"], station.name, snr_db)
+            noise = add_noise(np.zeros(cells.shape), snr_db, rng, power_w)
+            for effect in self.scene.effects:
+                noise = effect.module.filtered(effect.settings, noise) if effect.name == "canceller" else noise
+            cells = (clean + noise).astype(np.complex64)
+        cells[chosen < 0] = 0
+        if signal is not None:
+            there = np.flatnonzero(chosen >= 0)
+            cells[there, chosen[there]] = signal[there]
+        return Cube(cells, chosen, truth)
+
+    def _seen(self, row: dict, snr_db: float, station: Station) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Clean cells (N, M), chosen cells (N,), truth and the power (W) that SNRs refer to."""
+        key = row["subtype"], row["model"], station.name, snr_db if self.every_cell else None
+        if key not in self._clean:
+            while len(self._clean) >= self.kept:
+                del self._clean[next(iter(self._clean))]
+            self._clean[key] = self._computed(row, snr_db, station)
+        return self._clean[key]
+
+    def _computed(self, row: dict, snr_db: float, station: Station) -> tuple:
+        """Compute `_seen`."""
+        scene = self.scene.at_snr(snr_db) if self.every_cell else self.scene
+        sample = SceneSample(
+            scene, station, cloud_of(self.clouds, row), row, self.occluders.get(row["subtype"]), self.clouds
+        )
+        received, sampling = sample.received(), sample.view.sampling
+        there = slice(None) if sampling is None else sampling.present
+        cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
+        seen = sample.without_target() if self.empty else sample
+        cells[there] = seen.filtered(sample.detection)
+        own = np.full(len(cells), -1)
+        own[there] = sample.own_cell()
+        return cells, received.cell, np.column_stack([truth(sample), own]), received.power
+
+
+def truth(sample: SceneSample) -> np.ndarray:
+    """Return range (m), radial speed (m/s) and direction cosines of the target's middle at each symbol, (N, 4)."""
+    station, middle = sample.station, sample.view.places.mean(axis=1)
+    moved = np.gradient(middle, sample.view.times_s, axis=0, edge_order=2)
+    ends = [station] if station.transmitter is None else [station, station.transmitter]
+    ways = [middle - np.asarray(end.position_m) for end in ends]
+    ranges = [np.linalg.norm(way, axis=1) for way in ways]
+    speeds = [(way * moved).sum(axis=1) / length for way, length in zip(ways, ranges, strict=True)]
+    towards = ways[0] / ranges[0][:, None]
+    cosines = towards @ np.asarray(station.horizontal), towards[:, 2]
+    return np.column_stack([np.mean(ranges, axis=0), np.mean(speeds, axis=0), *cosines])

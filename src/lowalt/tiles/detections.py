@@ -1,0 +1,43 @@
+"""Detections of a look: what stands out of its range-Doppler map at a constant false-alarm rate, beside the truth."""
+
+import numpy as np
+from scipy.ndimage import maximum_filter
+
+from lowalt.config.network import Network, Station
+from lowalt.scene.effects.detection.detector import DEFAULTS, exceeds
+from lowalt.spectra.cube import TRUTH, Cube
+from lowalt.spectra.kinds import range_doppler
+
+DETECTION = np.dtype([("cell", "<i8"), ("range_m", "<f8"), ("radial_mps", "<f8"), ("over_db", "<f8"), ("true", "?")])
+"""Range cell, its range within the band's unambiguous one, folded speed away from the station, power over the mean of
+the map, and whether it is the target's."""
+
+
+def detections(
+    cube: Cube, network: Network, station: Station, false_alarm: float = 1e-4, guard: int = 2, training: int = 16
+) -> np.ndarray:
+    """Return the detections (`DETECTION`) of a cube, the strongest first.
+
+    A value of the range-Doppler map is detected where it is the largest of its neighbours and exceeds the mean of the
+    `training` cells on either side, beyond `guard` cells, by the factor that noise passes with probability
+    `false_alarm`. It is the target's where it is within one cell and two speeds of what is true at some symbol.
+    Source: Finn & Johnson 1968; Richards 2014, 6.5.
+    """
+    symbols, count = cube.cells.shape
+    settings = range_doppler.Settings(count - 1 + count % 2, symbols)
+    power = range_doppler.definition(cube, settings) ** 2
+    passed = exceeds({**DEFAULTS, "false_alarm": false_alarm, "guard": guard, "training": training}, power.T).T
+    rows, columns = np.nonzero(passed & (power == maximum_filter(power, 3, mode="wrap")))
+    result = np.zeros(len(rows), DETECTION)
+    result["cell"] = (cube.chosen[symbols // 2] - settings.cells // 2 + rows) % count
+    result["range_m"] = result["cell"] * network.cell_m
+    (_, first, last), _ = range_doppler.axes(settings, network, station)
+    step = (last - first) / symbols
+    # The most negative frequency, -1 / (2 T_r), is the last column.
+    result["radial_mps"] = last - step * (symbols - 1 - columns)
+    result["over_db"] = 10 * np.log10(power[rows, columns] / power.mean())
+    true = dict(zip(TRUTH, cube.truth.T, strict=True))
+    aside = (result["cell"][:, None] - true["cell"] + count / 2) % count - count / 2
+    faster = (result["radial_mps"][:, None] - true["radial_mps"] + last) % (2 * last) - last
+    result["true"] = ((abs(aside) <= 1) & (abs(faster) <= 2 * step)).any(axis=1)
+    return result[np.argsort(-result["over_db"])]

@@ -1,0 +1,248 @@
+"""Tracks: state goes on from look to look, a fold takes a track whole, and a flight log comes back from the records."""
+
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+
+from builtin_records import TABLE
+from configured import run_of
+from lowalt.config.layers import check, merge
+from lowalt.config.network import masts_m
+from lowalt.config.plan import motion_block
+from lowalt.config.splits import FOLDS
+from lowalt.files.errors import InputError
+from lowalt.files.yaml_files import load_yaml
+from lowalt.motion import positions, read_table, write_table
+from lowalt.motion.__main__ import main as motion
+from lowalt.motion.sample import region_polygon
+from lowalt.motion.track_files import path_of
+from lowalt.motion.tracks import TURN_RADPS, Cell, model_rows
+from lowalt.shards.dataset import Dataset, Place
+from lowalt.shards.record import record, row_of
+from lowalt.shards.write import select
+from lowalt.targets.cloud import write as write_cloud
+from lowalt.workflow.settings import Settings
+
+SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
+LOOKS = 12
+OVERLAY = {
+    "targets": {"select": SUBTYPES},
+    "motion": {"models": 4, "models_per_chunk": 4, "looks": LOOKS, "cadence": "tied"},
+    "split": {"train": 2, "val": 1, "test": 1},
+    "noise": {"snr_db": [3, float("inf")]},
+}
+LOG = "time_s,x_m,y_m,z_m\n"
+
+
+def configuration(**motion) -> dict:
+    """The default with four subtypes that are looked at again and again."""
+    config = merge(load_yaml("config/default.yaml"), merge(OVERLAY, {"motion": motion}))
+    return check(config, "workflow/schemas/config.schema.yaml")
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return Dataset(configuration())
+
+
+def flight(time_s: np.ndarray) -> np.ndarray:
+    """A parabola in the middle of the cell: differences of second order and cubics have no error on it."""
+    return np.stack([200 + 3 * time_s, 100 + 0.5 * time_s + 0.2 * time_s**2, 50 + time_s], axis=-1)
+
+
+def written(path, times_s, header=LOG, places=flight) -> str:
+    """A log of a path, a row each of the times."""
+    rows = ("{},{},{},{}\n".format(*map(repr, map(float, (time, *place))))
+            for time, place in zip(times_s, places(times_s), strict=True))  # fmt: skip
+    path.write_text(header + "".join(rows))
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory):
+    """Tracks along a log of uneven rows that begins at 7 s."""
+    times = np.concatenate([[7.0], 7 + np.sort(np.random.default_rng(3).uniform(0.2, 11.9, 40)), [19.5]])
+    log = written(tmp_path_factory.mktemp("log") / "log.csv", times)
+    return Dataset(configuration(track=log))
+
+
+def looks_of(dataset: Dataset, subtype: str, track: int) -> list[dict]:
+    """The rows of a track."""
+    group = TABLE[subtype]["unseen_protocol"]
+    return [dataset.row(Place(group, subtype, track * LOOKS + look, 3.0)) for look in range(LOOKS)]
+
+
+@pytest.mark.parametrize("subtype", SUBTYPES)
+@pytest.mark.parametrize("which", ["dataset", "logged"])
+def test_nothing_jumps_between_looks(which, subtype, request):
+    tracks = request.getfixturevalue(which)
+    cloud, rows = tracks.clouds[subtype], looks_of(tracks, subtype, 2)
+    for row, after in itertools.pairwise(rows):
+        # All points: place, heading, and phases of rotors, wings, wheels and gait at once.
+        ends, starts = positions(cloud, row, np.array([1.0])), positions(cloud, after, np.array([0.0]))
+        np.testing.assert_allclose(ends, starts, rtol=0, atol=1e-9)
+        for axis in "xyz":
+            bent = row[f"v{axis}_mps"] + row[f"a{axis}_mps2"] + row[f"j{axis}_mps3"] / 2
+            assert bent == pytest.approx(after[f"v{axis}_mps"], abs=1e-9)
+
+
+@pytest.mark.parametrize("subtype", ["EH 216 S", "Owl", "NIO ET5T 2023"])
+def test_a_drawn_path_is_made_of_coordinated_turns_inside_the_cell(dataset, subtype):
+    masts = np.array(masts_m(dataset.config["network"]), float)
+    corners, settings = region_polygon(masts, None), motion_block(dataset.config)
+    cell = Cell(corners, masts, 10.0)
+    cloud, published = dataset.clouds["NIO ET5T 2023" if "NIO" in subtype else "DJI Mini 2"], TABLE[subtype]
+    times = np.linspace(0, 1, 9)
+    rates = []
+    for track in range(12):
+        rows = model_rows(1, cloud, published, masts, corners, settings, track)
+        speeds = [math.hypot(row["vx_mps"], row["vy_mps"]) for row in rows]
+        np.testing.assert_allclose(speeds, speeds[0], rtol=1e-12)
+        for row in rows:
+            place = np.array([row[f"{axis}_m"] for axis in "xyz"]) + sum(
+                times[:, None] ** power / math.factorial(power) * [row[f"{kind}{axis}{unit}"] for axis in "xyz"]
+                for power, kind, unit in ((1, "v", "_mps"), (2, "a", "_mps2"), (3, "j", "_mps3"))
+            )
+            assert (cell.room_m(place[:, :2]) > 0).all()
+            assert "NIO" in subtype or ((place[:, 2] >= 20).all() and (place[:, 2] <= 150).all())
+            # The same turn as a sum of many short straight steps.
+            fine = (np.arange(8000) + 0.5) / 8000
+            course = math.atan2(row["vy_mps"], row["vx_mps"]) + row["turn_radps"] * fine
+            steps = speeds[0] / 8000 * np.cumsum([np.cos(course), np.sin(course)], axis=1)
+            np.testing.assert_allclose(place[1:, :2] - place[0, :2], steps[:, 999::1000].T, atol=1e-3 * speeds[0])
+            rates.append(row["turn_radps"])
+    assert -TURN_RADPS - 1e-9 <= min(rates) < -0.8 * TURN_RADPS and 0.8 * TURN_RADPS < max(rates) <= TURN_RADPS + 1e-9
+
+
+def test_a_track_is_in_one_fold_whole(dataset):
+    plan = dataset.plan
+    assert len(dataset) == len(SUBTYPES) * 4 * LOOKS * 2
+    places = {fold: [one.place(n) for n in range(len(one))]
+              for fold in FOLDS for one in [Dataset(dataset.config, dataset.clouds, folds=[fold])]}  # fmt: skip
+    tracks = {fold: {(place.subtype, place.model // LOOKS) for place in found} for fold, found in places.items()}
+    assert {fold: len(found) for fold, found in tracks.items()} == {"train": 8, "val": 4, "test": 4}
+    assert {fold: len(found) for fold, found in places.items()} == {
+        fold: len(found) * LOOKS * 2 for fold, found in tracks.items()
+    }
+    # Shards are dealt by the motion tables; the plan names a shard for each fold that has a sample.
+    for chunk in plan.chunks:
+        first, count = plan.span(chunk)
+        names = plan.chunk(chunk).members
+        group = chunk.partition("-")[0]
+        rows = [dataset.row(Place(group, name, model, 3.0)) for model in range(first, first + count) for name in names]
+        assert plan.folds(chunk) == list(FOLDS)
+        for fold in FOLDS:
+            chosen = {(rows[number]["subtype"], rows[number]["model"]) for number, _ in
+                      select(rows, [3.0, math.inf], plan.split, plan.seed, fold)}  # fmt: skip
+            assert chosen == {(place.subtype, place.model) for place in places[fold] if place.group == group}
+    # One track of each subtype is in one fold, however many looks it has.
+    few = Dataset(configuration(models=1), dataset.clouds)
+    for chunk in few.plan.chunks:
+        names = few.plan.chunk(chunk).members
+        dealt = {fold for fold, found in tracks.items() if found & {(name, 0) for name in names}}
+        assert {*few.plan.folds(chunk)} == dealt
+
+
+@pytest.mark.parametrize("which", ["dataset", "logged"])
+def test_the_motion_stage_writes_the_rows_of_the_samples(which, request, tmp_path):
+    tracks = request.getfixturevalue(which)
+    settings = Settings(run_of(merge(OVERLAY, {"motion": tracks.config["motion"]})))
+    clouds = [str(tmp_path / f"{number}.npz") for number, name in enumerate(SUBTYPES[:1])]
+    write_cloud(clouds[0], tracks.clouds[SUBTYPES[0]])
+    wildcards = type("", (), {"group": "seen", "part": "00000"})()
+    path = tmp_path / "motion.csv"
+    motion(["--settings", settings.motion(wildcards), "--clouds", *clouds, "--group", "seen", "--first", "0",
+            "--count", str(4 * LOOKS), "--out", str(path)])  # fmt: skip
+    rows = read_table(path)
+    assert [(row["model"], row["track"], row["look"]) for row in rows] == [
+        (number, *divmod(number, LOOKS)) for number in range(4 * LOOKS)
+    ]
+    again = tmp_path / "again.csv"
+    write_table(again, [row for track in range(4) for row in looks_of(tracks, SUBTYPES[0], track)])
+    assert again.read_bytes() == path.read_bytes()
+
+
+@pytest.mark.parametrize("subtype", ["DJI Mini 2", "NIO ET5T 2023"])
+def test_a_log_comes_back_from_the_records(logged, subtype):
+    group = TABLE[subtype]["unseen_protocol"]
+    entries = [json.loads(logged.made_record(Place(group, subtype, LOOKS + look, 3.0))) for look in range(LOOKS)]
+    assert [(entry["track"], entry["look"]) for entry in entries] == [(1, look) for look in range(LOOKS)]
+    place = np.array([[entry["motion"][f"{axis}_m"] for axis in "xyz"] for entry in entries])
+    wanted = flight(7.0 + np.arange(LOOKS))
+    if subtype.startswith("NIO"):
+        wanted[:, 2] = logged.clouds[subtype].record["origin_height_m"]
+    np.testing.assert_allclose(place, wanted, atol=1e-9)
+    # The front looks along the course, and wheels roll at the speed over ground.
+    velocity = np.array([[entry["motion"][f"v{axis}_mps"] for axis in "xy"] for entry in entries])
+    yaw = np.array([entry["motion"]["yaw_rad"] for entry in entries])
+    speed = np.hypot(*velocity.T)
+    np.testing.assert_allclose(velocity, speed[:, None] * np.stack([-np.sin(yaw), np.cos(yaw)], axis=1), atol=1e-9)
+    if subtype.startswith("NIO"):
+        rate = [entry["motion"]["rate_hz"] for entry in entries[:-1]]
+        np.testing.assert_allclose(rate, (speed[:-1] + speed[1:]) / 2 / (math.pi * 0.4826), rtol=1e-3)
+    # A stored record is enough to make the sample again.
+    network = logged.maker.network
+    row, snr_db = row_of(entries[3])
+    assert json.loads(record(row, snr_db, entries[3]["fold"], entries[3]["seed"], network)) == entries[3]
+
+
+def test_degrees_become_metres_about_the_first_row(tmp_path, dataset):
+    # At 60 degrees north of WGS 84, a degree of latitude is 111 412.3 m long, one of longitude 55 800.0 m.
+    step = np.arange(30)[:, None] * [5.0, -2.0, 0.0]
+    log = written(
+        tmp_path / "log.csv", np.arange(30.0), "time_s,lat,lon,alt\n",
+        lambda _: np.array([60.0, 179.999, 40.0]) + step[:, [1, 0, 2]] / [111412.3, 55800.0, 1.0],
+    )  # fmt: skip
+    tracks = Dataset(configuration(track=log), dataset.clouds)
+    rows = looks_of(tracks, "Owl", 0)
+    place = np.array([[row[f"{axis}_m"] for axis in "xyz"] for row in rows])
+    middle = [250.0, 433.0127018922193 / 3, 40.0]
+    np.testing.assert_allclose(place, middle + step[:LOOKS], atol=1e-3)
+    assert [row["yaw_rad"] for row in rows] == pytest.approx([math.atan2(-5, -2) + 2 * math.pi] * LOOKS, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("time_s,x_m,y_m\n0,1,2\n", r"columns \['time_s', 'x_m', 'y_m'\], expected two or more of \['time_s', 'x_m'"),
+        ("x_m,y_m,z_m\n0,1,2\n", r"lacks the columns \['time_s'\]"),
+        (LOG, "0 rows"),
+        (LOG + "0,250,99,40\n1,250,up,40\n", "line 3, column y_m: 'up', expected a number"),
+        (LOG + "0,250,99,40\n1,250,nan,40\n", "line 3, column y_m: 'nan', expected a number"),
+        (LOG + "0,250,99,40\n2,250,99,40\n2,250,99,40\n", "line 4, column time_s: 2 after 2, expected times that inc"),
+        (LOG + "0,250,99,40\n11,250,99,40\n", "11 s long, expected 12 s for motion.looks 12"),
+        (LOG + "0,250,99,40\n20,2250,99,40\n", r"2 s after its start at \(450.0, 99.0\) m, outside the cell"),
+    ],
+)
+def test_a_bad_log_is_refused_in_one_sentence(tmp_path, text, words):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    settings = motion_block(configuration(track=str(path)))
+    masts = np.array(masts_m(configuration()["network"]), float)
+    with pytest.raises(InputError, match=words) as refused:
+        path_of(settings, region_polygon(masts, None), masts)
+    assert str(path) in str(refused.value) and "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("overlay", "words"),
+    [
+        ({"split": {"by": "sample"}}, "split.by: 'sample' together with motion.looks, expected 'motion'"),
+        ({"effects": {"gusts": {}}}, r"effects: \['gusts'\] together with motion.looks"),
+        ({"motion": {"track": "nowhere.csv"}}, "motion.track: 'nowhere.csv' is not there"),
+        ({"motion": {"track": "README.md", "looks": None}}, "looks"),
+    ],
+)
+def test_what_does_not_go_with_tracks_is_refused(overlay, words):
+    with pytest.raises(InputError, match=words):
+        run_of(merge(OVERLAY, overlay))
+
+
+def test_a_region_too_small_to_turn_in_is_refused(dataset):
+    corners = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]])
+    settings = motion_block(dataset.config)
+    with pytest.raises(InputError, match="region is too small for a turn of 20 degrees a second at"):
+        model_rows(1, dataset.clouds["Owl"], TABLE["EH 216 S"], np.zeros((0, 2)), corners, settings, 0)
