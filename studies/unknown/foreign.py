@@ -12,7 +12,7 @@ from lowalt.numerics.streams import stream
 from lowalt.recognition import samples
 from lowalt.recognition.made import DatasetSamples
 from lowalt.recognition.samples import Facts
-from lowalt.recognition.schemes import Scheme
+from lowalt.recognition.schemes import Scheme, columns_in
 from lowalt.shards.maker import Maker
 from lowalt.tiles.resample import resize
 
@@ -37,7 +37,8 @@ def facts(names: list[str], models: np.ndarray, snr_db: np.ndarray, folds: list[
 
 def _seen(maker: Maker, signal: np.ndarray, scheme: Scheme, size: int) -> np.ndarray:
     """Index images (views, size, size) uint8 of the scheme's views of signals (stations, symbols)."""
-    return resize(maker.renderer.some(signal, scheme.columns, None, None), size)
+    columns = columns_in(scheme.columns, list(maker.renderer.spectra), len(signal), scheme.name)
+    return resize(maker.renderer.some(signal, columns, None, None), size)
 
 
 def noise(config: dict, scheme: Scheme, size: int) -> tuple[np.ndarray, Facts]:

@@ -11,7 +11,7 @@ The table has one row a network, a kind of window and a score:
 """
 
 import argparse
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,26 +21,33 @@ from study import logits
 
 from lowalt.config.classes import CATEGORIES
 from lowalt.config.command import run
+from lowalt.config.network import SPEED_OF_LIGHT
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
 from lowalt.numerics.streams import stream
-from lowalt.recognition import zoo
+from lowalt.recognition import runs, zoo
+from lowalt.recognition.samples import fingerprint, joined
+from lowalt.recognition.schemes import TABLE, named
 from lowalt.recordings import recognise, sets
 from lowalt.recordings.channel import coherent_intervals
 from lowalt.recordings.files import Baseband, read
 from lowalt.recordings.library import Library
 from lowalt.recordings.presence import present
 from lowalt.recordings.record import Record
-from lowalt.recordings.scenes import heard, samples, stretch
+from lowalt.recordings.scenes import MARGIN, samples, stretch
 from lowalt.recordings.twin import Twin
 from lowalt.tiles.settings import Images
 
 FOLDER = Path("config/measured")
 SCORES = {"largest probability": rejection.probability, "energy": rejection.energy}
-NOISE = 200
-"""Windows of the receiver's noise alone."""
-COLUMNS = ("network", "windows", "known", "score", "count", "kept_percent", "right_percent")
+EXTRA = {"extra class": rejection.no_extra}
+EMPTY = ("noise", "swinging point")
+"""Windows without a target of the four classes; the extra class is trained on both."""
+ASKED = 200
+"""Windows of each kind of EMPTY that the networks are asked about."""
+MODELS = Path("results/unknown/twins")
+COLUMNS = ("network", "windows", "score", "known", "count", "kept_percent", "right_percent")
 
 
 @dataclass(frozen=True)
@@ -53,16 +60,20 @@ class Radar:
     images: Images
     size: int
 
+    def rendered(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
+        """Return the images (n, 3, size, size) uint8 of intervals (n, symbols)."""
+        return recognise.rendered(intervals, twin, self.images, self.size)
+
     def logits(self, intervals: np.ndarray, twin: Twin) -> np.ndarray:
-        """Return the logits (n, 4) of intervals (n, symbols) at a recording's own carrier."""
-        shown = recognise.rendered(intervals, twin, self.images, self.size)
+        """Return the logits (n, classes) of intervals (n, symbols) at a recording's own carrier."""
+        shown = self.rendered(intervals, twin)
         count = len(shown)
         told = recognise.facts(np.zeros(count, int), ["window"] * count, np.arange(count), np.zeros(count), "")
         return logits(self.model, recognise.Windows(shown, told))
 
 
 class Part(NamedTuple):
-    """Windows of one kind: what they are, their logits (n, 4), and their labels, None where the network knows none."""
+    """Windows of one kind: what they are, their logits (n, classes), and their labels, None where it knows none."""
 
     windows: str
     logits: np.ndarray
@@ -95,21 +106,61 @@ def foreign(entry: dict, folder: Path, twin: Twin) -> np.ndarray:
     return coherent_intervals(signal, twin.symbols, name=str(path))
 
 
-def noise(radar: Radar, library: Library) -> np.ndarray:
-    """Return windows (NOISE, symbols) of what the twin's receiver hears without a target, scene by scene in turn.
+def swung(times_s: np.ndarray, wavelength_m: float, rng: np.random.Generator) -> np.ndarray:
+    """Return the echo (N,) complex128 of a point that swings, at three random rates and sizes, while it drifts."""
+    range_m = rng.uniform(-2, 2) * times_s
+    for _ in range(3):
+        size_m, rate_hz = 10 ** rng.uniform(-2.5, -0.3), 10 ** rng.uniform(-0.5, 0.7)
+        range_m = range_m + size_m * np.sin(2 * np.pi * (rate_hz * times_s + rng.random()))
+    return np.exp(-4j * np.pi / wavelength_m * range_m)
 
-    The noise is as strong as beside the target that was taken away.
+
+def empty(radar: Radar, library: Library, kind: str, count: int, fold: str) -> np.ndarray:
+    """Return windows (count, symbols) without a target of the four classes through the twin's receivers.
+
+    kind: "noise", which is that beside an echo of unit power, or "swinging point"; fold: keys the random streams.
     """
-    twin, seconds, found = radar.twin, radar.twin.symbols * radar.twin.symbol_interval_s, []
-    scenes = [(category, scene) for category in CATEGORIES for scene in library.scenes[radar.name][category]]
-    clouds = {category: library.clouds(radar.name, category) for category in CATEGORIES}
-    for number in range(NOISE):
-        category, scene = scenes[number % len(scenes)]
-        rng = stream(library.seed, "unknown", radar.name, number)
-        signal, _ = heard(twin, scene, clouds[category], rng, seconds)
-        values = samples(twin, scene["receiver"], signal, rng, target=False)
+    twin, found = radar.twin, []
+    receivers = [scene["receiver"] for category in CATEGORIES for scene in library.scenes[radar.name][category]]
+    seconds = twin.symbols * twin.symbol_interval_s
+    times = np.arange(int((seconds + 2 * MARGIN * twin.symbol_interval_s) * twin.rate_hz) + 1) / twin.rate_hz
+    for number in range(count):
+        rng = stream(library.seed, "unknown", radar.name, kind, fold, number)
+        signal = swung(times, SPEED_OF_LIGHT / twin.carrier_hz, rng)
+        values = samples(twin, receivers[number % len(receivers)], signal, rng, target=kind != "noise")
         found.append(coherent_intervals(stretch(values, twin, seconds), twin.symbols)[0])
     return np.array(found)
+
+
+class Kept(recognise.Windows):
+    """Windows in memory whose images and facts name a training."""
+
+    def sha256(self) -> str:
+        """Return the SHA-256 of images and facts."""
+        return fingerprint(self.facts, np.ascontiguousarray(self.images).data)
+
+
+def with_empty(radar: Radar, library: Library, block: dict, fold: str) -> Kept:
+    """Return the twin's windows of a fold, "train" or "validation", and as many of an extra class as of another."""
+    known = recognise.simulated(library, radar.name, block, fold)
+    count = len(known.facts) // (2 * len(CATEGORIES))
+    parts, told = [known.images], [known.facts]
+    for kind in EMPTY:
+        parts.append(radar.rendered(empty(radar, library, kind, count, fold), radar.twin))
+        numbers = np.arange(count)
+        told.append(recognise.facts(np.full(count, len(CATEGORIES)), [kind] * count, numbers, np.zeros(count), fold))
+    return Kept(np.concatenate(parts), joined(told))
+
+
+def with_extra(radar: Radar, library: Library, block: dict, folder: Path) -> Radar:
+    """Return the radar with a network of five classes that is trained here, unless that is done."""
+    path = folder / radar.name / "model.pt"
+    if not path.is_file():
+        windows = {fold: with_empty(radar, library, block, fold) for fold in ("train", "validation")}
+        settings = {key: block[key] for key in ("seed", "size", "network", "training", "augmentation")}
+        settings |= {"colour_map": block["images"]["colour_map"], "classes": [*CATEGORIES, "Other"]}
+        runs.train(windows, named(TABLE, block["scheme"], ["A"]), "seen", settings, path.parent)
+    return replace(radar, model=runs.load(path).model)
 
 
 def known_parts(radar: Radar, library: Library, inputs: Path) -> list[Part]:
@@ -143,23 +194,31 @@ def foreign_parts(radar: Radar, folder: Path) -> list[Part]:
     return parts
 
 
-def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path) -> list[list]:
-    """Return the table's rows of one network."""
-    own = recognise.simulated(library, radar.name, recognise.settings(FOLDER / "recognition.yaml"), "validation")
-    parts = [
-        Part("simulated, validation", logits(radar.model, own), own.facts.label),
-        Part("simulated, noise alone", radar.logits(noise(radar, library), radar.twin), None),
-        *known_parts(radar, library, inputs), *foreign_parts(radar, folder),
-    ]  # fmt: skip
+def rows_of(radar: Radar, library: Library, inputs: Path, folder: Path, models: Path) -> list[list]:
+    """Return the table's rows of one network of the zoo, and of one with an extra class."""
+    block = recognise.settings(FOLDER / "recognition.yaml")
+    own = recognise.simulated(library, radar.name, block, "validation")
+    hollow = {kind: empty(radar, library, kind, ASKED, "test") for kind in EMPTY}
     rows = []
-    for name, score in SCORES.items():
-        scores = [score(part.logits, len(CATEGORIES)) for part in parts]
-        level = rejection.level(scores[0], np.ones(len(scores[0])))
-        for part, values in zip(parts, scores, strict=True):
-            kept, known = values >= level, part.label is not None
-            right = f"{100 * np.mean(kept & (part.logits.argmax(1) == part.label)):.1f}" if known else ""
-            rows.append([radar.name, part.windows, known, name, len(kept), f"{100 * kept.mean():.1f}", right])
+    for asked, scores in ((radar, SCORES), (with_extra(radar, library, block, models), EXTRA)):
+        parts = [
+            Part("simulated, validation", logits(asked.model, own), own.facts.label),
+            *(Part(f"simulated, {kind}", asked.logits(windows, asked.twin), None) for kind, windows in hollow.items()),
+            *known_parts(asked, library, inputs), *foreign_parts(asked, folder),
+        ]  # fmt: skip
+        for name, score in scores.items():
+            values = [score(part.logits, len(CATEGORIES)) for part in parts]
+            level = rejection.level(values[0], np.ones(len(values[0])))
+            rows += [[radar.name, part.windows, name, *shares(part, found >= level)]
+                     for part, found in zip(parts, values, strict=True)]  # fmt: skip
     return rows
+
+
+def shares(part: Part, kept: np.ndarray) -> list:
+    """Return count, share kept and, of a class that the network knows, share kept and named rightly, percent."""
+    named_as = part.logits[:, : len(CATEGORIES)].argmax(1)
+    right = "" if part.label is None else f"{100 * np.mean(kept & (named_as == part.label)):.1f}"
+    return [part.label is not None, len(kept), f"{100 * kept.mean():.1f}", right]
 
 
 def main(arguments: list[str]) -> None:
@@ -170,7 +229,9 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", type=Path, required=True, help="table to write (.csv)")
     given = line.parse_args(arguments)
     library = Library.read(FOLDER / "twins.yaml")
-    rows = [row for name in library.twins for row in rows_of(opened(name), library, given.inputs, given.foreign)]
+    rows = [
+        row for name in library.twins for row in rows_of(opened(name), library, given.inputs, given.foreign, MODELS)
+    ]
     write_csv(given.out, COLUMNS, rows)
 
 
