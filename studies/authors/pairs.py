@@ -1,6 +1,7 @@
 """Our clouds beside the authors' pictures, in the same view: `python pairs.py FOLDER OUT` writes one PNG a category.
 
-FOLDER holds `pictures/`. Fixed parts are blue, moving ones red. A craft or bird is drawn by the axes of its picture.
+FOLDER holds `pictures/`. Fixed parts are blue, moving ones red. A target is drawn by the axes of its picture. The
+factors by which our cars' bodies would have to be scaled to have the authors' outline are printed.
 """
 
 import sys
@@ -8,20 +9,42 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageDraw
-from read import LABELS, axes
+from read import LABELS, axes, dots
+from scipy.optimize import least_squares
 
 from lowalt.config.layers import load
 from lowalt.targets.make import make
 from lowalt.targets.records import records_of
 
 ROOT = Path(__file__).parents[2]
+CROPS = {"Vehicle": (395, 240, 920, 639), "Pedestrian": (450, 320, 820, 601)}
+"""Part of the picture that is shown, in pixels: columns and rows of the first and of the last corner."""
 
 
-def drawn(cloud, base: np.ndarray, size: tuple[int, int], flip: bool) -> Image.Image:
-    """Return the cloud's picture of (width, height) by a projection (4, 2); flip: the nose on -y."""
+def placed(cloud, category: str) -> np.ndarray:
+    """Return the cloud's points as the authors place them: birds with the nose on -y, cars on the ground z = 0."""
+    if category == "Bird":
+        return cloud.points * [-1, -1, 1]
+    return cloud.points + np.array([0, 0, cloud.record["origin_height_m"] if category == "Vehicle" else 0])
+
+
+def scaled(points: np.ndarray, base: np.ndarray, theirs: np.ndarray) -> np.ndarray:
+    """Return factors of x, y, z and shifts of y, z (m) that give our body's points (K, 3) the outline of their dots."""
+    angles = np.radians(np.arange(0, 360, 6))
+    ways = np.stack([np.cos(angles), np.sin(angles)], 1)
+    reach = (ways @ theirs.T).max(1)
+
+    def off(guess: np.ndarray) -> np.ndarray:
+        """Pixels by which our outline reaches farther."""
+        return (ways @ (base[0] + (points * guess[:3] + [0, *guess[3:]]) @ base[1:]).T).max(1) - reach
+
+    return least_squares(off, [1, 1, 1, 0, 0]).x
+
+
+def drawn(cloud, points: np.ndarray, base: np.ndarray, size: tuple[int, int]) -> Image.Image:
+    """Return the cloud's picture of (width, height) by a projection (4, 2), its points (K, 3) as `placed`."""
     picture = Image.new("RGB", size, "white")
     pen = ImageDraw.Draw(picture)
-    points = cloud.points * ([-1, -1, 1] if flip else [1, 1, 1])
     for place, part in zip(base[0] + points @ base[1:], cloud.part, strict=True):
         colour = (0, 114, 189) if cloud.kinds[part] == "body" else (220, 0, 0)
         pen.ellipse((*(place - 3), *(place + 3)), fill=colour)
@@ -29,20 +52,27 @@ def drawn(cloud, base: np.ndarray, size: tuple[int, int], flip: bool) -> Image.I
 
 
 def main(folder: Path, out: Path) -> None:
-    """Write the pairs of all targets whose axes are read."""
+    """Write the pairs of all targets."""
     records = records_of(load([ROOT / "config/default.yaml"], ROOT / "workflow/schemas/config.schema.yaml")["targets"])
     names = list(records)
     out.mkdir(parents=True, exist_ok=True)
-    for category in ("UAV", "Bird"):
+    for number, category in enumerate(("UAV", "Bird", "Vehicle", "Pedestrian")):
         rows = [name for name in LABELS if name.startswith(category)]
         page = Image.new("RGB", (4 * 500, 5 * 380), "white")
         for place, name in enumerate(rows):
             theirs = Image.open(folder / "pictures" / f"Target40_{name}.jpg").convert("RGB")
-            subtype = names[(10 if category == "Bird" else 0) + int(name.split("_")[1]) - 1]
+            subtype = names[10 * number + int(name.split("_")[1]) - 1]
             base = axes(np.asarray(theirs), name)
-            ours = drawn(make(records[subtype], None, 1), base, theirs.size, category == "Bird")
+            cloud = make(records[subtype], None, 1)
+            points = placed(cloud, category)
+            if category == "Vehicle":
+                body = points[[cloud.kinds[part] == "body" for part in cloud.part]]
+                factors = scaled(body, base, dots(np.asarray(theirs), category)["body"][0])
+                print(name, "width, length, height times", *factors[:3].round(2), "moved", *factors[3:].round(2))
+            ours = drawn(cloud, points, base, theirs.size)
             for side, picture in enumerate((theirs, ours)):
-                page.paste(picture.resize((500, 380)), (500 * (2 * (place % 2) + side), 380 * (place // 2)))
+                shown = picture.crop(CROPS.get(category, (0, 0, *picture.size)))
+                page.paste(shown.resize((500, 380)), (500 * (2 * (place % 2) + side), 380 * (place // 2)))
         page.save(out / f"{category}.png")
 
 

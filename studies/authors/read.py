@@ -1,9 +1,10 @@
-"""Lengths of the authors' craft and birds, read from their videos: rotors, layers, hubs, shares of points, wings.
+"""Lengths of the authors' targets, read from their videos: rotors, layers, hubs, wings, wheels, shares of points.
 
 A view is orthographic, so a place (x, y, z) lies at pixel O + x e_x + y e_y + z e_z, and the ticks of the axes give the
 three vectors. Rotors turn about z: the union of a rotor's dots over the frames is an ellipse whose width tells the
 radius and whose height, beyond that, the distance between two layers. Wings are mirror images of each other in x: two
-tips give all three coordinates. Run as `python read.py FOLDER readings.csv`; FOLDER holds `videos/`.
+tips give all three coordinates. Wheels turn about x: see `wheel`. Run as `python read.py FOLDER readings.csv`; FOLDER
+holds `videos/`.
 """
 
 import csv
@@ -21,6 +22,8 @@ from scipy import ndimage
 BOXES = {
     "UAV": ((560, 822), (1112, 672), (134, 628), (134, 202)),
     "Bird": ((492, 822), (1110, 697), (134, 608), (134, 177)),
+    "Vehicle": ((559, 823), (1111, 674), (134, 628), (134, 203)),
+    "Pedestrian": ((559, 823), (1111, 674), (134, 628), (134, 203)),
 }
 # First label and step of the x, y and z axis, in metres, read by eye; the places of the ticks are found.
 LABELS = {
@@ -44,6 +47,26 @@ LABELS = {
     "Bird_08_Seagull": (1.0, -0.5, 1.0, -0.5, -1.0, 0.5),
     "Bird_09_Owl": (1.0, -0.5, 1.0, -0.5, -1.0, 0.5),
     "Bird_10_Wild_Goose": (0.5, -0.5, 0.5, -0.5, -0.5, 0.5),
+    "Vehicle_01_AITO_M9_2024": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_02_Tesla_Roadster_2020": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_03_Xiaomi_SU7_2024": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_04_XPeng_G9_2022": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_05_ZEEKR_001_2022": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_06_Audi_A6L_2019": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_07_BYD_Song_L_EV_2024": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_08_Geely_Galaxy_L7_2024": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_09_Leading_Ideal_L8_2023": (-5, 5, -5, 5, -2, 1),
+    "Vehicle_10_NIO_ET5T_2023": (-5, 5, -5, 5, -2, 1),
+    "Pedestrian_01_Walking_Pedestrian_1": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_02_Walking_Pedestrian_2": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_03_Walking_Pedestrian_3": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_04_Walking_Pedestrian_4": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_05_Walking_Pedestrian_5": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_06_Walking_Pedestrian_6": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_07_Walking_Pedestrian_7": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_08_Walking_Pedestrian_8": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_09_Running_Pedestrian_1": (-2, 1, -2, 1, -2, 1),
+    "Pedestrian_10_Running_Pedestrian_2": (-2, 1, -2, 1, -2, 1),
 }
 COLOURS = {
     "body": (0, 114, 189), "red": (255, 0, 0), "black": (0, 0, 0), "green": (0, 255, 0), "blue": (0, 0, 255),
@@ -53,6 +76,8 @@ FRAMES = 90
 """Frames that are looked at, evenly over a video: a rotor has passed all its angles in them."""
 DOT = 2.0
 """Pixels by which a dot's middle may be off, mostly where dots overlap."""
+DOT_AREA = 30
+"""Pixels of a dot."""
 
 
 def frames(path: Path, count: int) -> list[np.ndarray]:
@@ -100,16 +125,17 @@ def dots(frame: np.ndarray, box: str) -> dict[str, tuple[np.ndarray, int]]:
                      columns > top[0] + 8, columns < x_end[0], rows > 60], axis=0)  # fmt: skip
     rows, columns = rows[inside], columns[inside]
     away = ((frame[rows, columns].astype(int)[:, None, :] - np.array(list(COLOURS.values()))) ** 2).sum(2)
-    found = {}
+    first = np.array([rows.min() - 2, columns.min() - 2])
+    rows, columns, found = rows - first[0], columns - first[1], {}
     for number, colour in enumerate(COLOURS):
-        mask = np.zeros(frame.shape[:2], bool)
+        mask = np.zeros((rows.max() + 3, columns.max() + 3), bool)
         own = (away.argmin(1) == number) & (away[:, number] < 120**2)
         mask[rows[own], columns[own]] = True
         # Lines and the rims of other dots are thinner than a dot.
         mask = ndimage.binary_opening(mask, np.ones((3, 3)))
         runs, count = ndimage.label(mask)
         middles = np.array(ndimage.center_of_mass(mask, runs, range(1, count + 1))).reshape(-1, 2)
-        found[colour] = middles[:, ::-1], int(mask.sum())
+        found[colour] = (middles + first)[:, ::-1], int(mask.sum())
     return found
 
 
@@ -223,14 +249,74 @@ def bird(name: str, shown: list[np.ndarray]) -> list[tuple]:
     ]
 
 
+def wheel(base: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return a wheel's middle (pixels, 2), radius and half width (m) from the dots (dots, 2) of all frames.
+
+    Dots that turn about x fill the surface of a cylinder. Along a direction n of the picture it reaches from its middle
+    by radius |(n e_y, n e_z)| + half width |n e_x|, so the outline gives all four by least squares.
+    """
+    angles = np.radians(np.arange(0, 360, 6))
+    ways = np.stack([np.cos(angles), np.sin(angles)], 1)
+    reach = [ways, np.hypot(ways @ base[2], ways @ base[3])[:, None], abs(ways @ base[1])[:, None]]
+    return np.linalg.lstsq(np.hstack(reach), (ways @ places.T).max(1), rcond=None)[0]
+
+
+def rolling(base: np.ndarray, seen: list[np.ndarray], found: np.ndarray, count: int) -> float:
+    """Return the share of frames in which a wheel's top moves on to +y, of those in which it turns.
+
+    `found` is what `wheel` returned; `count` dots stand evenly on each edge of the rim; frames may repeat.
+    """
+    middle, radius, half = found[:2], *found[2:]
+    phasors = []
+    for places in seen:
+        y, z = np.linalg.solve(base[2:].T, (places - middle - half * base[1]).T) / radius
+        rim = abs(np.hypot(y, z) - 1) < 0.12
+        phasors.append(np.exp(1j * count * np.arctan2(y, z)[rim]).sum())
+    steps = np.degrees(np.angle(np.array(phasors[1:]) * np.conj(phasors[:-1]))) / count
+    return float(np.mean(steps[abs(steps) > 1] > 0))
+
+
+def car(name: str, shown: list[np.ndarray]) -> list[tuple]:
+    """Return the readings of a car: its wheels' points, places, size and way, and the share of points that turn."""
+    base = axes(shown[0], name)
+    seen = [dots(frame, "Vehicle") for frame in shown]
+    colours = [colour for colour in ("red", "black", "green", "blue") if max(len(found[colour][0]) for found in seen)]
+    each = max(len(found[colour][0]) for found in seen for colour in colours)
+    body = np.mean([found["body"][1] for found in seen]) / DOT_AREA
+    wheels = np.array([wheel(base, np.concatenate([found[colour][0] for found in seen])) for colour in colours])
+    # The four stand about x = 0 at equal height, so their middle gives y and z, and each one then x and y.
+    middle = wheels[:, :2].mean(0)
+    y, z = np.linalg.solve(base[2:].T, middle - base[0])
+    spots = np.linalg.solve(base[1:3].T, (wheels[:, :2] - middle).T).T + np.array([0, y])
+    front, right = spots[:, 1] > y, spots[:, 0] > 0
+    ahead = [rolling(base, [found[colour][0] for found in seen], row, each // 2)
+             for colour, row in zip(colours, wheels, strict=True)]  # fmt: skip
+    error = DOT / 2 / np.hypot(*base[2])
+    rows = [(name, "wheels", len(colours), 0, "1"), (name, "points a wheel", each, 0, "1"),
+            (name, "share of points that turn", 4 * each / (4 * each + body), 0.02, "1")]  # fmt: skip
+    for (x, along), foremost, aside in zip(spots, front, right, strict=True):
+        place = f"{'front' if foremost else 'rear'} {'right' if aside else 'left'} wheel"
+        rows += [(name, f"{place}, x", x, error, "m"), (name, f"{place}, y", along, error, "m")]
+    return [
+        *rows,
+        (name, "wheel base", spots[front, 1].mean() - spots[~front, 1].mean(), error, "m"),
+        (name, "track", spots[right, 0].mean() - spots[~right, 0].mean(), error, "m"),
+        (name, "wheel, diameter", 2 * wheels[:, 2].mean(), np.ptp(wheels[:, 2]) + 0.005, "m"),
+        (name, "wheel, edges apart", 2 * wheels[:, 3].mean(), np.ptp(wheels[:, 3]) + 0.01, "m"),
+        (name, "wheel, middle above z = 0", z, error, "m"),
+        (name, "share of frames that roll to +y", np.mean(ahead), np.ptp(ahead), "1"),
+    ]
+
+
 def main(folder: Path, out: Path) -> None:
-    """Read all craft and birds and write the table."""
+    """Read all targets and write the table."""
+    readers = {"UAV": craft, "Bird": bird, "Vehicle": car}
     with out.open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(("target", "quantity", "value", "error", "unit"))
         for name in LABELS:
             shown = frames(folder / "videos" / f"Target40_{name}.mp4", FRAMES)
-            for target, what, value, error, unit in (craft if name.startswith("UAV") else bird)(name, shown):
+            for target, what, value, error, unit in readers[name.split("_")[0]](name, shown):
                 writer.writerow((target, what, f"{value:.4g}", f"{error:.2g}", unit))
             print(name, file=sys.stderr)
 
