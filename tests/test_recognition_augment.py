@@ -8,6 +8,7 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition.augment import KEYS, augment
+from lowalt.spectra import NAMES
 
 
 def block(**changes):
@@ -143,6 +144,6 @@ def test_each_of_the_eight_draws_decides_one_change():
     draws[0, 0], draws[1, 0], drops[2] = 0.4, np.nextafter(0.4, 0), 0.1
     drops[3, 1] = 0.7
     made = iter((draws, drops))
-    found = augment(images, [0, 1, 2, 6], strong, SimpleNamespace(random=lambda shape: next(made)))
+    found = augment(images, [0, 1, 2, len(NAMES) + 2], strong, SimpleNamespace(random=lambda shape: next(made)))
     for image, changed, draw, drop in zip(images, found, draws, drops, strict=True):
         assert (changed == slow(image, draw, strong, (0, 0, 128, 128), drop < 0.7)).all()

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from lowalt.files.errors import InputError
 from lowalt.numerics.streams import stream
 from lowalt.recognition import freeze, order, protocols, samples, schemes, score
+from lowalt.spectra import NAMES
 from made_predictions import SNRS, SUBTYPES, facts
 
 UNUSED = ("model", "group", "fold", "range_m", "aspect_rad")
@@ -30,8 +31,8 @@ def test_the_table_of_schemes_holds_every_row_of_the_paper():
         published = {(row["protocol"], row["scheme"]) for row in csv.DictReader(file)}
     ours = {(protocol, entry.name) for entry in table.values() for protocol in entry.protocols}
     assert published <= ours
-    assert table["ABC:VRP+TRP+VT"].columns == [0, 1, 2, 4, 5, 6, 8, 9, 10]
-    assert table["B:VRP+TRP+VT"].columns == [4, 5, 6]
+    assert table["ABC:VRP+TRP+VT"].columns == [station * len(NAMES) + image for station in range(3) for image in range(3)]
+    assert table["B:VRP+TRP+VT"].columns == [len(NAMES) + image for image in range(3)]
     assert table["A:VT"].columns == [2]
     assert schemes.named("config/schemes.csv", "abc-vit-b-16-mean-fusion", "ABC").backbone == "vit_base_patch16_224"
 
@@ -97,10 +98,10 @@ def test_samples_in_memory_are_those_written_and_no_others(tmp_path):
     halves = [np.arange(len(found)) % 2 == part for part in (0, 1)]
     views = [cache(tmp_path / f"{part}.npz", found.take(half)) for part, half in enumerate(halves)]
     pairs = {("seen", "train"), ("unseen", "val")}
-    source = samples.ViewSamples([tmp_path / "1.npz", tmp_path / "0.npz"], [0, 6], pairs)
+    source = samples.ViewSamples([tmp_path / "1.npz", tmp_path / "0.npz"], [0, len(NAMES) + 2], pairs)
     kept = [np.array([pair in pairs for pair in zip(found.group[h], found.fold[h], strict=True)]) for h in halves]
     assert source.size == 16
-    # The second station's VT is view 6 of the catalogue, and image 5 of a data set without its fourth spectrum.
+    # The second station's VT stands after all spectra of the catalogue, and is image 5 of a data set of three spectra.
     expected = np.concatenate([part[keep][:, [0, 5]] for part, keep in zip(views, kept, strict=True)])
     assert (source.views(np.arange(len(source.facts))) == expected).all()
     assert set(zip(source.facts.group.tolist(), source.facts.fold.tolist(), strict=True)) == pairs
