@@ -1,4 +1,4 @@
-"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index; the folder can be published.
+"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index: the folder can be published.
 
 A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
 """
@@ -22,15 +22,13 @@ from lowalt.files.errors import InputError
 from lowalt.shards import sums
 from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
-from lowalt.shards.hub import TAGS, front
+from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
 from lowalt.shards.table import EXTENSIONS
 
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
-
-AUTHORS = "The lowalt authors"
 
 ODDITIES = """\
 - Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
@@ -62,10 +60,10 @@ def _slug(key: str) -> str:
 
     Raises: InputError naming a key of another form.
     """
-    found = SLUG.match(key)
-    if found is None:
+    parts = SLUG.match(key)
+    if parts is None:
         raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
-    return found[1]
+    return parts[1]
 
 
 def _census(shards: ShardSet) -> tuple[dict[str, dict], Counter, Counter]:
@@ -165,7 +163,7 @@ shards = ShardSet("index.json", groups=["seen"], folds=["train"])
 images, label = shards.images(0, size=224), shards.labels[0]  # ({images}, 224, 224) uint8
 ```
 
-`python -m lowalt.shards verify --index index.json` checks every byte of every file and names what is damaged;
+`lowalt verify index.json` checks every byte of every file and names what is damaged;
 `sha256sum --check SHA256SUMS` does the same without this package, file by file.
 
 **Protocols.** *seen*: train, val and test folds of both groups. *unseen*: folds of the `seen` group, and all folds
@@ -192,20 +190,8 @@ The exact configuration, which makes the same bytes again with these versions:
 """
 
 
-def zenodo(shards: ShardSet, name: str, license_name: str) -> dict:
-    """Return the data set's metadata as Zenodo's deposits take it.
-
-    Source: Zenodo's developer documentation, deposit metadata.
-    """
-    return {
-        "title": name, "upload_type": "dataset", "description": description(shards), "version": __version__,
-        "creators": [{"name": AUTHORS}], "access_right": "open", "license": license_name.lower(), "language": "eng",
-        "keywords": TAGS,
-    }  # fmt: skip
-
-
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv, croissant.json and .zenodo.json next to an index, and the checksums of all of it.
+    """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of it.
 
     facts: further properties of the Croissant description, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
@@ -226,22 +212,20 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
-    with replacing(folder / ".zenodo.json") as temporary:
-        temporary.write_text(json.dumps(zenodo(shards, name, license_name), indent=1) + "\n")
     sums.write(index_path, shards.index)
 
 
 def main(arguments: list[str]) -> None:
     """Write the data card, the table of samples and the Croissant description next to the index."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
-    options.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
-    options.add_argument("--url", help="where the data set will be published")
-    options.add_argument("--date", help="day of publication, YYYY-MM-DD")
-    given = options.parse_args(arguments)
-    facts = {"url": given.url, "datePublished": given.date}
-    write(given.index, given.config, given.license, **{key: text for key, text in facts.items() if text})
+    line = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
+    line.add_argument("--index", required=True, help="the data set's index")
+    line.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
+    line.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
+    line.add_argument("--url", help="where the data set will be published")
+    line.add_argument("--date", help="day of publication, YYYY-MM-DD")
+    options = line.parse_args(arguments)
+    facts = {"url": options.url, "datePublished": options.date}
+    write(options.index, options.config, options.license, **{key: text for key, text in facts.items() if text})
 
 
 if __name__ == "__main__":

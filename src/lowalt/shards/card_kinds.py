@@ -33,7 +33,8 @@ READING = {
     "cube": _SAMPLE.format(
         extension="cube.npy",
         meaning="the range cells of every symbol with noise, float32 (stations, symbols, cells, 2: real and imaginary "
-        "part); the record's `cube` tells at every symbol the cell that the receiver chose (-1: none received), which "
+        "part), or int16 to be multiplied by the station's `step` in the record's `cube`, rounded by at most half a "
+        "step; the record's `cube` tells at every symbol the cell that the receiver chose (-1: none received), which "
         "holds the signal, and the target's true range, radial speed, direction and cell",
     ),
     "recipe": """\

@@ -65,15 +65,15 @@ def shard_faults(path: Path, entry: dict) -> Iterator[str]:
     except InputError:
         yield f"{path.name}: damaged, and its table cannot tell where"
         return
-    found = path.stat().st_size
-    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"], found))
+    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"]))
 
 
-def _locate(path: Path, samples: np.ndarray, expected: int, found: int) -> Iterator[str]:
+def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
     """Faults of a shard known to be damaged, sample by sample, then those of the remaining bytes."""
-    if found != expected:
-        yield f"{found} bytes, expected {expected}"
-    end, named = 0, found != expected
+    size = path.stat().st_size
+    if size != expected:
+        yield f"{size} bytes, expected {expected}"
+    end, named = 0, size != expected
     with path.open("rb") as file:
         for row in samples:
             # The samples of one motion model share their bytes in recipe shards.
