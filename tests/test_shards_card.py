@@ -140,7 +140,6 @@ def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(publi
     main(["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml"), "--license", "CC-BY-4.0"])
     assert "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)" in (copy / "README.md").read_text()
     assert yaml.safe_load((copy / "README.md").read_text().split("---")[1])["license"] == "cc-by-4.0"
-    assert json.loads((copy / ".zenodo.json").read_text())["license"] == "cc-by-4.0"
     assert (
         json.loads((copy / "croissant.json").read_text())["license"] == "https://creativecommons.org/licenses/by/4.0/"
     )
