@@ -9,6 +9,8 @@ parts, such as the product of complex numbers, are compiled for each set of opti
 kernel of a process to call a function would decide how that function rounds in all others.
 """
 
+import contextlib
+import functools
 import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,7 +25,8 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 
-from lowalt.machine.turns import Turn
+PATIENCE_S = 180.0
+"""After so long a process goes on without its turn: doing the work twice is better than standing still."""
 
 
 def _text_of(value) -> str:
@@ -124,10 +127,15 @@ class _DigestCache(FunctionCache):
     options: dict[str, Any] | None = None
     """How the function is compiled."""
 
-    def __init__(self, function):
-        super().__init__(function)
+    @functools.cached_property
+    def turn(self):
+        """The lock under which one process at a time compiles this function; any user may open its file."""
+        # Only who compiles needs the module, whose import takes a twentieth of a job's start.
+        from filelock import FileLock
+
         # In a folder of its own: tools that list kept machine code see no other file.
-        self._turn = Turn(Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock")
+        path = Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock"
+        return FileLock(path, timeout=PATIENCE_S, mode=0o666)
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""
@@ -145,10 +153,11 @@ class _DigestCache(FunctionCache):
         if found is None and self._enabled:
             # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
             # no two processes wait for each other.
-            self._turn.take()
+            with contextlib.suppress(OSError, RuntimeError):
+                self.turn.acquire()
             found = self._kept(sig, target_context)
             if found is not None:
-                self._turn.give()
+                self.turn.release()
         return found
 
     def save_overload(self, sig, data):
@@ -156,7 +165,7 @@ class _DigestCache(FunctionCache):
         try:
             super().save_overload(sig, data)
         finally:
-            self._turn.give()
+            self.turn.release()
 
     def _kept(self, sig, target_context):
         """Finished machine code for a signature, None where none is kept."""
