@@ -34,10 +34,8 @@ def test_processes_that_start_together_compile_a_kernel_once(tmp_path):
 
 def test_a_kernel_waits_for_the_process_that_compiles_it(tmp_path):
     (tmp_path / "slow_kernel.py").write_text(KERNEL)
-    path = (
-        start(tmp_path, "import slow_kernel; print(slow_kernel.twice._cache.turn.lock_file)").communicate()[0].strip()
-    )
-    with FileLock(path):
+    path = start(tmp_path, "import slow_kernel; print(slow_kernel.twice._cache.turn.lock_file)").communicate()[0]
+    with FileLock(path.strip()):
         run = start(tmp_path, CALL)
         with pytest.raises(subprocess.TimeoutExpired):
             run.wait(4)
