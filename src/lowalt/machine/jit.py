@@ -149,16 +149,16 @@ class _DigestCache(FunctionCache):
         Like numba's method, except that it does not load the compiler before it looks for finished machine code, and
         that it waits while another process compiles this function.
         """
-        found = self._kept(sig, target_context)
-        if found is None and self._enabled:
+        code = self._kept(sig, target_context)
+        if code is None and self._enabled:
             # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
             # no two processes wait for each other.
             with contextlib.suppress(OSError, RuntimeError):
                 self.turn.acquire()
-            found = self._kept(sig, target_context)
-            if found is not None:
+            code = self._kept(sig, target_context)
+            if code is not None:
                 self.turn.release()
-        return found
+        return code
 
     def save_overload(self, sig, data):
         """Keep machine code as numba's method does, then let other processes go on."""

@@ -92,8 +92,8 @@ def write_shard(
                 key = sample_key(row["subtype"], row["model"], snr_db)
                 span = spans.get(number)
                 if span is None:
-                    data, told = content(number, level)
-                    name, text = key, record(row, snr_db, wanted, seed, network, classes, told)
+                    data, cubes = content(number, level)
+                    name, text = key, record(row, snr_db, wanted, seed, network, classes, cubes)
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]

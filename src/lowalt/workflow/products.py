@@ -80,13 +80,13 @@ class Products(DataProducts):
 
         Raises: InputError naming the command that makes them, where one is missing.
         """
-        found = []
+        paths = []
         for row in read_csv(shipped(PRESETS), "command", "predictions"):
             for seed in self._config["recognition"]["seeds"] if row["predictions"] else ():
-                found.append(f"results/{self._run.data}-{row['predictions']}/{seed}.csv")
-                if not Path(found[-1]).is_file():
-                    raise InputError(f"no {found[-1]}: `{row['command']}` makes it first")
-        return found
+                paths.append(f"results/{self._run.data}-{row['predictions']}/{seed}.csv")
+                if not Path(paths[-1]).is_file():
+                    raise InputError(f"no {paths[-1]}: `{row['command']}` makes it first")
+        return paths
 
     def transferred(self, wildcards: Any) -> list[str]:
         """Configurations of this run and of those whose models are tried on its test samples.
@@ -172,10 +172,10 @@ class Products(DataProducts):
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""
-        trainings, own = self._run.trainings, f"results/{wildcards.run}/benchmarks"
+        trainings, folder = self._run.trainings, f"results/{wildcards.run}/benchmarks"
         return [
             *self.data_benchmarks(wildcards),
-            *(f"{own}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
+            *(f"{folder}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
             f"results/{self._run.data}/benchmarks/distances.jsonl",
-            f"{own}/tables.jsonl",
+            f"{folder}/tables.jsonl",
         ]

@@ -136,8 +136,8 @@ def refuse_data(config: dict) -> None:
     made = Path("results") / name / "config.yaml"
     if not made.is_file():
         raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
-    own, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
-    differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
+    here, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
+    differ = [key for key in sorted({*here, *other} - set(TRAINING_BLOCKS)) if here.get(key) != other.get(key)]
     if differ:
         raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
 

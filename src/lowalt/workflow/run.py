@@ -64,10 +64,10 @@ class Run:
     @property
     def sources(self) -> str:
         """One line: the number of subtypes from built-in models, and the subtypes made from files of the user."""
-        own = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
-        if not own:
+        named = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
+        if not named:
             return f"targets: {len(self.records)} built-in"
-        return f"targets: {len(self.records) - len(own)} built-in; from files: {', '.join(own)}"
+        return f"targets: {len(self.records) - len(named)} built-in; from files: {', '.join(named)}"
 
     @property
     def name(self) -> str:

@@ -101,8 +101,8 @@ def writable(folder: Path, run: str) -> None:
     results = folder / "results"
     if results.is_symlink() and not results.exists():
         raise InputError(f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)")
-    own = results / run
-    for place in (folder, *(place for place in (results, own, *sorted(own.glob("*/"))) if place.exists())):
+    made = results / run
+    for place in (folder, *(place for place in (results, made, *sorted(made.glob("*/"))) if place.exists())):
         try:
             with tempfile.TemporaryFile(dir=place) as file:
                 file.write(bytes(TRIAL_BYTES))
