@@ -19,7 +19,7 @@ from lowalt.shards import ShardSet, index
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.remake import number_of, opened
-from lowalt.tiles.files import Tiles
+from lowalt.tiles.tile_files import Tiles
 from test_dataset import configuration
 from trainings import SCHEME, SETTINGS, write_views
 

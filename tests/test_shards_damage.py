@@ -8,7 +8,7 @@ import pytest
 from dataset import build, publish
 from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet, faults, verify
-from lowalt.shards.table import map_samples
+from lowalt.shards.sample_table import map_samples
 
 
 @pytest.fixture(scope="module")

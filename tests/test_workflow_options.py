@@ -1,4 +1,4 @@
-"""Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `lowalt.workflow.settings`)."""
+"""Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `stage_settings`)."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.workflow import options
 from lowalt.workflow.products import Products
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 

@@ -201,15 +201,15 @@ def _arrays() -> list[Reader]:
     from lowalt.files.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
     from lowalt.recognition.one_sample import images_of
-    from lowalt.shards import table
+    from lowalt.shards import sample_table
     from lowalt.shards.index import load as load_index
-    from lowalt.shards.table import map_samples, read_header
+    from lowalt.shards.sample_table import map_samples, read_header
     from lowalt.targets import occluders
     from lowalt.targets.cloud import read as read_cloud
     from lowalt.targets.cloud import write as write_cloud
-    from lowalt.tiles.files import Tiles
-    from lowalt.tiles.files import write as write_tiles
     from lowalt.tiles.png import decode, encode
+    from lowalt.tiles.tile_files import Tiles
+    from lowalt.tiles.tile_files import write as write_tiles
 
     image = np.add.outer(np.arange(24), np.arange(24)).astype(np.uint8)
     png = encode(image, np.stack([np.arange(256)] * 3, 1).astype(np.uint8))
@@ -224,8 +224,8 @@ def _arrays() -> list[Reader]:
         np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
     )  # fmt: skip
     cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
-    rows = np.zeros(count, table.SAMPLE)
-    header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
+    rows = np.zeros(count, sample_table.SAMPLE)
+    header = _bytes(lambda p: sample_table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
     surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
     tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")

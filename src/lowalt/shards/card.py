@@ -19,12 +19,12 @@ from lowalt.config.network import station_names
 from lowalt.files.atomic import replacing, sha256, text_of
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
-from lowalt.shards import sums
-from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
+from lowalt.shards import checksums
+from lowalt.shards.card_kinds import READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
-from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.sample_table import EXTENSIONS
 
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
@@ -156,7 +156,7 @@ samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
 
 import webdataset
 for sample in webdataset.WebDataset("{example}", shardshuffle=False).decode("pil"):
-    print(sample["__key__"], sample["json"]["category"], sample["{MEMBERS[shards.kind]}"])
+    print(sample["__key__"], sample["json"]["category"], sample["{EXTENSIONS[shards.kind]}"])
 
 from lowalt.shards import ShardSet
 shards = ShardSet("index.json", groups=["seen"], folds=["train"])
@@ -212,7 +212,7 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
-    sums.write(index_path, shards.index)
+    checksums.write(index_path, shards.index)
 
 
 def main(arguments: list[str]) -> None:

@@ -3,9 +3,6 @@
 WHAT and READING leave the numbers of stations and spectra, and the names of the spectra, to `str.format`.
 """
 
-MEMBERS = {"image": "png", "signal": "npy", "recipe": "clean.npy", "cube": "cube.npy"}
-"""Extension of the member next to the record."""
-
 WHAT = {
     "image": "{stations} x {columns} tiles of time-frequency images",
     "signal": "complex symbol-domain signals",

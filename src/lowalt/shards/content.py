@@ -12,8 +12,8 @@ from lowalt.shards.record import npy
 from lowalt.shards.stored_cubes import of_cubes
 from lowalt.shards.write import Content
 from lowalt.tiles.cubes import Cubes
-from lowalt.tiles.files import Tiles
 from lowalt.tiles.signals import load_signals
+from lowalt.tiles.tile_files import Tiles
 
 
 def _signals(kind: str, path: str | None, network: Network, shape: tuple[int, int]) -> np.ndarray:

@@ -4,7 +4,7 @@ Source: Croissant format specification 1.1 (MLCommons).
 """
 
 from lowalt.config.classes import stated
-from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.spectra.catalogue import named
 
 TERMS = """

@@ -5,8 +5,8 @@ from fnmatch import fnmatchcase
 
 from lowalt.config.splits import FOLDS
 from lowalt.shards.read import ShardSet
+from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.shards.stored_cubes import number_of
-from lowalt.shards.table import EXTENSIONS
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
 

@@ -13,7 +13,7 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, replacing, sha256, text_of
 from lowalt.files.errors import InputError
-from lowalt.shards.table import read_header, table_path
+from lowalt.shards.sample_table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
 READABLE = ("lowalt-shards-1", FORMAT)

@@ -22,8 +22,8 @@ from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
 from lowalt.shards.record import npy, row_of
+from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.stored_cubes import cubes_of
-from lowalt.shards.table import map_samples, table_path
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.spectra.cube import Cube
 from lowalt.tiles.png import decode

@@ -16,7 +16,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
-from lowalt.tiles.files import npy_header
+from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
 

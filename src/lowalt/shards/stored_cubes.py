@@ -13,7 +13,7 @@ from lowalt.config.network import Network
 from lowalt.shards.clean import complex_signals
 from lowalt.shards.record import npy, parts_of
 from lowalt.spectra.cube import TRUTH, Cube
-from lowalt.tiles.files import npy_header
+from lowalt.tiles.tile_files import npy_header
 
 LARGEST = 2**15 - 1
 LEAST_EXPONENT = -149

@@ -13,8 +13,8 @@ from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.shards.clean import packed
 from lowalt.shards.record import model_key, rank, record, sample_key
-from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
-from lowalt.shards.table import write as write_table
+from lowalt.shards.sample_table import EXTENSIONS, KINDS, SAMPLE, table_path
+from lowalt.shards.sample_table import write as write_table
 from lowalt.shards.tar import Span, Writer
 
 Content = Callable[[int, int], tuple[bytes, dict]]

@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.config.command import parser, pick, run
 from lowalt.machine.progress import reported
 from lowalt.spectra.cube import Cube
-from lowalt.tiles import files, reduced
+from lowalt.tiles import reduced, tile_files
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.signals import load_signals
@@ -54,7 +54,7 @@ def main(arguments: list[str]) -> None:
     signals = load_signals(options.signals, tiles.network)
     targets = [reduced.target(text) for text in options.reduced]
     with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
-        files.write(options.out, encoded(signals, tiles, seen, late, **more))
+        tile_files.write(options.out, encoded(signals, tiles, seen, late, **more))
 
 
 def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:

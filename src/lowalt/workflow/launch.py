@@ -29,8 +29,8 @@ class Launch:
         launch = cls(block.get("processes", 1), block.get("nodes", 1), block.get("gpu", False))
         if launch.processes % launch.nodes:
             raise InputError(
-                f"recognition.nodes: {launch.nodes} with recognition.processes: {launch.processes}, expected a number of "
-                "nodes that divides the processes, of which each node gets equally many"
+                f"recognition.nodes: {launch.nodes} with recognition.processes: {launch.processes}, expected a number "
+                "of nodes that divides the processes, of which each node gets equally many"
             )
         return launch
 

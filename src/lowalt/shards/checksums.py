@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.files.atomic import replacing, sha256
-from lowalt.shards.table import table_path
+from lowalt.shards.sample_table import table_path
 
 NAME = "SHA256SUMS"
 CARD = ("README.md", "croissant.json", "samples.csv")
