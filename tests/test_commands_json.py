@@ -11,7 +11,7 @@ import yaml
 
 from lowalt.__main__ import main
 from lowalt.commands import spectra, workflow
-from lowalt.commands.for_programs import as_json
+from lowalt.commands.command_line import as_json
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
 from lowalt.report.figures import inspection, target

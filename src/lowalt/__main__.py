@@ -8,7 +8,7 @@ import argparse
 import sys
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
-from lowalt.commands.for_programs import Answer, as_json
+from lowalt.commands.command_line import Answer, as_json
 from lowalt.config.command import refusal
 from lowalt.files.errors import InputError
 

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
@@ -17,12 +17,9 @@ MEASURED = ("accuracy_percent", "processor_s", "data")
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `compare` to a parser's commands."""
-    line = commands.add_parser(
-        "compare", help="two finished runs: what differs in configuration, accuracy, time and bytes",
-        epilog="example: lowalt compare results/default results/tiny",
-    )  # fmt: skip
+    meaning = "two finished runs: what differs in configuration, accuracy, time and bytes"
+    line = add_command(commands, "compare", run, meaning, "lowalt compare results/default results/tiny")
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
-    acts(line, run)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:

@@ -3,7 +3,7 @@
 import argparse
 from collections.abc import Iterator
 
-from lowalt.commands.for_programs import Answer
+from lowalt.commands.command_line import Answer
 
 SCRIPT = """# Completion of lowalt for bash and zsh; load it by: source <(lowalt completion)
 if [ -n "${{ZSH_VERSION-}}" ]; then autoload -Uz compinit bashcompinit && compinit -u && bashcompinit; fi

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import name_backbone
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import existing
@@ -19,36 +19,23 @@ if TYPE_CHECKING:
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add the three commands to a parser's."""
-    verify = commands.add_parser(
-        "verify",
-        help="check every byte of a data set",
-        epilog="example: lowalt verify results/default/shards/index.json",
-    )
-    verify.add_argument("index", type=_index, help="index.json of the data set")
+    index = "results/default/shards/index.json"
+    verify = add_command(commands, "verify", verified, "check every byte of a data set", f"lowalt verify {index}")
     verify.add_argument("--remake", type=int, default=0, metavar="N", help="also make N random samples again")
-    remake = commands.add_parser(
-        "remake", help="make stored samples again from their records and compare every byte",
-        epilog="example: lowalt remake results/default/shards/index.json crow-000003-snr013",
-    )  # fmt: skip
-    remake.add_argument("index", type=_index, help="index.json of the data set")
-    remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
-    for line, act in ((verify, verified), (remake, remade)):
-        acts(line, act)
+    meaning = "make stored samples again from their records and compare every byte"
+    remake = add_command(commands, "remake", remade, meaning, f"lowalt remake {index} crow-000003-snr013")
+    for line in (verify, remake):
+        line.add_argument("index", type=_index, help="index.json of the data set")
         line.add_argument("--clouds", type=Path, help="folder of the run's clouds (default: ../clouds)")
         line.add_argument("--occluders", type=Path, help="folder of its surfaces (default: occluders next to clouds)")
-    predict = commands.add_parser(
-        "predict", help="class probabilities of a tile, of signals or of a recording by a trained model",
-        epilog="example: lowalt predict default-seen sample.npy",
-    )  # fmt: skip
+    remake.add_argument("sample", nargs="+", metavar="KEY", help="keys of samples")
+    meaning = "class probabilities of a tile, of signals or of a recording by a trained model"
+    predict = add_command(commands, "predict", predicted, meaning, "lowalt predict default-seen sample.npy")
     predict.add_argument("model", help="model.pt of a training, a .safetensors file, or the name of one in results/zoo")
-    predict.add_argument(
-        "input",
-        type=Path,
-        help="tile (.png), signals (stations, symbols) complex (.npy), or a recording's record (.yaml)",
-    )
+    predict.add_argument("input", type=Path, help="tile (.png), signals (stations, symbols) complex (.npy), or a "
+                         "recording's record (.yaml)")  # fmt: skip
     name_backbone(predict)
     predict.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays of the run that trained it")
-    acts(predict, predicted)
 
 
 def _checked(lines: list[str], good: str) -> Answer:

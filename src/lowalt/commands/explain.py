@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import merge, overlaid
 from lowalt.config.plan import Plan
 from lowalt.files.atomic import replacing
@@ -33,10 +33,9 @@ def _sample(text: str) -> tuple[str, int]:
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `explain` to a parser's commands."""
-    line = commands.add_parser(
-        "explain", help="say whether a scene's receiver finds its targets, and what each effect changes",
-        epilog="example: lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml",
-    )  # fmt: skip
+    meaning = "say whether a scene's receiver finds its targets, and what each effect changes"
+    example = "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"
+    line = add_command(commands, "explain", run, meaning, example)
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     line.add_argument("--station", help="the station of the table of effects (default: the first)")
@@ -46,7 +45,6 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("--sources", action="store_true", help="list where the model of each effect comes from")
     line.add_argument("--suggest", type=float, metavar="LEAST", help="write the effects that change a signal by more")
     line.add_argument("--out", type=Path, help="the scene to write with --suggest (.yaml)")
-    acts(line, run)
 
 
 def run(options: argparse.Namespace) -> Answer:

@@ -7,8 +7,8 @@ from pathlib import Path
 import yaml
 
 from lowalt.commands import workflow
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.commands.compare import facts
-from lowalt.commands.for_programs import Answer, acts
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import as_named, shipped
@@ -19,16 +19,13 @@ BASE = "config/default.yaml"
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `report` to a parser's commands."""
-    line = commands.add_parser(
-        "report", help="make the page of one run again, or a page that links all runs and compares any two",
-        epilog="example: lowalt report results/default, or lowalt report --gallery",
-    )  # fmt: skip
+    meaning = "make the page of one run again, or a page that links all runs and compares any two"
+    line = add_command(commands, "report", run, meaning, "lowalt report results/default, or lowalt report --gallery")
     line.add_argument("run", type=Path, nargs="?", help="folder of a run that was started here")
     line.add_argument("--cores", default="all", help="cores to use (default: all)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only name the files that would be made, and why")
     line.add_argument("--gallery", action="store_true", help="write RESULTS/index.html")
     line.add_argument("--results", type=Path, default=Path("results"), help="folder of runs (default: results)")
-    acts(line, run)
 
 
 def run(options: argparse.Namespace) -> Answer:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -18,15 +18,12 @@ from lowalt.tiles.png import encode
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `sample` to a parser's commands."""
-    line = commands.add_parser(
-        "sample", help="one sample: tile, signals, record, and a picture with axes",
-        epilog="example: lowalt sample Crow 3 --snr 13 --out samples",
-    )  # fmt: skip
+    meaning = "one sample: tile, signals, record, and a picture with axes"
+    line = add_command(commands, "sample", run, meaning, "lowalt sample Crow 3 --snr 13 --out samples")
     line.add_argument("subtype", help="name of the subtype, as in the table of targets")
     line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
     line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the default")
-    acts(line, run)
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import overlaid
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import median_s
@@ -21,12 +21,9 @@ REPEATS = 5
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `spectra` to a parser's commands."""
-    line = commands.add_parser(
-        "spectra", help="the spectra of a configuration, and the time an image of each takes",
-        epilog="example: lowalt spectra config/tiny.yaml",
-    )  # fmt: skip
+    meaning = "the spectra of a configuration, and the time an image of each takes"
+    line = add_command(commands, "spectra", run, meaning, "lowalt spectra config/tiny.yaml")
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default")
-    acts(line, run)
 
 
 def facts(config: dict) -> list[dict]:

@@ -10,7 +10,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import yaml
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.files.atomic import existing, replacing, slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED
@@ -26,6 +26,7 @@ from lowalt.targets.robot_files import is_description, read_robot
 from lowalt.targets.robots import category_of, drafted_robot, parts_of, write_parts
 
 AXES = ("x", "-x", "y", "-y", "z", "-z")
+KINDS = ("UAV", "Bird", "Vehicle")
 TABLE = SHIPPED / "config/targets.csv"
 INNER = ("points", "owner", "groups", "sides_seen")
 """Parts of an inspection that a program is not told."""
@@ -51,27 +52,20 @@ def add_to(commands: argparse._SubParsersAction) -> None:
         epilog="example: lowalt target inspect inputs/mydrone.stl",
     )  # fmt: skip
     actions = target.add_subparsers(dest="action", required=True)
-    inspect = actions.add_parser(
-        "inspect", help="unit, sizes, pieces and possible moves of a mesh file, and a picture",
-        epilog="example: lowalt target inspect inputs/mydrone.stl",
-    )  # fmt: skip
-    inspect.add_argument("file", type=Path)
-    inspect.add_argument("--category", default="UAV", choices=("UAV", "Bird", "Vehicle"))
-    inspect.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
-    inspect.add_argument(
-        "--size", type=float, dest="size_m", help="largest extent of the target (m), instead of --unit"
-    )
+    meaning = "unit, sizes, pieces and possible moves of a mesh file, and a picture"
+    inspect = add_command(actions, "inspect", _inspect, meaning, "lowalt target inspect inputs/mydrone.stl")
+    inspect.add_argument("--category", default="UAV", choices=KINDS)
     inspect.add_argument("--out", type=Path, help="picture to write (default: the file's name and -inspect.png, here)")
-    new = actions.add_parser(
-        "new", help="draft a record of a mesh or a robot's description; figures to confirm are marked",
-        epilog='example: lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml',
-    )  # fmt: skip
-    new.add_argument("file", type=Path, help="mesh, or a robot's description: URDF, SDF or MJCF")
+    meaning = "draft a record of a mesh or a robot's description; figures to confirm are marked"
+    example = 'lowalt target new inputs/mydrone.stl --subtype "DJI Mini 2" --inputs inputs --out mine.yaml'
+    new = add_command(actions, "new", _new, meaning, example)
     new.add_argument("--subtype", help="the published target whose place it takes; another name (default: the file's) "
                      "makes a row of its own")  # fmt: skip
-    new.add_argument("--category", choices=("UAV", "Bird", "Vehicle"), help="of a target with a row of its own")
-    new.add_argument("--unit", type=_unit)
-    new.add_argument("--size", type=float, dest="size_m", help="largest extent of the target (m), instead of --unit")
+    new.add_argument("--category", choices=KINDS, help="of a target with a row of its own")
+    for line in (inspect, new):
+        line.add_argument("file", type=Path, help="mesh, or for `new` a robot's description: URDF, SDF or MJCF")
+        line.add_argument("--unit", type=_unit, help="unit of the file's numbers: m, cm, mm, in, ft or metres")
+        line.add_argument("--size", type=float, dest="size_m", help="largest extent of the target (m), not --unit")
     for axis in ("up", "front"):
         new.add_argument(
             f"--{axis}", choices=AXES, help=f"axis of the file that points {axis}; --{axis}=-y for a minus"
@@ -81,26 +75,21 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     new.add_argument("--moving", nargs="+", metavar="NUMBER", help="pieces that turn, numbered as in the picture; 5+6 "
                      "for two that are one rotor or wheel")  # fmt: skip
     new.add_argument("--out", type=Path, help="record file to write (default: print it)")
-    make = actions.add_parser(
-        "make", help="one record to one cloud and a picture",
-        epilog="example: lowalt target make mydrone.yaml --inputs inputs",
-    )  # fmt: skip
+    example = "lowalt target make mydrone.yaml --inputs inputs"
+    make = add_command(actions, "make", _make, "one record to one cloud and a picture", example)
     make.add_argument("record", type=Path, help="YAML file of records")
     make.add_argument("--subtype", help="which record of the file (default: its only one)")
     make.add_argument("--seed", type=int, default=20260701)
     make.add_argument("--out", type=Path, help="cloud file to write (default: SUBTYPE.npz)")
-    show = actions.add_parser(
-        "show", help="picture of a cloud with axes, hinges, normals, its motion and its spectra",
-        epilog="example: lowalt target show results/default/clouds/crow.npz --out crow.png",
-    )  # fmt: skip
+    for line in (new, make):
+        line.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
+        line.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
+                          help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
+    meaning = "picture of a cloud with axes, hinges, normals, its motion and its spectra"
+    example = "lowalt target show results/default/clouds/crow.npz --out crow.png"
+    show = add_command(actions, "show", _show, meaning, example)
     show.add_argument("cloud", type=Path)
     show.add_argument("--out", type=Path, help="picture to write (default: the cloud's name, .png); .gif: its motion")
-    for parser, act in ((inspect, _inspect), (new, _new), (make, _make), (show, _show)):
-        acts(parser, act)
-    for parser in (new, make):
-        parser.add_argument("--table", type=Path, default=TABLE, help="table of targets (default: the package's)")
-        parser.add_argument("--inputs", type=Path, default=Path(os.environ.get("LOWALT_INPUTS", ".")),
-                            help="folder that a record's files are in (default: $LOWALT_INPUTS or .)")  # fmt: skip
 
 
 def _write(path: Path, data: bytes) -> Path:

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lowalt.commands.for_programs import Answer, acts
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import exit_status
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
@@ -22,23 +22,15 @@ SNAKEFILE = SHIPPED / "Snakefile"
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `run` and `status` to a parser's commands."""
-    line = commands.add_parser(
-        "run", help="run the workflow: the default, or with overlays",
-        epilog="example: lowalt run config/tiny.yaml --target data --cores 2",
-    )  # fmt: skip
+    meaning = "run the workflow: the default, or with overlays"
+    line = add_command(commands, "run", run, meaning, "lowalt run config/tiny.yaml --target data --cores 2")
     line.add_argument("overlay", type=shipped, nargs="*", help="overlays on the default configuration")
-    line.add_argument(
-        "--configfile", type=shipped, nargs="+", default=[], help="more overlays, as snakemake names them"
-    )
+    line.add_argument("--configfile", type=shipped, nargs="+", default=[], help="more overlays, as in snakemake")
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
-    acts(line, run)
-    state = commands.add_parser(
-        "status", help="the state of a run in another terminal", epilog="example: lowalt status"
-    )
-    acts(state, states)
+    add_command(commands, "status", states, "the state of a run in another terminal", "lowalt status")
 
 
 def command(options: argparse.Namespace) -> list[str]:

@@ -1,4 +1,4 @@
-"""What commands answer: a text for a person, and with the option `--json` the same facts as one JSON text."""
+"""What all commands share: their place on the command line, and their answer as text or as JSON."""
 
 import argparse
 import dataclasses
@@ -19,10 +19,18 @@ class Answer(NamedTuple):
     status: int = 0
 
 
-def acts(line: argparse.ArgumentParser, act: Callable[[argparse.Namespace], Answer]) -> None:
-    """Add `--json` to a command's line, and what the command does with its options."""
+def add_command(
+    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str,
+    example: str,
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Add a command to a parser's and return its line, which has the option `--json` already.
+
+    act: what it does with its options; meaning: its help; example: a command line.
+    """
+    line = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     line.add_argument("--json", action="store_true", help="print JSON for a program")
     line.set_defaults(act=act)
+    return line
 
 
 def _plain(value: object) -> object:
