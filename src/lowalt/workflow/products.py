@@ -53,13 +53,9 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and the user's file that a backbone is made in."""
-        return {**self.samples(wildcards), **self._own_backbone(wildcards)}
-
-    def _own_backbone(self, wildcards: Any) -> dict[str, str]:
-        """The user's file that a scheme's backbone is made in, none for a library's backbone."""
+        """Files that one training reads: `samples`, and the user's file where a scheme's backbone is made in one."""
         name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
-        return {"backbone": name.rpartition(":")[0]} if name else {}
+        return self.samples(wildcards) | ({"backbone": name.rpartition(":")[0]} if name else {})
 
     def data(self, wildcards: Any) -> list[str]:
         """Files of the run's data set: shards, their tables, index and data card."""
@@ -70,10 +66,6 @@ class Products(DataProducts):
         """Images of this run's own samples, shrunk to the sizes of the schemes that are trained."""
         sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
-
-    def presets(self, wildcards: Any) -> str:
-        """The table of presets."""
-        return str(shipped(PRESETS))
 
     def studied(self, wildcards: Any) -> list[str]:
         """Predictions of the presets that a study trains on this run's data, one a training seed.
@@ -126,13 +118,8 @@ class Products(DataProducts):
         }
         if self._run.trainings:
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
-        if block["accuracy"]:
-            files["accuracy_cost"] = block["accuracy"]
-        if block["measured"]:
-            files["measured"] = block["measured"]
-        if block["cost"]:
-            files["echo_cost"] = block["cost"]
-        return files
+        asked = {"accuracy_cost": block["accuracy"], "measured": block["measured"], "echo_cost": block["cost"]}
+        return files | {name: path for name, path in asked.items() if path}
 
     def manifest(self, wildcards: Any) -> str:
         """The files of the report as the JSON text of its manifest."""
