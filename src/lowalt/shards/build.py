@@ -4,17 +4,15 @@
 """
 
 import argparse
-import functools
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.config.command import run
-from lowalt.config.layers import merge
+from lowalt.config.layers import SCHEMA, load
 from lowalt.config.plan import cube_number
 from lowalt.files.atomic import slug
-from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
@@ -97,8 +95,7 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
     line.add_argument("--out", required=True, help="folder to write into")
     options = line.parse_args(arguments)
-    config = functools.reduce(merge, map(load_yaml, options.config))
-    dataset = Dataset(config, options.clouds, inputs=options.inputs)
+    dataset = Dataset(load(options.config, SCHEMA), options.clouds, inputs=options.inputs)
     write_run(dataset, options.out, dataset.config["shards"]["kind"])
 
 
