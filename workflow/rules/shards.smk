@@ -49,6 +49,7 @@ rule index:
 rule card:
     input:
         code=code("lowalt.shards.card"),
+        template=products.card_template,
         index="results/{run}/shards/index.json",
         configuration="results/{run}/config.yaml",
     output:

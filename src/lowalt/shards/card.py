@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import jinja2
 import yaml
 
 from lowalt import __version__
@@ -20,7 +21,6 @@ from lowalt.files.atomic import replacing, sha256, text_of
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
 from lowalt.shards import checksums
-from lowalt.shards.card_kinds import READING, WHAT
 from lowalt.shards.croissant import FIELDS, metadata
 from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
@@ -30,23 +30,14 @@ SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
 
-ODDITIES = """\
-- Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
-- At every range-cell crossing the signal jumps in phase by nearly pi: the stripes of fast cars are real.
-- Published wheel diameters are rim sizes, so wheels turn faster than real ones; runners move at walking speed; bird
-  sizes are small. They are followed as published.
-- Six SNRs of one motion model are nearly the same picture: split by motion model, as the folds here do, unless
-  `split.by` is `sample` (the published way, which leaks motions from training into test).
-- Each image is scaled by its own largest value: absolute echo strength, and with it range, is not in the images. It is
-  in the signals.
-"""
-
-LIMITS = """\
-- Simulated: scattering points in free space with equal or modelled cross sections; no clutter, no multipath, no
-  occlusion, no receiver impairments unless the configuration below names them as effects.
-- Built-in targets are parametric models with published sizes and rates, not measured craft, animals or people.
-- One target a sample, tracked perfectly: the strongest range cell of every symbol is the target's.
-"""
+TEMPLATE = Path(__file__).with_name("card.md.jinja")
+WHAT = {
+    "image": "{stations} x {columns} tiles of time-frequency images",
+    "signal": "complex symbol-domain signals",
+    "cube": "all range cells of every symbol, complex, with noise",
+    "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
+}
+"""Name of the data in the description, by kind of shards."""
 
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
@@ -131,63 +122,17 @@ def description(shards: ShardSet) -> str:
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
-    images = len(shards.columns())
-    example = shards.shards[0]["path"] if shards.shards else "SHARD.tar"
-    first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
-    return f"""---
-{yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip()}
----
-# {name}
-
-{description(shards)}
-
-## What is in it
-
-{_counts(shards)}
-## How to read it
-
-{READING[shards.kind].format(spectra=", ".join(name.upper() for name in shards.spectra))}
-`samples.csv` lists all samples, `index.json` the shards with their SHA-256, and the `.npz` beside a shard the offset,
-size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
-
-```python
-import datasets
-samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
-
-import webdataset
-for sample in webdataset.WebDataset("{example}", shardshuffle=False).decode("pil"):
-    print(sample["__key__"], sample["json"]["category"], sample["{EXTENSIONS[shards.kind]}"])
-
-from lowalt.shards import ShardSet
-shards = ShardSet("index.json", groups=["seen"], folds=["train"])
-images, label = shards.images(0, size=224), shards.labels[0]  # ({images}, 224, 224) uint8
-```
-
-`lowalt verify index.json` checks every byte of every file and names what is damaged;
-`sha256sum --check SHA256SUMS` does the same without this package, file by file.
-
-**Protocols.** *seen*: train, val and test folds of both groups. *unseen*: folds of the `seen` group, and all folds
-of the `unseen` group as the test on subtypes that training has not met.
-
-## Known limits
-
-{LIMITS}
-## Oddities to know
-
-{ODDITIES}
-## Licence
-
-{license_name} ({LICENSES[license_name]}). Inputs that a user adds (meshes, recordings) keep their own licences.
-
-## What made it
-
-{_table(("package", "version"), sorted(first["versions"].items()))}
-The exact configuration, which makes the same bytes again with these versions:
-
-```yaml
-{config.strip()}
-```
-"""
+    versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
+    # Blocks of the template leave no lines of their own.
+    blocks = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
+    template = jinja2.Template(TEMPLATE.read_text(), undefined=jinja2.StrictUndefined, **blocks)
+    return template.render(
+        front=yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip(), name=name, kind=shards.kind,
+        description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
+        spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
+        example=shards.shards[0]["path"] if shards.shards else "SHARD.tar", license=license_name,
+        license_address=LICENSES[license_name], versions=_table(("package", "version"), sorted(versions.items())),
+    )  # fmt: skip
 
 
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:

@@ -134,6 +134,10 @@ class Products(DataProducts):
         views = self.own_views(wildcards) if self._config["recognition"]["cache"] else []
         return [*(f"{base}/{name}" for name in names), *views]
 
+    def card_template(self, wildcards: Any) -> str:
+        """The text of the data card."""
+        return near(PACKAGE / "shards/card.md.jinja")
+
     def page_templates(self, wildcards: Any) -> list[str]:
         """The templates of the page and of its sections, its style and its scripts."""
         return [near(path) for path in sorted((PACKAGE / "report").rglob("*")) if path.suffix in PAGE]
