@@ -129,13 +129,13 @@ class _DigestCache(FunctionCache):
 
     @functools.cached_property
     def turn(self):
-        """The lock under which one process at a time compiles this function; any user may open its file."""
+        """The lock under which one process at a time compiles this function."""
         # Only who compiles needs the module, whose import takes a twentieth of a job's start.
         from filelock import FileLock
 
         # In a folder of its own: tools that list kept machine code see no other file.
         path = Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock"
-        return FileLock(path, timeout=PATIENCE_S, mode=0o666)
+        return FileLock(path, timeout=PATIENCE_S)
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""

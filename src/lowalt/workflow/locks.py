@@ -26,8 +26,6 @@ TOKEN = "LOWALT_RUN"
 """Environment variable that every job of a run inherits: the token of the run."""
 GRACE_S = 10.0
 """Time that jobs of a dead run have to end after SIGTERM before they are killed."""
-EVERYONE = 0o666
-"""Mode of lock files: any user may open them."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +63,7 @@ class Owner:
 
 def guarded(folder: Path) -> FileLock:
     """Return the lock under which one process at a time looks at the locks of a folder and changes them."""
-    return FileLock(folder / "lowalt.guard", mode=EVERYONE)
+    return FileLock(folder / "lowalt.guard")
 
 
 def record(locks: Path, number: int) -> Path:
@@ -153,7 +151,7 @@ def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, Fi
     record until it is released. Raises: OSError where a file cannot be written or the file system locks none.
     """
     number = next(number for number in count() if number not in numbers(locks))
-    holding = FileLock(record(locks, number), mode=EVERYONE, timeout=0)
+    holding = FileLock(record(locks, number), timeout=0)
     try:
         holding.acquire()
         record(locks, number).write_text(json.dumps(asdict(owner)))
