@@ -27,8 +27,12 @@ PIXEL_BYTES = 0.5
 """Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
 CELL_BYTES = {"complex64": 8, "int16": 4}
 """Bytes of a range cell of a cube, by the number that it is stored as."""
-TRUTH_BYTES = 52
+TRUTH_BYTES = 47
 """Bytes of the record for what is true of a cube at one symbol: the chosen cell and five numbers of six decimals."""
+
+
+EVERY = 2**53
+"""Samples of a shard where none is too many."""
 
 
 def snrs_of(config: dict) -> tuple[float, ...]:
@@ -108,7 +112,7 @@ class Plan:
     split: dict
     seed: int
     steps: tuple[tuple[tuple[str, ...], tuple[float, ...]], ...]
-    largest: float = float("inf")
+    largest: float = EVERY
     looks: int = 1
 
     @classmethod
@@ -143,7 +147,7 @@ class Plan:
         levels = [tuple(map(float, step.get("snr_db", []))) for step in (config["noise"], *config.get("added", []))]
         subtypes = [tuple(name for name in names if name not in more), *later]
         steps = tuple(zip(subtypes, levels, strict=True))
-        largest = float("inf")
+        largest: float = EVERY
         if config.get("shards", {}).get("largest_mb"):
             largest = max(1, 1e6 * config["shards"]["largest_mb"] // sample_bytes(config))
         looks = motion.get("looks", 1)
