@@ -124,9 +124,10 @@ def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
     versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
     # Blocks of the template leave no lines of their own.
-    blocks = {"trim_blocks": True, "lstrip_blocks": True, "keep_trailing_newline": True}
-    template = jinja2.Template(TEMPLATE.read_text(), undefined=jinja2.StrictUndefined, **blocks)
-    return template.render(
+    templates = jinja2.Environment(
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
+    )
+    return templates.from_string(TEMPLATE.read_text()).render(
         front=yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip(), name=name, kind=shards.kind,
         description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
         spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
