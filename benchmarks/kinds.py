@@ -33,7 +33,7 @@ from lowalt.recognition.schemes import Scheme
 from lowalt.shards import ShardSet
 from lowalt.shards.build import write_run
 from lowalt.shards.dataset import Dataset
-from lowalt.shards.table import KINDS, table_path
+from lowalt.shards.sample_table import KINDS, table_path
 
 COLUMNS = ("what", "bytes_a_sample", "image_ms", "signal_ms", "needs_lowalt", "hardware")
 WAITS = ("network", "pixels", "steps", "batch", "workers", "step_ms", "waiting_percent", "hardware")

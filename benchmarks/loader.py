@@ -33,7 +33,7 @@ from lowalt.recognition.views import facts_of
 from lowalt.shards import ShardSet
 from lowalt.shards.index import build
 from lowalt.shards.record import npy
-from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.sample_table import map_samples, table_path
 from lowalt.shards.verify import shard_faults
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import Spectra

@@ -18,14 +18,14 @@ from lowalt.recognition import checkpoint, freeze, schemes
 from lowalt.recognition.one_sample import images_of
 from lowalt.recordings.files import read
 from lowalt.recordings.record import Record
-from lowalt.shards.table import SAMPLE, map_samples
-from lowalt.shards.table import write as write_table
+from lowalt.shards.sample_table import SAMPLE, map_samples
+from lowalt.shards.sample_table import write as write_table
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.targets.records import load_table
-from lowalt.tiles.files import Tiles
-from lowalt.tiles.files import write as write_tiles
 from lowalt.tiles.png import SIGNATURE, decode, encode
+from lowalt.tiles.tile_files import Tiles
+from lowalt.tiles.tile_files import write as write_tiles
 
 
 def encoded(height: int, width: int) -> bytes:

@@ -33,17 +33,11 @@ report.figures.cost_plots: plot, --table, --figure
 report.figures.house: --figure
 report.measured: --pairs, --tables, --page
 shards.__main__ index: --settings, --shards, --out
-shards.__main__ remake: --index, --sample
-shards.__main__ verify: --index
 shards.__main__ write: --settings, --motion, --fold, --out
 shards.build: --config, --out
 shards.card: --index, --config
 shards.manifest write: --run, --manifest
-shards.recipe pack: --run, --out
-shards.recipe unpack: recipe, --out
-shards.recipe: command
 shards.sigmf: --index, --out
-shards.upload: --index, --repository
 targets.__main__: --settings, --out
 targets.dimensions: --table, --records, --out
 targets.download: --out

@@ -11,7 +11,7 @@ import yaml
 
 from lowalt.__main__ import main
 from lowalt.commands import spectra, workflow
-from lowalt.commands.for_programs import as_json
+from lowalt.commands.command_line import as_json
 from lowalt.config.layers import load, plain
 from lowalt.files.atomic import replacing
 from lowalt.report.figures import inspection, target
@@ -38,10 +38,7 @@ def answer(capsys):
     """What a command line prints with --json, and its exit status; every key stands on the page of the reference."""
 
     def asked(*words):
-        try:
-            status = main([*map(str, words), "--json"])
-        except SystemExit as ended:
-            status = ended.code
+        status = main([*map(str, words), "--json"])
         found = json.loads(capsys.readouterr().out, parse_constant=refused)
         missing = {key for key in keys(found) if f"`{key}`" not in PAGE}
         assert not missing
@@ -104,10 +101,11 @@ def test_a_wrong_cell_changes_the_symbols_that_hold_another_cell(answer, tmp_pat
     assert 0.3 < right < 0.9 and found["changes"][0]["cells"] == pytest.approx(1 - right)
 
 
-def test_spectra_answers_with_the_size_of_each(answer):
+def test_spectra_answers_with_the_size_of_each(answer, capsys):
     found, status = answer("spectra")
-    text = spectra.described(found["spectra"], "here").splitlines()
-    assert len(text) == 2 * len(found["spectra"]) + 1 and text[-1] == "medians of 5; here"
+    assert main(["spectra"]) == 0
+    text = capsys.readouterr().out.splitlines()
+    assert len(text) == 2 * len(found["spectra"]) + 1 and text[-1] == f"medians of 5; {found['hardware']}"
     for one, first, second in zip(found["spectra"], text[::2], text[1::2], strict=False):
         said = f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, zero at index "
         assert first.startswith(f"{said}{one['zero_index']}, ") and second == f"  {one['source']}"

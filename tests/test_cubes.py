@@ -22,9 +22,9 @@ from lowalt.spectra.kinds import hrrp, range_doppler
 from lowalt.targets.cloud import write as write_cloud
 from lowalt.tiles.__main__ import main as tiles
 from lowalt.tiles.cubes import Cubes
-from lowalt.tiles.files import Tiles
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
+from lowalt.tiles.tile_files import Tiles
 from lowalt.workflow.refusals import refuse_cells
 from test_dataset import configuration
 

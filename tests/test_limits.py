@@ -17,10 +17,10 @@ from lowalt.shards import ShardSet, index
 from lowalt.shards import write as shard_module
 from lowalt.shards.dataset import Dataset
 from lowalt.shards.record import sample_key
-from lowalt.shards.table import SAMPLE, map_samples, table_path
+from lowalt.shards.sample_table import SAMPLE, map_samples, table_path
 from lowalt.shards.tar import Writer
 from lowalt.targets.records import records_of
-from lowalt.tiles.files import Tiles, map_array, npy_header
+from lowalt.tiles.tile_files import Tiles, map_array, npy_header
 
 HOLE = 5 * 2**30
 """Bytes of zeros in front of what a test reads: more than 32 bits count, and whole blocks of a tar."""

@@ -102,18 +102,6 @@ def test_checksums_of_the_description_are_right(published):
         assert node["contentSize"] == f"{len(data)} B"
 
 
-def test_mlcroissant_validates_and_loads(published, mlcroissant):
-    """The reference implementation finds no fault and reads every sample's row, and images from the shards."""
-    data = mlcroissant.Dataset(str(published / "croissant.json"))
-    assert not data.metadata.issues.errors and not data.metadata.issues.warnings
-    rows = list(data.records("samples"))
-    shards = ShardSet(published / "index.json")
-    assert [row["samples/key"] for row in rows] == shards.keys.tolist()
-    assert [row["samples/label"] for row in rows] == shards.labels.tolist()
-    if shards.kind == "image":
-        assert next(iter(data.records("labelled")))["labelled/content"].size == (768, 768)
-
-
 def test_a_card_names_the_spectra_and_sizes_that_its_tiles_have(tmp_path):
     """Two stations and one spectrum: tiles of one column and two rows."""
     stations = {name: RENDER["network"]["stations"][name] for name in "AB"}
@@ -140,7 +128,6 @@ def test_the_licence_asked_for_stands_in_every_file_and_another_is_refused(publi
     main(["--index", str(copy / "index.json"), "--config", str(copy / "config.yaml"), "--license", "CC-BY-4.0"])
     assert "CC-BY-4.0 (https://creativecommons.org/licenses/by/4.0/)" in (copy / "README.md").read_text()
     assert yaml.safe_load((copy / "README.md").read_text().split("---")[1])["license"] == "cc-by-4.0"
-    assert json.loads((copy / ".zenodo.json").read_text())["license"] == "cc-by-4.0"
     assert (
         json.loads((copy / "croissant.json").read_text())["license"] == "https://creativecommons.org/licenses/by/4.0/"
     )

@@ -17,8 +17,8 @@ from lowalt.shards import ShardSet, clean
 from lowalt.shards.__main__ import main
 from lowalt.shards.card import main as card
 from lowalt.shards.record import npy
+from lowalt.shards.sample_table import map_samples
 from lowalt.shards.sigmf import main as sigmf
-from lowalt.shards.table import map_samples
 from lowalt.shards.verify import faults
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.spectra import NAMES

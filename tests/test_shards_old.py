@@ -16,9 +16,9 @@ import pytest
 from lowalt.files.errors import InputError
 from lowalt.recognition.views import cache_shard, facts_of
 from lowalt.shards import ShardSet, card
-from lowalt.shards.__main__ import main
 from lowalt.shards.record import row_of
-from lowalt.shards.verify import shard_faults
+from lowalt.shards.remake import opened
+from lowalt.shards.verify import faults, shard_faults
 
 OLD = Path(__file__).parent / "data" / "format_1"
 
@@ -48,9 +48,8 @@ def test_old_signals_are_complex_and_make_the_old_pixels():
 
 
 def test_what_an_old_data_set_lacks_is_said_with_the_version_that_made_it(tmp_path):
-    key = "crow-000000-snr003"
     with pytest.raises(InputError, match=r"lowalt 0\.2 or later wrote, found format lowalt-shards-1"):
-        main(["remake", "--index", str(OLD / "signal" / "index.json"), "--sample", key, "--clouds", str(tmp_path)])
+        opened(OLD / "signal" / "index.json", tmp_path)
     with pytest.raises(InputError, match=r"record of lowalt 0\.1\.0, expected of 0\.2 or later"):
         row_of(ShardSet(OLD / "image" / "index.json").record(0))
 
@@ -60,4 +59,4 @@ def test_an_old_data_set_gets_a_card_of_its_own_version(tmp_path):
     (tmp_path / "config.yaml").write_text(json.dumps({"run": "old"}))
     card.write(folder / "index.json", tmp_path / "config.yaml")
     assert "| lowalt | 0.1.0 |" in (folder / "README.md").read_text()
-    main(["verify", "--index", str(folder / "index.json")])
+    assert list(faults(folder / "index.json")) == []

@@ -1,4 +1,4 @@
-"""Other people's tools read the shards: the hub's library, Croissant's, SigMF's, and an uploader without internet."""
+"""Other people's tools read the shards: the hub's library, Croissant's and SigMF's."""
 
 import json
 
@@ -8,9 +8,8 @@ import yaml
 
 from dataset import build
 from lowalt.files.errors import InputError
-from lowalt.shards import ShardSet, upload
+from lowalt.shards import ShardSet
 from lowalt.shards.card import main as card
-from lowalt.shards.hub import size_category
 from lowalt.shards.sigmf import main as sigmf
 from test_shards_card import CONFIG
 
@@ -53,11 +52,9 @@ def test_the_hubs_library_reads_every_protocol_by_the_card(published, tmp_path, 
 
 def test_the_cards_front_matter_is_what_the_hub_wants(published):
     front = yaml.safe_load((published / "README.md").read_text().split("---")[1])
-    assert front["language"] == ["en"] and front["size_categories"] == ["n<1K"]
+    assert front["language"] == ["en"]
     assert [config["config_name"] for config in front["configs"]] == ["seen", "unseen"]
     assert front["configs"][0]["default"] is True
-    words = [size_category(count) for count in (0, 999, 1000, 24_000, 1_440_000, 10**9)]
-    assert words == ["n<1K", "n<1K", "1K<n<10K", "10K<n<100K", "1M<n<10M", "n>1B"]
 
 
 def test_croissant_is_of_version_1_1_and_has_no_fault(published, mlcroissant):
@@ -65,22 +62,14 @@ def test_croissant_is_of_version_1_1_and_has_no_fault(published, mlcroissant):
     assert text["conformsTo"].endswith("/1.1")
     data = mlcroissant.Dataset(str(published / "croissant.json"))
     assert not data.metadata.issues.errors and not data.metadata.issues.warnings
-    assert len(list(data.records("samples"))) == 24
     shards = ShardSet(published / "index.json")
+    assert [row["samples/key"] for row in data.records("samples")] == shards.keys.tolist()
     labels = dict(zip((key.decode() for key in shards.keys.tolist()), shards.labels.tolist(), strict=True))
     rows = list(data.records("labelled"))
     assert {row["labelled/key"].decode(): row["labelled/label"] for row in rows} == labels
     for row in rows if shards.kind == "image" else []:
         number = shards.keys.tolist().index(row["labelled/key"])
         assert (np.asarray(row["labelled/content"]) == shards.tile(number)).all()
-
-
-def test_zenodo_takes_the_metadata(published):
-    text = (published / ".zenodo.json").read_text()
-    found = json.loads(text)
-    assert text == json.dumps(found, indent=1) + "\n"
-    assert found["upload_type"] == "dataset" and found["license"] == "mit" and found["creators"][0]["name"]
-    assert set(found) >= {"title", "description", "access_right", "keywords"}
 
 
 def test_sigmf_recordings_hold_every_signal_with_its_annotation(published, tmp_path):
@@ -106,46 +95,3 @@ def test_sigmf_recordings_hold_every_signal_with_its_annotation(published, tmp_p
             signal = recording.read_samples(note["core:sample_start"], note["core:sample_count"])
             assert (signal == shards.signal(number)[place]).all()
             assert note["lowalt:key"] == shards.keys[number].decode()
-
-
-class Client:
-    """Stands in for the hub and notes what is asked of it."""
-
-    def __init__(self):
-        self.calls = []
-
-    def create_repo(self, *names, **options):
-        self.calls.append(("create", names, options))
-
-    def upload_folder(self, **options):
-        self.calls.append(("upload", options))
-
-
-def test_an_upload_sends_all_files_of_a_whole_data_set(published, monkeypatch):
-    client = Client()
-    count = upload.upload(published / "index.json", "somebody/echoes", client)
-    (_, names, options), (_, sent) = client.calls
-    assert names == ("somebody/echoes",) and options["repo_type"] == "dataset" and options["private"]
-    assert len(sent["allow_patterns"]) == count == 6 * 2 + 6
-    assert {"README.md", "SHA256SUMS", "index.json", ".zenodo.json"} <= set(sent["allow_patterns"])
-    with pytest.raises(InputError, match="USER/NAME"):
-        upload.upload(published / "index.json", "echoes", client)
-    monkeypatch.delenv("HF_TOKEN", raising=False)
-    with pytest.raises(InputError, match="HF_TOKEN"):
-        upload.main(["--index", str(published / "index.json"), "--repository", "somebody/echoes"])
-    stray = published / "notes.txt"
-    stray.write_text("no part of it")
-    with pytest.raises(InputError, match="no part of the data set"):
-        upload.upload(published / "index.json", "somebody/echoes", client)
-    stray.unlink()
-    assert len(client.calls) == 2
-
-
-def test_the_real_client_is_asked_with_the_token_and_nothing_is_sent(published, monkeypatch):
-    hub = pytest.importorskip("huggingface_hub")
-    seen = []
-    monkeypatch.setenv("HF_TOKEN", "hf_token_of_nobody")
-    monkeypatch.setattr(hub.HfApi, "create_repo", lambda self, *names, **options: seen.append((self.token, names)))
-    monkeypatch.setattr(hub.HfApi, "upload_folder", lambda self, **options: seen.append(options["repo_id"]))
-    upload.main(["--index", str(published / "index.json"), "--repository", "somebody/echoes"])
-    assert seen == [("hf_token_of_nobody", ("somebody/echoes",)), "somebody/echoes"]

@@ -11,8 +11,8 @@ from lowalt.files.errors import InputError
 from lowalt.shards import ShardSet
 from lowalt.shards.hub import configs, patterns
 from lowalt.shards.index import build
-from lowalt.shards.table import map_samples, read_header
-from lowalt.shards.table import write as write_table
+from lowalt.shards.sample_table import map_samples, read_header
+from lowalt.shards.sample_table import write as write_table
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from lowalt.shards import ShardSet
 from lowalt.shards.build import rows_of, write_run
 from lowalt.shards.dataset import Dataset
 from lowalt.tiles.__main__ import main as tiles
-from lowalt.tiles.files import Tiles
+from lowalt.tiles.tile_files import Tiles
 from test_dataset import configuration
 
 FRAMES = {"slow_time": {"downlink": 0.75, "missing": 0.2, "jitter_s": 1e-3, "regrid": "zero"}}

@@ -20,10 +20,10 @@ from lowalt.tiles import (
     Renderer,
     Scale,
     decode,
-    files,
     join,
     resize,
     split,
+    tile_files,
     triangle,
 )
 from lowalt.tiles.__main__ import main
@@ -214,8 +214,8 @@ def test_resize_is_pillows_on_index_values(size, seed):
 
 def test_tiles_file_keeps_every_image(tmp_path):
     images = [bytes([number]) * (number * 7) for number in range(5)]
-    assert files.write(tmp_path / "tiles.npz", iter(images)) == (5, 70)
-    found = files.Tiles(tmp_path / "tiles.npz")
+    assert tile_files.write(tmp_path / "tiles.npz", iter(images)) == (5, 70)
+    found = tile_files.Tiles(tmp_path / "tiles.npz")
     assert [found[number] for number in range(len(found))] == images
     with np.load(tmp_path / "tiles.npz") as plain:
         assert plain["data"].tobytes() == b"".join(images)
@@ -225,7 +225,7 @@ def test_tiles_file_keeps_every_image(tmp_path):
         found[5]
     (tmp_path / "bad.npz").write_bytes((tmp_path / "tiles.npz").read_bytes()[:-20])
     with pytest.raises(InputError, match=r"bad\.npz"):
-        files.Tiles(tmp_path / "bad.npz")
+        tile_files.Tiles(tmp_path / "bad.npz")
 
 
 def test_command_line_renders_a_chunk(tmp_path):
@@ -239,7 +239,7 @@ def test_command_line_renders_a_chunk(tmp_path):
         outputs.append(out)
     assert outputs[0].read_bytes() == outputs[1].read_bytes()
     assert sorted(path.name for path in outputs[0].parent.iterdir()) == ["chunk.npz"]
-    tiles = files.Tiles(outputs[0])
+    tiles = tile_files.Tiles(outputs[0])
     assert len(tiles) == 4
     np.testing.assert_array_equal(decode(tiles[2])[0], renderer().tile(signals[1, 0]))
     np.save(tmp_path / "noisy.npy", signals[..., :300])

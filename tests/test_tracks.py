@@ -24,7 +24,7 @@ from lowalt.shards.dataset import Dataset, Place
 from lowalt.shards.record import record, row_of
 from lowalt.shards.write import select
 from lowalt.targets.cloud import write as write_cloud
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 
 SUBTYPES = ["DJI Mini 2", "Owl", "NIO ET5T 2023", "Walking Pedestrian 5"]
 LOOKS = 12

@@ -7,8 +7,8 @@ import pytest
 
 from lowalt.files.shipped import SHIPPED, as_named, located
 from lowalt.files.yaml_files import load_yaml
-from lowalt.workflow.settings import Settings
 from lowalt.workflow.sources import code, sources
+from lowalt.workflow.stage_settings import Settings
 
 ROOT = Path(__file__).parent.parent
 

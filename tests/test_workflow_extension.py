@@ -56,10 +56,7 @@ def samples(folder):
     return {shards.keys[n].decode(): (shards.record(n), shards.signal(n).tobytes()) for n in range(len(shards))}
 
 
-DESCRIBED = {
-    f"shards/{name}"
-    for name in ("index.json", "README.md", "samples.csv", "croissant.json", ".zenodo.json", "SHA256SUMS")
-}
+DESCRIBED = {f"shards/{name}" for name in ("index.json", "README.md", "samples.csv", "croissant.json", "SHA256SUMS")}
 """Files that list or describe all samples."""
 
 

@@ -20,15 +20,10 @@ def config(monkeypatch):
 
 
 def test_smallest_inputs_pass_the_commands_of_echo_and_tiles(config, tmp_path):
-    config["cost"]["tolerances"] = [1e-3, 1e-12]
     kernels.echo(config, tmp_path)
-    exact = np.load(tmp_path / "echo.npy")
-    kernels.tiles(config, tmp_path)
-    kernels.tolerances(config, tmp_path)
-    fast = np.load(tmp_path / "echo.npy")
-    assert exact.shape == fast.shape == (4, 400)
-    assert 0 < abs(fast - exact).max() < 1e-2 * abs(exact).max()
+    assert np.load(tmp_path / "echo.npy").shape == (4, 400)
     assert len(list(tmp_path.glob("?.npz"))) == 4
+    kernels.tiles(config, tmp_path)
     # Two samples of nine images.
     assert np.load(tmp_path / "24.npy").shape == (2, 9, 24, 24)
 
@@ -41,17 +36,15 @@ def test_a_stage_that_fails_is_no_success(config, monkeypatch):
         kernels.main([])
 
 
-def test_named_stages_are_compiled_here_and_all_of_them_in_two_processes(config, monkeypatch):
+def test_named_stages_are_compiled_here_and_all_of_them_in_a_process_each(config, monkeypatch):
     done, started = [], []
-    for name in ("tiles", "tolerances"):
-        monkeypatch.setattr(
-            kernels, name, lambda given, folder, name=name: done.append((name, given == config, folder.is_dir()))
+    for name in kernels.STAGES:
+        monkeypatch.setitem(
+            kernels.STAGES, name, lambda block, folder, name=name: done.append((name, block == config, folder.is_dir()))
         )
     ended = SimpleNamespace(wait=lambda: 0)
     monkeypatch.setattr(kernels.subprocess, "Popen", lambda command: started.append(command[1:]) or ended)
-    kernels.main(["tiles", "tolerances"])
-    assert done == [("tiles", True, True), ("tolerances", True, True)] and not started
+    kernels.main(["tiles"])
+    assert done == [("tiles", True, True)] and not started
     kernels.main([])
-    assert started == [["-m", "lowalt.workflow.kernels", *stages] for stages in (["echo"], ["tiles", "tolerances"])]
-    assert len(done) == 2
-    assert sorted(stage for stages in kernels.PROCESSES for stage in stages) == sorted(kernels.STAGES)
+    assert started == [["-m", "lowalt.workflow.kernels", stage] for stage in ("echo", "tiles")] and len(done) == 1

@@ -14,7 +14,6 @@ import pytest
 
 import snakemake_runs
 from lowalt.files.processes import started
-from lowalt.workflow import locks
 from lowalt.workflow.locks import TOKEN, Owner, guarded, holders, numbers, refusal, take, take_over
 
 ROOT = Path(__file__).parent.parent
@@ -40,7 +39,7 @@ def takers(locks):
 def leave(locks, owner=GONE):
     """Take a lock and end, as a killed run does: its record is no longer held."""
     number, holding = take(locks, owner, KEYS)
-    holding.close()
+    holding.release()
     return number
 
 
@@ -53,7 +52,7 @@ def test_a_damaged_record_has_no_owner(tmp_path):
         path.write_text(text)
         assert Owner.read(path) is None
     assert Owner.read(tmp_path / "none") is None
-    holding.close()
+    holding.release()
 
 
 def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
@@ -72,16 +71,16 @@ def test_a_dead_owner_s_lock_is_taken_over_and_all_others_stay(tmp_path):
     assert "host elsewhere, which cannot be seen from here" in text
     assert "7.output.lock: no record of its owner" in text and "--unlock" in text
     assert holders(tmp_path, living=True) == [f"process {os.getpid()} of {mine.host} is running; wait for it or end it"]
-    holding.close()
+    holding.release()
     take_over(tmp_path, said.append)
     assert numbers(tmp_path) == [2, 7]
 
 
 def test_a_lock_that_cannot_be_written_whole_leaves_nothing(tmp_path, monkeypatch):
-    def full(descriptor):
+    def full(path, text):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(locks.os, "fsync", full)
+    monkeypatch.setattr(Path, "write_text", full)
     with pytest.raises(OSError, match="No space left"):
         take(tmp_path, Owner(), KEYS)
     assert not list(tmp_path.iterdir())

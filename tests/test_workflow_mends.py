@@ -71,9 +71,10 @@ def test_the_mended_lock_has_an_owner_for_the_length_of_its_block(kept, monkeypa
         with FilePersistence.lock_warn_only(kept):
             assert f"process {os.getpid()}" in said[0]
     assert numbers(folder) == []
-    kept.path = kept.path / "none"
+    kept.path = kept.path / "file"
+    kept.path.touch()
     with pytest.raises(SystemExit, match=r"^2$"), FilePersistence.lock(kept):
-        pytest.fail("a lock in a folder that is not there")
+        pytest.fail("a lock in a file")
     assert "cannot write a lock" in capsys.readouterr().err
 
 

@@ -1,4 +1,4 @@
-"""Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `lowalt.workflow.settings`)."""
+"""Options of commands and settings of stages in scenes (`lowalt.workflow.options`, `stage_settings`)."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.workflow import options
 from lowalt.workflow.products import Products
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 
 CHUNK = SimpleNamespace(run="default", group="seen", part="00001", station="B", fold="train")
 
@@ -28,8 +28,7 @@ def checkout(monkeypatch):
 GIVEN = {
     "occluders": ({"occluders": ["a b", "c"]}, ["--occluders", "a b", "c"]),
     "powers": ({"powers": ["a", "b"]}, ["--powers", "a", "b"]),
-    "motion": ({"motion": "a"}, ["--motion", "a"]),
-    "clouds": ({"clouds": ["a"]}, ["--clouds", "a"]),
+    "scene": ({"motion": "a", "clouds": ["b"]}, ["--motion", "a", "--clouds", "b"]),
     "content": ({"signals": "a", "echoes": ["b", "c"]}, ["--signals", "a", "--echoes", "b", "c"]),
     "reduced_chunk": ({"reduced": "a", "motion": "b"}, ["--reduced", "a", "--motion", "b"]),
     "samples": ({"views": ["a", "b"]}, ["--views", "a", "b"]),
@@ -72,7 +71,7 @@ def scene(effects, **more):
 def test_settings_name_an_effect_for_the_stages_that_read_it_alone():
     _, plain = scene({})
     products, cancelled = scene({"canceller": {"kind": "mean"}})
-    assert "canceller" not in json.loads(plain.noise(CHUNK)) and products.tile_motion(CHUNK) == []
+    assert "canceller" not in json.loads(plain.noise(CHUNK)) and products.tile_content(CHUNK) == {}
     assert json.loads(cancelled.noise(CHUNK))["canceller"]["kind"] == "mean"
     assert "canceller" not in json.loads(cancelled.shard(CHUNK))
     for effect in ({"canceller": None}, {"companions": None}):
@@ -90,11 +89,11 @@ def test_settings_name_an_effect_for_the_stages_that_read_it_alone():
 def test_late_symbols_tell_the_tiles_their_draws_and_other_scenes_do_not():
     late = {"slow_time": {"jitter_s": 1e-4}}
     products, settings = scene(late, spectra={"times": "known"})
-    assert products.tile_motion(CHUNK) == ["results/default/motion/seen-00001.csv"]
+    assert products.tile_content(CHUNK) == {"motion": "results/default/motion/seen-00001.csv"}
     drawn = json.loads(settings.images(CHUNK))["drawn"]
     assert set(drawn) == {"seed", "effects"} and list(drawn["effects"]) == ["slow_time"]
     products, settings = scene(late)
-    assert products.tile_motion(CHUNK) == [] and "drawn" not in json.loads(settings.images(CHUNK))
+    assert products.tile_content(CHUNK) == {} and "drawn" not in json.loads(settings.images(CHUNK))
 
 
 def test_an_echo_in_a_scene_knows_set_snrs_where_all_cells_hold_noise():

@@ -80,7 +80,7 @@ def test_a_job_reads_the_files_of_its_own_chunk_in_the_order_of_the_stations():
     content = {"signals": f"{base}/noisy/seen-00001.npy", "tiles": f"{base}/tiles/seen-00001.npz"}
     assert products.shard_content(CHUNK) == content
     assert options.content(None, content) == ["--signals", content["signals"], "--tiles", content["tiles"]]
-    clouds = products.group_clouds(CHUNK)
+    clouds = products.chunk_clouds(CHUNK)
     assert len(clouds) == len(run.plan.groups["seen"]) and len(set(clouds)) == len(clouds)
     assert all(Path(path).stem in run.subtypes for path in clouds)
 
@@ -127,7 +127,7 @@ def test_signal_shards_need_no_tiles_and_only_hidden_points_need_surfaces():
     _, products, _ = parts({"shards": {"kind": "signal"}, "effects": {"occlusion": {}}, "echo": {"tolerance": 1e-3}})
     assert products.shard_content(CHUNK) == {"signals": "results/default/noisy/seen-00001.npy"}
     surfaces = products.chunk_occluders(CHUNK)
-    assert [path.replace("occluders", "clouds") for path in surfaces] == products.group_clouds(CHUNK)
+    assert [path.replace("occluders", "clouds") for path in surfaces] == products.chunk_clouds(CHUNK)
     assert [Path(path).name for path in products.chunk_powers(CHUNK)] == ["A.power.npy", "B.power.npy", "C.power.npy"]
     _, usual, _ = parts()
     assert usual.chunk_occluders(CHUNK) == usual.chunk_powers(CHUNK) == []

@@ -1,4 +1,4 @@
-"""Settings of stages (`lowalt.workflow.settings`), options of commands and the report's manifest, by configuration."""
+"""Settings of stages (`lowalt.workflow.stage_settings`), options of commands and the report's manifest."""
 
 import json
 import re
@@ -12,7 +12,7 @@ from lowalt.config.layers import plain
 from lowalt.files.yaml_files import load_yaml
 from lowalt.report.inputs import KEPT, OPTIONAL
 from lowalt.report.inputs import Inputs as ReportInputs
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 from snakemake_texts import body
 
 ROOT = Path(__file__).parent.parent

@@ -47,6 +47,7 @@ def test_the_shards_of_a_fold_share_its_bytes():
     assert len(pieces) > 4 and pieces == [f"p{number}" for number in range(len(pieces))]
     assert len(pieces) * space.written("shard", wildcards, plan, small) == pytest.approx(whole)
     assert whole / len(pieces) <= 20e6 < whole / (len(pieces) - 1)
+    assert Plan.of(CONFIG | {"shards": {"kind": "image"}}, PUBLISHED).pieces("seen-00001", "train") == [""]
 
 
 @pytest.mark.parametrize("there", [0, 1_000_000, 10**9])

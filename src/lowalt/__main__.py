@@ -8,6 +8,7 @@ import argparse
 import sys
 
 from lowalt.commands import compare, completion, data, explain, report, sample, spectra, target, workflow
+from lowalt.commands.command_line import Answer, as_json
 from lowalt.config.command import refusal
 from lowalt.files.errors import InputError
 
@@ -18,17 +19,19 @@ def main(arguments: list[str] | None = None) -> int:
         prog="lowalt", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     commands = line.add_subparsers(dest="command", required=True)
-    for part in (explain, workflow, sample, data, compare, report, target, spectra, completion):
+    for part in (explain, workflow, sample, data, compare, report, target, spectra):
         part.add_to(commands)
-    given = line.parse_args(arguments)
+    completion.add_to(commands, line)
+    options = line.parse_args(arguments)
     try:
-        text = completion.script(line) if given.command == "completion" else given.act(given)
+        answer: Answer = options.act(options)
     except (InputError, OSError) as error:
         print(f"error: {error if isinstance(error, InputError) else refusal(error)}", file=sys.stderr)
         return 2
+    text = as_json(answer.facts) if options.json else answer.text
     if text:
         print(text)
-    return 0
+    return answer.status
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ from lowalt.config.layers import merge
 from lowalt.files.yaml_files import load_yaml
 from lowalt.workflow.products import Products
 from lowalt.workflow.run import Run
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = ROOT / "workflow/schemas/config.schema.yaml"

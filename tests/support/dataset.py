@@ -13,7 +13,7 @@ from lowalt.shards import card
 from lowalt.shards.__main__ import main
 from lowalt.shards.record import npy
 from lowalt.shards.write import ChunkSamples, write_shard
-from lowalt.tiles import encode, files
+from lowalt.tiles import encode, tile_files
 from pictures import IMAGES, NETWORK, SPECTRA, echoes, renderer
 
 RENDER = {"network": NETWORK, "spectra": SPECTRA, "images": IMAGES}
@@ -69,7 +69,7 @@ def build(folder, kind, inputs=True):
         np.save(folder / f"{group}.npy", signals)
         tiles = renderer()
         pngs = [encode(tiles.tile(sample), tiles.images.palette) for model in signals for sample in model]
-        files.write(folder / f"{group}.tiles.npz", pngs)
+        tile_files.write(folder / f"{group}.tiles.npz", pngs)
         for name in ("train", "val", "test"):
             shards.append(str(folder / f"{group}-{name}-00000.tar"))
             given = ["--motion", f"{folder}/{group}.csv", *write_options(folder, group, kind)]

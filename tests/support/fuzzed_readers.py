@@ -11,9 +11,8 @@ import numpy as np
 import yaml
 from scipy.io import savemat, wavfile
 
-from chain import IMAGES, SPECTRA, WAVE
 from craft import craft, row
-from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG, RECIPE, tar
+from fuzzed_seals import ARCHIVE, INDEX, MATLAB, PNG
 from fuzzing import Reader
 from shown_meshes import dae, ply, prism, skinned
 
@@ -202,15 +201,15 @@ def _arrays() -> list[Reader]:
     from lowalt.files.yaml_files import load_yaml
     from lowalt.recognition import checkpoint, predictions, samples
     from lowalt.recognition.one_sample import images_of
-    from lowalt.shards import recipe, table
+    from lowalt.shards import sample_table
     from lowalt.shards.index import load as load_index
-    from lowalt.shards.table import map_samples, read_header
+    from lowalt.shards.sample_table import map_samples, read_header
     from lowalt.targets import occluders
     from lowalt.targets.cloud import read as read_cloud
     from lowalt.targets.cloud import write as write_cloud
-    from lowalt.tiles.files import Tiles
-    from lowalt.tiles.files import write as write_tiles
     from lowalt.tiles.png import decode, encode
+    from lowalt.tiles.tile_files import Tiles
+    from lowalt.tiles.tile_files import write as write_tiles
 
     image = np.add.outer(np.arange(24), np.arange(24)).astype(np.uint8)
     png = encode(image, np.stack([np.arange(256)] * 3, 1).astype(np.uint8))
@@ -225,8 +224,8 @@ def _arrays() -> list[Reader]:
         np.full(count, "seen"), np.full(count, "train"), np.arange(count) % 4, np.ones((count, 3)), np.ones((count, 3)),
     )  # fmt: skip
     cache = _bytes(lambda p: samples.write(p, np.zeros((count, 9, 16, 16), np.uint8), facts), "a.npz")
-    rows = np.zeros(count, table.SAMPLE)
-    header = _bytes(lambda p: table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
+    rows = np.zeros(count, sample_table.SAMPLE)
+    header = _bytes(lambda p: sample_table.write(p, {"name": "a", "samples": count}, rows), "a.npz")
     surfaces = _bytes(lambda p: occluders.write(p, dict.fromkeys(occluders.ARRAYS, np.zeros(3)), "a"), "a.npz")
     tiles = _bytes(lambda p: write_tiles(p, [png, png]), "a.npz")
     model = _bytes(lambda p: checkpoint.save(p, "{}", {"weights": {"a": torch.ones(5)}}), "a.pt")
@@ -243,7 +242,6 @@ def _arrays() -> list[Reader]:
         Reader("signals to predict", "a.npy", signals, lambda p: images_of(p, render)),
         Reader("checkpoint", "a.pt", model, checkpoint.load),
         Reader("predictions", "a.csv", _bytes(lambda p: predictions.write(p, said), "a.csv"), predictions.read),
-        Reader("recipe", "a.tar", _recipe(), lambda p: recipe.unpack(p, p.parent / "out"), 0.1, RECIPE),
     ]
 
 
@@ -258,28 +256,6 @@ def _index(render: dict) -> bytes:
 def _all(tiles) -> list[bytes]:
     """All images of a tiles file."""
     return [tiles[number] for number in range(len(tiles))]
-
-
-def _recipe() -> bytes:
-    """The bytes of a recipe of a data set of one subtype, four motion models and two short signals of each."""
-    from lowalt import __version__
-    from lowalt.config.layers import merge, plain
-    from lowalt.files.yaml_files import load_yaml
-    from lowalt.targets.cloud import write as write_cloud
-    from lowalt.targets.records import records_of
-
-    changes = {
-        "targets": {"select": ["DJI Mini 2"]}, "network": WAVE, "motion": {"models": 4, "models_per_chunk": 4},
-        "split": {"train": 2, "val": 1, "test": 1}, "noise": {"snr_db": [8, float("inf")]},
-        "shards": {"kind": "signal"}, "tiles": {"reduced": []}, "spectra": SPECTRA, "images": IMAGES,
-    }  # fmt: skip
-    config = merge(load_yaml("config/default.yaml"), changes)
-    published = {"DJI Mini 2": records_of(config["targets"], None)["DJI Mini 2"]["published"]}
-    head = {"format": "lowalt-recipe-1", "lowalt": __version__, "config": plain(config), "published": published}
-    cloud = _bytes(lambda p: write_cloud(p, craft()), "a.npz")
-    line = f"{hashlib.sha256(cloud).hexdigest()}  clouds/dji-mini-2.npz\n"
-    return tar({"recipe.json": json.dumps(head).encode(), "manifest.sha256": line.encode(),
-                "clouds/dji-mini-2.npz": cloud})  # fmt: skip
 
 
 def readers() -> list[Reader]:

@@ -4,9 +4,7 @@ reader behind them."""
 import hashlib
 import io
 import json
-import re
 import struct
-import tarfile
 import zipfile
 import zlib
 from collections.abc import Callable
@@ -79,43 +77,6 @@ def _unsigned(data: bytes) -> Parts:
     return {"index": json.dumps(content).encode()}
 
 
-def _packed(data: bytes) -> Parts:
-    """The members of a recipe, each array of a cloud on its own."""
-    parts = {}
-    with tarfile.open(fileobj=io.BytesIO(data)) as archive:
-        for member in archive:
-            content = archive.extractfile(member).read()
-            inner = _members(content) if member.name.endswith(".npz") else {"": content}
-            parts |= {f"{member.name}:{name}": array for name, array in inner.items()}
-    return parts
-
-
-def tar(members: Parts) -> bytes:
-    """A tar of these members."""
-    out = io.BytesIO()
-    with tarfile.open(fileobj=out, mode="w") as archive:
-        for name, content in members.items():
-            info = tarfile.TarInfo(name)
-            info.size = len(content)
-            archive.addfile(info, io.BytesIO(content))
-    return out.getvalue()
-
-
-def _recipe(parts: Parts) -> bytes:
-    """A recipe whose manifest has the checksums of its clouds."""
-    grouped: dict[str, Parts] = {}
-    for key, content in parts.items():
-        member, _, name = key.partition(":")
-        grouped.setdefault(member, {})[name] = content
-    members = {name: _archive(inner) if name.endswith(".npz") else inner[""] for name, inner in grouped.items()}
-    for name, content in members.items():
-        if name.endswith(".npz"):
-            line = rb"[0-9a-f]{64}(?=  " + re.escape(name.encode()) + rb")"
-            signed = hashlib.sha256(content).hexdigest().encode()
-            members["manifest.sha256"] = re.sub(line, signed, members["manifest.sha256"])
-    return tar(members)
-
-
 def _plain_matlab(data: bytes) -> Parts:
     """A MATLAB file without compression."""
     out = io.BytesIO()
@@ -126,5 +87,4 @@ def _plain_matlab(data: bytes) -> Parts:
 ARCHIVE = Seal(_members, _archive)
 PNG = Seal(_chunks, _png)
 INDEX = Seal(_unsigned, _index)
-RECIPE = Seal(_packed, _recipe)
 MATLAB = Seal(_plain_matlab, lambda parts: parts["file"])

@@ -35,7 +35,7 @@ rule accuracy_cost_table:
         speeds=expand("results/{{run}}/speed/{scheme}.json", scheme=RUN.schemes_by_slug),
         index=f"{DATA}/shards/index.json",
         data_jobs=products.data_benchmarks,
-        presets=products.presets,
+        presets=str(shipped(PRESETS)),
         schemes=config["recognition"]["table"],
     output:
         report("results/{run}/accuracy_cost.csv", caption="../report/accuracy_cost.rst", category="Cost"),

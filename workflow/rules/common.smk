@@ -9,10 +9,10 @@ from lowalt.machine.environment import prepare
 from lowalt.config.plan import PART, PIECE
 from lowalt.scene.catalogue import dotted
 from lowalt.workflow import mends, options, space
-from lowalt.files.shipped import located
-from lowalt.workflow.products import TABLES, Products
+from lowalt.files.shipped import located, shipped
+from lowalt.workflow.products import PRESETS, TABLES, Products
 from lowalt.workflow.run import Run
-from lowalt.workflow.settings import Settings
+from lowalt.workflow.stage_settings import Settings
 from lowalt.workflow.sources import ROOT, SOURCE_MODULES, code as code_of
 
 mends.install()

@@ -1,8 +1,7 @@
 # Shards: the samples of a chunk and fold in one WebDataset tar, the table of its samples next to it, and one index.
 # REQUIRED INPUTS: motion table of a chunk; by kind its tiles and noisy signals, its noisy signals (for cubes with clouds and surfaces), or its clean echoes
 # OUTPUTS: results/{run}/shards/{group}-{fold}-{part}{piece}.tar and .npz, results/{run}/shards/index.json,
-#          and next to them the data card: README.md, samples.csv, croissant.json, .zenodo.json,
-#          SHA256SUMS
+#          and next to them the data card: README.md, samples.csv, croissant.json, SHA256SUMS
 
 
 rule shard:
@@ -50,10 +49,11 @@ rule index:
 rule card:
     input:
         code=code("lowalt.shards.card"),
+        template=products.card_template,
         index="results/{run}/shards/index.json",
         configuration="results/{run}/config.yaml",
     output:
-        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json", ".zenodo.json", "SHA256SUMS"),
+        multiext("results/{run}/shards/", "README.md", "samples.csv", "croissant.json", "SHA256SUMS"),
     log:
         "results/{run}/logs/card.log",
     conda:

@@ -7,11 +7,9 @@
 
 rule tiles:
     input:
+        unpack(products.tile_content),
         code=code("lowalt.tiles", *options.tile_modules(config)),
         signals="results/{run}/noisy/{group}-{part}.npy",
-        motion=products.tile_motion,
-        clouds=products.tile_clouds,
-        occluders=products.tile_occluders,
     output:
         tiles=temp("results/{run}/tiles/{group}-{part}.npz"),
         reduced=expand("results/{{run}}/reduced/{size}/{{group}}-{{part}}.npy", size=config["tiles"]["reduced"]),
@@ -24,10 +22,7 @@ rule tiles:
     params:
         settings=settings.images,
         reduced=options.reduced,
-        motion=options.motion,
-        clouds=options.clouds,
-        occluders=options.occluders,
+        scene=options.scene,
     shell:
         "python -m lowalt.tiles --settings {params.settings:q} --signals {input.signals:q} {params.reduced:q}"
-        " {params.motion:q} {params.clouds:q} {params.occluders:q}"
-        " --out {output.tiles:q} 2> {log:q}"
+        " {params.scene:q} --out {output.tiles:q} 2> {log:q}"

@@ -5,21 +5,21 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
-from lowalt.commands.for_programs import acts, as_json
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.files.atomic import text_of
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.workflow.closing import averages
+
+MEASURED = ("accuracy_percent", "processor_s", "data")
 
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `compare` to a parser's commands."""
-    line = commands.add_parser(
-        "compare", help="two finished runs: what differs in configuration, accuracy, time and bytes",
-        epilog="example: lowalt compare results/default results/tiny",
-    )  # fmt: skip
+    meaning = "two finished runs: what differs in configuration, accuracy, time and bytes"
+    line = add_command(commands, "compare", run, meaning, "lowalt compare results/default results/tiny")
     line.add_argument("runs", type=Path, nargs=2, metavar="RUN", help="folder of a finished run")
-    acts(line, run)
 
 
 def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
@@ -31,58 +31,40 @@ def leaves(block: dict, where: str = "") -> Iterator[tuple[str, object]]:
             yield f"{where}{key}", value
 
 
-def _accuracies(folder: Path) -> dict[str, float]:
-    """The table's averages over the SNRs (%) by "protocol scheme"; empty where the run trained nothing."""
-    path = folder / "accuracy.csv"
-    rows = read_csv(path, "protocol", "scheme", "snr_db", "accuracy_percent") if path.exists() else []
-    averages = [row for row in rows if row["snr_db"] == "avg"]
-    return {f"{row['protocol']} {row['scheme']}": float(row["accuracy_percent"]) for row in averages}
-
-
-def _seconds(folder: Path) -> dict[str, float]:
-    """Processor seconds by stage; empty where the run has no report."""
-    path = folder / "stages.csv"
-    return {row["rule"]: float(row["cpu_s"]) for row in read_csv(path, "rule", "cpu_s")} if path.exists() else {}
-
-
-def _sizes(folder: Path) -> dict[str, int]:
-    """Samples and bytes of the data set; empty where the run has none."""
-    path = folder / "shards/index.json"
-    if not path.exists():
-        return {}
-    index = json.loads(text_of(path, "index"))
-    return {"samples": index["samples"], "bytes": index["bytes"]}
-
-
 def facts(folder: Path) -> dict[str, dict]:
     """Return the facts of one run's folder, {part: {name: value}}.
 
-    Parts: configuration (dotted keys), accuracy_percent, processor_s, data.
+    Parts: configuration (dotted keys), accuracy_percent (averages over the SNRs by "protocol scheme"), processor_s (by
+    stage), data (samples and bytes); a part is empty where the run has no such table.
     Raises: InputError naming the folder that is no run's.
     """
     if not (folder / "config.yaml").is_file():
         raise InputError(f"{folder}: has no config.yaml, expected the folder of a finished run")
-    measured = {"accuracy_percent": _accuracies, "processor_s": _seconds, "data": _sizes}
-    return {"configuration": dict(leaves(load_yaml(folder / "config.yaml")))} | {
-        part: of(folder) for part, of in measured.items()
+    accuracy, stages, index = (folder / name for name in ("accuracy.csv", "stages.csv", "shards/index.json"))
+    shares = averages(accuracy) if accuracy.exists() else {}
+    times = read_csv(stages, "rule", "cpu_s") if stages.exists() else []
+    data = json.loads(text_of(index, "index")) if index.exists() else {}
+    return {
+        "configuration": dict(leaves(load_yaml(folder / "config.yaml"))),
+        "accuracy_percent": {f"{protocol} {scheme}": share for (scheme, protocol), share in shares.items()},
+        "processor_s": {row["rule"]: float(row["cpu_s"]) for row in times},
+        "data": {name: data[name] for name in ("samples", "bytes") if data},
     }
 
 
-def compared(one: Path, other: Path) -> dict[str, dict[str, tuple]]:
-    """Return {part: {name: (value of the first, value of the second)}} for all that differs or is measured in two runs.
+def compared(*folders: Path) -> dict[str, dict[str, tuple]]:
+    """Return {part: {name: (value of the first run, value of the second)}}: of the configuration only what differs, of
+    the parts MEASURED everything. None stands where a run has none.
 
-    Parts: configuration (only what differs), accuracy_percent, processor_s, data. None stands where a run has none.
     Raises: InputError naming the folder that is no run's.
     """
-    found = [facts(folder) for folder in (one, other)]
-
-    def pairs(part: str) -> dict[str, tuple]:
-        """Values of both runs in one part, by name; None where a run has none."""
-        first, second = (mine[part] for mine in found)
-        return {name: (first.get(name), second.get(name)) for name in dict.fromkeys([*first, *second])}
-
-    differs = {name: pair for name, pair in pairs("configuration").items() if pair[0] != pair[1]}
-    return {"configuration": differs} | {part: pairs(part) for part in ("accuracy_percent", "processor_s", "data")}
+    first, second = map(facts, folders)
+    pairs = {
+        part: {name: (first[part].get(name), second[part].get(name)) for name in {**first[part], **second[part]}}
+        for part in ("configuration", *MEASURED)
+    }
+    pairs["configuration"] = {name: pair for name, pair in pairs["configuration"].items() if pair[0] != pair[1]}
+    return pairs
 
 
 def _cell(value: object) -> str:
@@ -92,26 +74,19 @@ def _cell(value: object) -> str:
 
 def _change(part: str, first: object, second: object) -> str:
     """The difference of two measured numbers; of times and sizes as a share of the first too."""
-    if part == "configuration" or None in (first, second):
+    if part not in MEASURED or None in (first, second):
         return ""
     share = f" ({second / first - 1:+.1%})" if part != "accuracy_percent" and first else ""
     return f"   {second - first:+.4g}{share}"
 
 
-def run(given: argparse.Namespace) -> str:
-    """Return the comparison as text, or as JSON.
-
-    Raises: as `compared`.
-    """
-    found = compared(*given.runs)
-    if given.json:
-        return as_json(found)
-    lines = []
-    for part, rows in found.items():
-        if not rows:
-            continue
-        lines += ["", f"{part.replace('_', ' ')}: {given.runs[0]} | {given.runs[1]}"]
-        wide = max(map(len, rows))
-        for name, (first, second) in rows.items():
-            lines.append(f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}")
-    return "\n".join(lines[1:])
+def run(options: argparse.Namespace) -> Answer:
+    """Compare two runs. Raises: as `compared`."""
+    pairs, blocks = compared(*options.runs), []
+    for part, rows in pairs.items():
+        wide = max(map(len, rows), default=0)
+        lines = [f"  {name:{wide}}  {_cell(first)} | {_cell(second)}{_change(part, first, second)}"
+                 for name, (first, second) in rows.items()]  # fmt: skip
+        head = f"{part.replace('_', ' ')}: {options.runs[0]} | {options.runs[1]}"
+        blocks += ["\n".join([head, *lines])] if rows else []
+    return Answer(pairs, "\n\n".join(blocks))

@@ -1,6 +1,9 @@
 """The command `lowalt completion`: a script by which a shell completes commands, options and files."""
 
 import argparse
+from collections.abc import Iterator
+
+from lowalt.commands.command_line import Answer
 
 SCRIPT = """# Completion of lowalt for bash and zsh; load it by: source <(lowalt completion)
 if [ -n "${{ZSH_VERSION-}}" ]; then autoload -Uz compinit bashcompinit && compinit -u && bashcompinit; fi
@@ -10,7 +13,7 @@ _lowalt() {{
   local word="${{COMP_WORDS[COMP_CWORD]}}" path="" next="" options="" names=""
   for next in "${{COMP_WORDS[@]:1:$((COMP_CWORD - 1))}}"; do
     case "$path $next" in
-{paths}
+      {paths}) path="$path $next";;
     esac
   done
   case "$path" in
@@ -23,39 +26,26 @@ _lowalt() {{
 complete -o filenames -F _lowalt lowalt .venv/bin/lowalt"""
 
 
-def add_to(commands: argparse._SubParsersAction) -> None:
-    """Add `completion` to a parser's commands."""
-    commands.add_parser(
+def add_to(commands: argparse._SubParsersAction, whole: argparse.ArgumentParser) -> None:
+    """Add `completion` to the commands of a parser, whose whole line it completes."""
+    line = commands.add_parser(
         "completion", help="print the completion of commands, options and files for bash and zsh",
         epilog="example: source <(lowalt completion)",
     )  # fmt: skip
+    line.set_defaults(act=lambda options: Answer({}, script(whole)), json=False)
 
 
-def tree(line: argparse.ArgumentParser) -> dict[str, tuple[list[str], list[str]]]:
-    """Return (options, names of commands) of a parser and all its commands, by their words such as " target make"."""
-    found = {}
-
-    def look(parser: argparse.ArgumentParser, path: str) -> None:
-        """Note one parser, then those of its commands."""
-        options, names = [], []
-        for action in parser._actions:
-            options += [word for word in action.option_strings if word.startswith("--")]
-            if isinstance(action, argparse._SubParsersAction):
-                names += list(action.choices)
-                for name, below in action.choices.items():
-                    look(below, f"{path} {name}")
-        found[path] = options, names
-
-    look(line, "")
-    return dict(sorted(found.items()))
+def parsers(line: argparse.ArgumentParser, path: str = "") -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield the words, such as " target make", the options and the names of commands of a parser and all below it."""
+    below = {name: parser for action in line._actions if isinstance(action, argparse._SubParsersAction)
+             for name, parser in action.choices.items()}  # fmt: skip
+    yield path, [word for action in line._actions for word in action.option_strings if word[:2] == "--"], [*below]
+    for name, parser in below.items():
+        yield from parsers(parser, f"{path} {name}")
 
 
 def script(line: argparse.ArgumentParser) -> str:
     """Return the script that completes the commands of a parser."""
-    found = tree(line)
-    paths = "\n".join(f'      "{path}") path="{path}";;' for path in found if path)
-    cases = "\n".join(
-        f'    "{path}") options="{" ".join(options)}"; names="{" ".join(names)}";;'
-        for path, (options, names) in found.items()
-    )
-    return SCRIPT.format(paths=paths, cases=cases)
+    rows = [(path, " ".join(options), " ".join(names)) for path, options, names in parsers(line)]
+    cases = "\n".join(f'    "{path}") options="{options}"; names="{names}";;' for path, options, names in rows)
+    return SCRIPT.format(paths=" | ".join(f'"{path}"' for path, _, _ in rows if path), cases=cases)

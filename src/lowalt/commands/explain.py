@@ -1,6 +1,7 @@
 """The command `lowalt explain` says whether a scene's receiver finds its targets, and what each effect changes."""
 
 import argparse
+import dataclasses
 import os
 import sys
 from collections.abc import Callable
@@ -8,11 +9,18 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import acts, as_json
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import merge, overlaid
+from lowalt.config.plan import Plan
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.files.yaml_files import load_yaml
+from lowalt.spectra.catalogue import named
+from lowalt.targets.records import records_of
+from lowalt.workflow.space import cubes_sentence, cubes_size
+
+VISIBLE = 8
+"""Levels of 255 by which a pixel differs visibly."""
 
 
 def _sample(text: str) -> tuple[str, int]:
@@ -25,10 +33,9 @@ def _sample(text: str) -> tuple[str, int]:
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `explain` to a parser's commands."""
-    line = commands.add_parser(
-        "explain", help="say whether a scene's receiver finds its targets, and what each effect changes",
-        epilog="example: lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml",
-    )  # fmt: skip
+    meaning = "say whether a scene's receiver finds its targets, and what each effect changes"
+    example = "lowalt explain config/scenes/urban.yaml --suggest 1e-3 --out mine.yaml"
+    line = add_command(commands, "explain", run, meaning, example)
     line.add_argument("scene", type=Path, nargs="+", help="the scene, an overlay on the default; more may follow it")
     line.add_argument("--sample", type=_sample, action="append", default=[], metavar="SUBTYPE:MODEL")
     line.add_argument("--station", help="the station of the table of effects (default: the first)")
@@ -38,92 +45,94 @@ def add_to(commands: argparse._SubParsersAction) -> None:
     line.add_argument("--sources", action="store_true", help="list where the model of each effect comes from")
     line.add_argument("--suggest", type=float, metavar="LEAST", help="write the effects that change a signal by more")
     line.add_argument("--out", type=Path, help="the scene to write with --suggest (.yaml)")
-    acts(line, run)
 
 
-def run(given: argparse.Namespace) -> str:
-    """Return the explanation as text, or as JSON.
+def run(options: argparse.Namespace) -> Answer:
+    """Explain a scene; a data set of cubes begins with its size.
 
     Raises: InputError where the configuration, a sample or a station is wrong.
     """
-    if (given.suggest is None) != (given.out is None):
+    if (options.suggest is None) != (options.out is None):
         raise InputError(
-            "--suggest: without --out, expected both" if given.out is None else "--out: expected --suggest"
+            "--suggest: without --out, expected both" if options.out is None else "--out: expected --suggest"
         )
     from lowalt.scene import explain, explain_text
 
-    inputs = os.environ.get("LOWALT_INPUTS")
-    config = overlaid(given.scene)
+    inputs = Path(os.environ["LOWALT_INPUTS"]) if os.environ.get("LOWALT_INPUTS") else None
+    config = overlaid(options.scene)
+    size = _size(config, inputs)
     scene = explain.scene_of(config)
     stations = scene.network.stations
-    first = given.station or stations[0].name
+    first = options.station or stations[0].name
     scene.network.station(first)
     print("lowalt explain: making samples and, the first time, compiling", file=sys.stderr, flush=True)
-    chosen = explain.samples(config, Path(inputs) if inputs else None, given.sample)
+    chosen = explain.samples(config, inputs, options.sample)
     clouds = {sample.cloud.subtype: sample.cloud for sample in chosen}
     findings = [explain.finding(scene, station, sample, clouds) for sample in chosen for station in stations]
     changes = []
-    if not given.no_table or given.suggest is not None:
+    if not options.no_table or options.suggest is not None:
         print("lowalt explain: leaving out and adding every effect", file=sys.stderr, flush=True)
-        names = [station.name for station in stations] if given.model else [first]
-        changes = explain.changes(config, chosen, names, _comparison(config, names, given.model))
-    if given.out is not None:
+        names = [station.name for station in stations] if options.model else [first]
+        changes = explain.changes(config, chosen, names, _comparison(config, names, options.model))
+    if options.out is not None:
         overlay: dict = {}
-        for path in given.scene:
+        for path in options.scene:
             overlay = merge(overlay, load_yaml(path))
-        with replacing(given.out) as temporary:
-            temporary.write_text(explain_text.suggested(overlay, changes, given.suggest))
-    if given.json:
-        return as_json({
-            "run": config["run"], "findings": [finding._asdict() for finding in findings],
-            "changes": [change._asdict() for change in changes],
-        })  # fmt: skip
-    lines = explain_text.verdict(findings)
-    if changes and not given.no_table:
-        lines += ["", *explain_text.effects_table(changes, given.sources)]
-    for finding in findings if given.levels else []:
+        with replacing(options.out) as temporary:
+            temporary.write_text(explain_text.suggested(overlay, changes, options.suggest))
+    lines = [*([cubes_sentence(size), ""] if size else []), *explain_text.verdict(findings)]
+    if changes and not options.no_table:
+        lines += ["", *explain_text.effects_table(changes, options.sources)]
+    for finding in findings if options.levels else []:
         lines += ["", *explain_text.level_lines(finding)]
-    return "\n".join(lines)
+    facts = {"findings": [row._asdict() for row in findings], "changes": [row._asdict() for row in changes]}
+    return Answer({"run": config["run"], **({"shards": size} if size else {}), **facts}, "\n".join(lines))
+
+
+def _size(config: dict, inputs: Path | None) -> dict:
+    """What the data set of a scene takes where its shards are cubes, else nothing."""
+    if config["shards"]["kind"] != "cube":
+        return {}
+    records = records_of(config["targets"], inputs)
+    return cubes_size(config, Plan.of(config, {name: record["published"] for name, record in records.items()}))
 
 
 def _comparison(
     config: dict, stations: list[str], model: Path | None
 ) -> Callable[[np.ndarray, np.ndarray], dict[str, float]]:  # fmt: skip
     """What two sets of signals (K, stations, N) differ in as images, and in the answers of a trained model."""
-    from dataclasses import replace
-
     from lowalt.config.network import Network
     from lowalt.tiles import Renderer
 
-    visible = 8
-    network = Network.from_settings(config["network"])
     blocks = {key: config[key] for key in ("network", "spectra", "images")}
-    whole = Renderer.from_settings(blocks)
-    seen = replace(network, stations=tuple(network.station(name) for name in stations))
+    whole, network = Renderer.from_settings(blocks), Network.from_settings(config["network"])
+    seen = dataclasses.replace(network, stations=tuple(network.station(name) for name in stations))
     renderer = Renderer(seen, whole.spectra, whole.images)
-    answered = None
-    if model is not None:
-        from lowalt.recognition.one_sample import answer
-        from lowalt.recognition.zoo import opened
-        from lowalt.spectra.catalogue import named
-        from lowalt.tiles import split
+    answered = _answering(model, blocks) if model else None
 
-        trained, _ = opened(model)
-
-        def answered(tile: np.ndarray) -> str:
-            """The most probable class of a tile."""
-            shares = answer(trained, split(tile, len(named(config["spectra"]))), blocks, "--model")
-            return max(shares, key=shares.__getitem__)
-
-    def compare(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
-        """Shares of pixels whose index differs by more than 8 of 255, and of answers that differ."""
-        pairs = [
-            [renderer.tile(signals.astype(np.complex64)) for signals in pair]
-            for pair in zip(before, after, strict=True)
-        ]
-        result = {"pixels": float(np.mean([abs(a.astype(int) - b) > visible for a, b in pairs]))}
+    def differing(before: np.ndarray, after: np.ndarray) -> dict[str, float]:
+        """Shares of pixels whose index differs by more than VISIBLE of 255, and of answers that differ."""
+        first, second = ([renderer.tile(sample.astype(np.complex64)) for sample in many] for many in (before, after))
+        shares = {"pixels": float(np.mean(abs(np.subtract(first, second, dtype=int)) > VISIBLE))}
         if answered is not None:
-            result["answers"] = float(np.mean([answered(a) != answered(b) for a, b in pairs]))
-        return result
+            pairs = zip(map(answered, first), map(answered, second), strict=True)
+            shares["answers"] = float(np.mean([name != other for name, other in pairs]))
+        return shares
 
-    return compare
+    return differing
+
+
+def _answering(model: Path, blocks: dict) -> Callable[[np.ndarray], str]:
+    """The function that returns the class a trained model finds most probable for a tile."""
+    from lowalt.recognition.one_sample import answer
+    from lowalt.recognition.zoo import opened
+    from lowalt.tiles import split
+
+    (trained, _), spectra = opened(model), len(named(blocks["spectra"]))
+
+    def answered(tile: np.ndarray) -> str:
+        """The most probable class of a tile."""
+        shares = answer(trained, split(tile, spectra), blocks, "--model")
+        return max(shares, key=shares.__getitem__)
+
+    return answered

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import acts, as_json
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import overlaid
 from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
@@ -18,46 +18,43 @@ from lowalt.tiles.png import encode
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `sample` to a parser's commands."""
-    line = commands.add_parser(
-        "sample", help="one sample: tile, signals, record, and a picture with axes",
-        epilog="example: lowalt sample Crow 3 --snr 13 --out samples",
-    )  # fmt: skip
+    meaning = "one sample: tile, signals, record, and a picture with axes"
+    line = add_command(commands, "sample", run, meaning, "lowalt sample Crow 3 --snr 13 --out samples")
     line.add_argument("subtype", help="name of the subtype, as in the table of targets")
     line.add_argument("model", type=int, help="number of the motion model; any number, also beyond the configuration's")
     line.add_argument("--snr", type=float, default=math.inf, help="signal-to-noise ratio in dB (default: no noise)")
     line.add_argument("--overlay", type=Path, nargs="+", default=[], help="overlays on the default")
-    acts(line, run)
     line.add_argument("--out", type=Path, default=Path(), help="folder to write into (default: the current one)")
 
 
-def run(given: argparse.Namespace) -> str:
-    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; return what was written.
+def run(options: argparse.Namespace) -> Answer:
+    """Write {key}.png, .npy and .json as the shards hold them, and {key}-axes.png; answer with what was written.
 
     Raises: InputError for a wrong configuration, subtype or model.
     """
     from lowalt.report.figures.sample import figure
 
-    config = overlaid(given.overlay)
+    config = overlaid(options.overlay)
     everything = config["targets"]["select"]
     # Only the target's own cloud is made.
-    config["targets"]["select"] = [given.subtype]
+    config["targets"]["select"] = [options.subtype]
     dataset = Dataset(config, inputs=config["inputs"] or os.environ.get("LOWALT_INPUTS"))
-    if given.model < 0 or (everything and given.subtype not in everything):
-        raise InputError(f"{given.subtype!r}, model {given.model}: expected a selected subtype and a number from 0")
+    if options.model < 0 or (everything and options.subtype not in everything):
+        raise InputError(f"{options.subtype!r}, model {options.model}: expected a selected subtype and a number from 0")
     (group,) = dataset.plan.groups
-    place = Place(group, given.subtype, given.model, given.snr)
+    place = Place(group, options.subtype, options.model, options.snr)
     image, signal, _ = dataset.made(place)
-    key, renderer = sample_key(given.subtype, given.model, given.snr), dataset.maker.renderer
-    noise = "no noise" if math.isinf(given.snr) else f"SNR {given.snr:g} dB"
+    key, renderer = sample_key(options.subtype, options.model, options.snr), dataset.maker.renderer
+    noise = "no noise" if math.isinf(options.snr) else f"SNR {options.snr:g} dB"
     written = {
         f"{key}.png": encode(image, renderer.images.palette),
         f"{key}.json": dataset.made_record(place),
-        f"{key}-axes.png": figure(image, renderer, f"{given.subtype}, motion model {given.model}, {noise}"),
+        f"{key}-axes.png": figure(image, renderer, f"{options.subtype}, motion model {options.model}, {noise}"),
     }
     for name, data in written.items():
-        with replacing(given.out / name) as temporary:
+        with replacing(options.out / name) as temporary:
             temporary.write_bytes(data)
-    with replacing(given.out / f"{key}.npy") as temporary:
+    with replacing(options.out / f"{key}.npy") as temporary:
         np.save(temporary, signal)
-    paths = [str(given.out / name) for name in (*written, f"{key}.npy")]
-    return as_json({"key": key, "files": paths}) if given.json else "\n".join(paths)
+    paths = [str(options.out / name) for name in (*written, f"{key}.npy")]
+    return Answer({"key": key, "files": paths}, "\n".join(paths))

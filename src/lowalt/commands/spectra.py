@@ -1,12 +1,13 @@
 """The action `lowalt spectra`: a configuration's spectra, their settings and sources, and the time of an image."""
 
 import argparse
+import functools
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from lowalt.commands.for_programs import acts, as_json
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.layers import overlaid
 from lowalt.machine.hardware import describe
 from lowalt.machine.timing import median_s
@@ -20,12 +21,9 @@ REPEATS = 5
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `spectra` to a parser's commands."""
-    line = commands.add_parser(
-        "spectra", help="the spectra of a configuration, and the time an image of each takes",
-        epilog="example: lowalt spectra config/tiny.yaml",
-    )  # fmt: skip
+    meaning = "the spectra of a configuration, and the time an image of each takes"
+    line = add_command(commands, "spectra", run, meaning, "lowalt spectra config/tiny.yaml")
     line.add_argument("overlay", type=Path, nargs="*", help="overlays on the default")
-    acts(line, run)
 
 
 def facts(config: dict) -> list[dict]:
@@ -38,38 +36,31 @@ def facts(config: dict) -> list[dict]:
         signal[3::4] = 0
     image = np.empty((renderer.images.size, renderer.images.size), np.uint8)
     still, no_truth = np.zeros(symbols, np.int64), np.zeros((symbols, 0))
-    found = []
+    rows = []
     for name, settings in renderer.spectra.items():
         kind = spectrum(name)
         cells = isinstance(kind, OfCells)
         count = kind.columns(settings, symbols) if cells else windows(symbols, settings.window, settings.hop, name)
-        given = Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth) if cells else signal
-        renderer.image(given, 0, name, image)
-        found.append({
-            "name": name, "title": kind.TITLE, "rows": kind.rows(settings),
-            "windows": count, "zero_index": zero_index(name),
-            "image_ms": 1e3 * median_s(lambda name=name, given=given: renderer.image(given, 0, name, image), REPEATS),
-            "settings": asdict(settings), "source": kind.SOURCE,
+        heard = Cube(np.repeat(signal[:, None], settings.cells, axis=1), still, no_truth) if cells else signal
+        draw = functools.partial(renderer.image, heard, 0, name, image)
+        draw()
+        rows.append({
+            "name": name, "title": kind.TITLE, "rows": kind.rows(settings), "windows": count,
+            "zero_index": zero_index(name), "image_ms": 1e3 * median_s(draw, REPEATS), "settings": asdict(settings),
+            "source": kind.SOURCE,
         })  # fmt: skip
-    return found
+    return rows
 
 
-def described(found: list[dict], hardware: str) -> str:
-    """Return the facts on each spectrum as lines of text; hardware: of the machine that measured the times."""
-    lines = []
-    for one in found:
-        values = ", ".join(f"{key} {value}" for key, value in one["settings"].items())
+def run(options: argparse.Namespace) -> Answer:
+    """Describe the spectra of a configuration. Raises: InputError where the configuration is wrong."""
+    rows, hardware, lines = facts(overlaid(options.overlay)), describe(), []
+    for row in rows:
+        values = ", ".join(f"{key} {value}" for key, value in row["settings"].items())
         lines += [
-            f"{one['name']} ({one['title']}): {one['rows']} rows, {one['windows']} windows, "
-            f"zero at index {one['zero_index']}, {one['image_ms']:.2f} ms an image | {values}",
-            f"  {one['source']}",
+            f"{row['name']} ({row['title']}): {row['rows']} rows, {row['windows']} windows, "
+            f"zero at index {row['zero_index']}, {row['image_ms']:.2f} ms an image | {values}",
+            f"  {row['source']}",
         ]
-    return "\n".join([*lines, f"medians of {REPEATS}; {hardware}"])
-
-
-def run(given: argparse.Namespace) -> str:
-    """Return the facts as text, or as JSON. Raises: InputError where the configuration is wrong."""
-    found = facts(overlaid(given.overlay))
-    if given.json:
-        return as_json({"spectra": found, "repeats": REPEATS, "hardware": describe()})
-    return described(found, describe())
+    text = "\n".join([*lines, f"medians of {REPEATS}; {hardware}"])
+    return Answer({"spectra": rows, "repeats": REPEATS, "hardware": hardware}, text)

@@ -9,7 +9,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from lowalt.commands.for_programs import acts, as_json
+from lowalt.commands.command_line import Answer, add_command
 from lowalt.config.command import exit_status
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, shipped
@@ -22,26 +22,18 @@ SNAKEFILE = SHIPPED / "Snakefile"
 
 def add_to(commands: argparse._SubParsersAction) -> None:
     """Add `run` and `status` to a parser's commands."""
-    line = commands.add_parser(
-        "run", help="run the workflow: the default, or with overlays",
-        epilog="example: lowalt run config/tiny.yaml --target data --cores 2",
-    )  # fmt: skip
+    meaning = "run the workflow: the default, or with overlays"
+    line = add_command(commands, "run", run, meaning, "lowalt run config/tiny.yaml --target data --cores 2")
     line.add_argument("overlay", type=shipped, nargs="*", help="overlays on the default configuration")
-    line.add_argument(
-        "--configfile", type=shipped, nargs="+", default=[], help="more overlays, as snakemake names them"
-    )
+    line.add_argument("--configfile", type=shipped, nargs="+", default=[], help="more overlays, as in snakemake")
     line.add_argument("--target", nargs="+", default=[], help="rules or files to make (default: everything)")
     line.add_argument("--cores", help="cores to use (default: all; with --profile what that says)")
     line.add_argument("-n", "--dry-run", action="store_true", help="only say what would be made, and why")
     line.add_argument("--profile", type=shipped, help="profile of a cluster, such as profiles/slurm")
-    acts(line, run)
-    state = commands.add_parser(
-        "status", help="the state of a run in another terminal", epilog="example: lowalt status"
-    )
-    acts(state, states)
+    add_command(commands, "status", states, "the state of a run in another terminal", "lowalt status")
 
 
-def command(given: argparse.Namespace) -> list[str]:
+def command(options: argparse.Namespace) -> list[str]:
     """Return the command line of Snakemake.
 
     Raises: InputError naming an overlay that is missing or no YAML mapping, wrong cores, a profile that is not there,
@@ -49,35 +41,35 @@ def command(given: argparse.Namespace) -> list[str]:
     """
     if not SNAKEFILE.is_file():
         raise InputError(f"no {SNAKEFILE}: this installation has no workflow, expected one from a wheel or a clone")
-    overlays = [*given.overlay, *given.configfile]
+    overlays = [*options.overlay, *options.configfile]
     for path in overlays:
         if not path.is_file():
             raise InputError(f"configuration: no file at {path} (a rule or file to make is named by --target)")
         load_yaml(path)
     base = [] if Path("config/default.yaml").is_file() else [SHIPPED / "config/default.yaml"]
-    if given.cores not in (None, "all") and not (given.cores.isdecimal() and int(given.cores)):
-        raise InputError(f"--cores {given.cores!r}, expected a whole number of at least 1, or all")
+    if options.cores not in (None, "all") and not (options.cores.isdecimal() and int(options.cores)):
+        raise InputError(f"--cores {options.cores!r}, expected a whole number of at least 1, or all")
     # A profile that is not there is no error to Snakemake: the run would go on without it.
-    if given.profile and not any(given.profile.glob("config*.yaml")):
-        raise InputError(f"--profile {given.profile}: no config.yaml there, expected a folder such as profiles/slurm")
-    cores = given.cores or (None if given.profile else "all")
+    if options.profile and not any(options.profile.glob("config*.yaml")):
+        raise InputError(f"--profile {options.profile}: no config.yaml there, expected a folder such as profiles/slurm")
+    cores = options.cores or (None if options.profile else "all")
     line = [sys.executable, "-m", "snakemake", "--snakefile", str(SNAKEFILE), *(["--cores", cores] if cores else [])]
-    profile = given.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
+    profile = options.profile or (None if Path("profiles").is_dir() else shipped("profiles/default"))
     line += ["--workflow-profile", str(profile)] if profile else []
     line += ["--configfile", *map(str, [*base, *overlays])] if base or overlays else []
-    line += ["--dry-run"] if given.dry_run else []
-    return [*line, "--", *given.target] if given.target else line
+    line += ["--dry-run"] if options.dry_run else []
+    return [*line, "--", *options.target] if options.target else line
 
 
-def ended(given: argparse.Namespace) -> dict:
-    """Run Snakemake in this folder and return its exit status, and with `given.json` what happened.
+def ended(options: argparse.Namespace) -> dict:
+    """Run Snakemake in this folder and return its exit status, and with `options.json` what happened.
 
     That is the command line, the seconds, and by name the stages whose jobs ran; of a dry run the jobs that would run,
     each with its rule, files and reason. Snakemake's own text then goes to the standard error stream.
     Raises: as `command`.
     """
-    line = command(given)
-    if not given.json:
+    line = command(options)
+    if not options.json:
         return {"status": exit_status(subprocess.run(line).returncode)}
     begun = time.time()
     with tempfile.TemporaryDirectory() as folder:
@@ -85,38 +77,25 @@ def ended(given: argparse.Namespace) -> dict:
         ran = subprocess.run(line, stdout=2, env=os.environ | {PLANNED_JOBS: str(jobs)})
         planned = [json.loads(text) for text in jobs.read_text().splitlines()] if jobs.exists() else []
     answer = {"status": exit_status(ran.returncode), "command": line, "seconds": time.time() - begun}
-    if given.dry_run:
+    if options.dry_run:
         return answer | {"jobs": planned}
     kept = [entry for entry in status.read() if entry["written"] >= begun]
     return answer | {"stages": kept[-1]["board"]["stages"] if kept else {}}
 
 
-def said(given: argparse.Namespace, answer: dict, text: str) -> str:
-    """Return the text, or the answer as JSON; end with the workflow's status where that is not 0."""
-    text = as_json(answer) if given.json else text
-    if answer["status"]:
-        print(text, end="\n" if given.json else "")
-        raise SystemExit(answer["status"])
-    return text
+def run(options: argparse.Namespace) -> Answer:
+    """Run Snakemake in this folder; the exit status is its own. Raises: as `command`."""
+    ran = ended(options)
+    return Answer(ran, "", ran["status"])
 
 
-def run(given: argparse.Namespace) -> str:
-    """Run Snakemake in this folder; end with its status where that is not 0.
-
-    Raises: as `command`.
-    """
-    return said(given, ended(given), "")
-
-
-def states(given: argparse.Namespace) -> str:
-    """Return the state of the runs of this folder.
+def states(options: argparse.Namespace) -> Answer:
+    """Tell the state of the runs of this folder.
 
     Raises: InputError where no run has started here.
     """
-    kept = status.read()
+    kept = [entry | {"alive": status.alive(entry)} for entry in status.read()]
     if not kept:
         raise InputError(f"no run has started here: {status.FOLDER} is empty")
-    if given.json:
-        return as_json([entry | {"alive": status.alive(entry)} for entry in kept])
-    living = [entry for entry in kept if status.alive(entry)]
-    return "\n".join(status.describe(entry, time.time()) for entry in living or kept[-1:])
+    shown = [entry for entry in kept if entry["alive"]] or kept[-1:]
+    return Answer(kept, "\n".join(status.describe(entry, time.time()) for entry in shown))

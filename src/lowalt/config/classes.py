@@ -70,14 +70,14 @@ def like(record: Mapping) -> str:
 
     Raises: InputError naming the subtype where neither its key `like` nor its category says it.
     """
-    found = record.get("like", record["category"])
-    if found not in CATEGORIES:
+    name = record.get("like", record["category"])
+    if name not in CATEGORIES:
         key = "like" if "like" in record else "category"
         raise InputError(
-            f"{record.get('subtype', 'record')}: {key} is {found!r}, expected a key `like` with one of "
+            f"{record.get('subtype', 'record')}: {key} is {name!r}, expected a key `like` with one of "
             f"{list(CATEGORIES)}, which says how a target of another class is built, moves and reflects"
         )
-    return found
+    return name
 
 
 def listed(names: Iterable[str]) -> str:

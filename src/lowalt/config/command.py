@@ -121,15 +121,15 @@ class Refusing:
         self._held = held
 
     def __getattr__(self, name: str) -> Any:
-        found = getattr(self._held, name)
-        if not callable(found):
-            return found
+        held = getattr(self._held, name)
+        if not callable(held):
+            return held
 
-        @functools.wraps(found)
+        @functools.wraps(held)
         def asked(*given: Any, **named: Any) -> Any:
             """Answer, or end the process after one line."""
             with refusing():
-                return found(*given, **named)
+                return held(*given, **named)
 
         return asked
 

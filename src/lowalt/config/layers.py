@@ -87,9 +87,9 @@ def check(config: dict, schema_path: str | Path) -> dict:
     """
     schema = load_yaml(schema_path)
     _settle(config, schema)
-    found = faults(config, schema)
-    if found:
-        raise InputError("configuration refused: " + "\n  ".join(found))
+    lines = faults(config, schema)
+    if lines:
+        raise InputError("configuration refused: " + "\n  ".join(lines))
     return config
 
 
@@ -112,12 +112,12 @@ def overlaid(overlays: Iterable[str | Path]) -> dict:
 
 def main(arguments: list[str]) -> None:
     """Write the merged configuration next to a run's results."""
-    options = parser("lowalt.config.layers", "Write the merged configuration as YAML.")
-    options.add_argument("--out", required=True)
-    given = options.parse_args(arguments)
-    with replacing(given.out) as temporary:
-        temporary.write_text(yaml.safe_dump(given.settings, sort_keys=False, allow_unicode=True))
-    print(f"{given.out}: written", file=sys.stderr)
+    line = parser("lowalt.config.layers", "Write the merged configuration as YAML.")
+    line.add_argument("--out", required=True)
+    options = line.parse_args(arguments)
+    with replacing(options.out) as temporary:
+        temporary.write_text(yaml.safe_dump(options.settings, sort_keys=False, allow_unicode=True))
+    print(f"{options.out}: written", file=sys.stderr)
 
 
 if __name__ == "__main__":

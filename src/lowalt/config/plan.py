@@ -25,6 +25,14 @@ RECORD_BYTES = 2048
 """Space of a sample's JSON record in the tar, padded."""
 PIXEL_BYTES = 0.5
 """Bytes that a shard holds for each pixel of a tile: at most so many were measured."""
+CELL_BYTES = {"complex64": 8, "int16": 4}
+"""Bytes of a range cell of a cube, by the number that it is stored as."""
+TRUTH_BYTES = 47
+"""Bytes of the record for what is true of a cube at one symbol: the chosen cell and five numbers of six decimals."""
+
+
+EVERY = 2**53
+"""Samples of a shard where none is too many."""
 
 
 def snrs_of(config: dict) -> tuple[float, ...]:
@@ -55,18 +63,24 @@ def _refuse_tracks(config: dict) -> None:
         raise InputError(f"effects: {jumping} together with motion.looks, expected none of {list(JUMPING)}")
 
 
+def cube_number(config: dict) -> str:
+    """Return the number as which the cells of cubes are stored: "complex64" or "int16"."""
+    return config["shards"].get("number", "complex64")
+
+
 def sample_bytes(config: dict) -> int:
     """Return the approximate bytes of a sample in a shard, padding included, by its kind; of recipes, its share."""
     kind, stations = config["shards"]["kind"], len(config["network"]["stations"])
+    symbols, record = stations * config["network"]["symbols"], RECORD_BYTES
     if kind == "image":
         spectra = sum(isinstance(block, dict) for block in config["spectra"].values())
         data = int(PIXEL_BYTES * stations * spectra * config["images"]["size"] ** 2)
+    elif kind == "cube":
+        record += TRUTH_BYTES * symbols
+        data = 128 + CELL_BYTES[cube_number(config)] * symbols * config["network"]["subcarriers"]
     else:
-        data = 128 + 8 * stations * config["network"]["symbols"]
-    if kind == "cube":
-        # The truth of a symbol takes some 60 bytes of the record.
-        data = data * config["network"]["subcarriers"] + 60 * stations * config["network"]["symbols"]
-    whole = 2 * BLOCKSIZE + RECORD_BYTES + data + -data % BLOCKSIZE
+        data = 128 + 8 * symbols
+    whole = 2 * BLOCKSIZE + sum(size + -size % BLOCKSIZE for size in (record, data))
     return whole // len(snrs_of(config)) if kind == "recipe" else whole
 
 
@@ -98,7 +112,7 @@ class Plan:
     split: dict
     seed: int
     steps: tuple[tuple[tuple[str, ...], tuple[float, ...]], ...]
-    largest: float = float("inf")
+    largest: float = EVERY
     looks: int = 1
 
     @classmethod
@@ -133,7 +147,7 @@ class Plan:
         levels = [tuple(map(float, step.get("snr_db", []))) for step in (config["noise"], *config.get("added", []))]
         subtypes = [tuple(name for name in names if name not in more), *later]
         steps = tuple(zip(subtypes, levels, strict=True))
-        largest = float("inf")
+        largest: float = EVERY
         if config.get("shards", {}).get("largest_mb"):
             largest = max(1, 1e6 * config["shards"]["largest_mb"] // sample_bytes(config))
         looks = motion.get("looks", 1)
@@ -143,27 +157,32 @@ class Plan:
     @cached_property
     def _chunks(self) -> dict[str, Chunk]:
         """All chunks by name, step by step: subtypes of a step at all SNRs so far, then its SNRs for all chunks."""
-        found: dict[str, Chunk] = {}
+        chunks: dict[str, Chunk] = {}
         known: tuple[float, ...] = ()
         for step, (subtypes, snrs) in enumerate(self.steps):
-            earlier = [chunk for chunk in found.values() if chunk.name == chunk.source]
+            earlier = [chunk for chunk in chunks.values() if chunk.name == chunk.source]
             if snrs and step:
                 for chunk in earlier:
                     name = f"{chunk.name}s{step}"
-                    found[name] = Chunk(name, chunk.name, chunk.members, snrs, chunk.first, chunk.count)
+                    chunks[name] = Chunk(name, chunk.name, chunk.members, snrs, chunk.first, chunk.count)
             known += snrs
             for group, part in ((group, part) for group in self.groups for part in range(self._parts)):
                 members = tuple(name for name in self.groups[group] if name in subtypes)
                 name, first = f"{group}-{part:05d}{f't{step}' if step else ''}", part * self.models_per_chunk
                 count = min(self.models_per_chunk, self.models - first)
                 if members:
-                    found[name] = Chunk(name, name, members, known, first, count)
-        return found
+                    chunks[name] = Chunk(name, name, members, known, first, count)
+        return chunks
 
     @property
     def _parts(self) -> int:
         """Number of chunks that hold the motion models of one group, the last one possibly smaller."""
         return -(-self.models // self.models_per_chunk)
+
+    @property
+    def samples(self) -> int:
+        """Number of all samples."""
+        return sum(chunk.count * len(chunk.members) * len(chunk.snrs) for chunk in self._chunks.values())
 
     @property
     def chunks(self) -> list[str]:
@@ -188,13 +207,13 @@ class Plan:
         held = self._chunks[chunk]
         if held.count // self.looks % sum(self.split[name] for name in FOLDS) == 0:
             return [name for name in FOLDS if self.split[name]]
-        found = {
+        dealt = {
             fold(self.split, self.seed, subtype, model // self.looks, snr)
             for subtype in held.members
             for model in range(held.first, held.first + held.count, self.looks)
             for snr in held.snrs
         }
-        return [name for name in FOLDS if name in found]
+        return [name for name in FOLDS if name in dealt]
 
     def pieces(self, chunk: str, fold: str) -> list[str]:
         """Return what the names of a chunk's shards of one fold end on: nothing, or p0, p1, ... for several."""

@@ -132,8 +132,8 @@ def check_brought(part: str, settings: object, where: str | Path) -> None:
     Raises: InputError naming the file, the first key that is wrong, its value and what was expected.
     """
     try:
-        found = faults(settings, {"$ref": f"#/$defs/{part}", "$defs": _brought()}, part)
+        lines = faults(settings, {"$ref": f"#/$defs/{part}", "$defs": _brought()}, part)
     except RecursionError:
         raise InputError(f"{where}: values stand in each other too deeply, expected a few levels") from None
-    if found:
-        raise InputError(f"{where}: {found[0]}")
+    if lines:
+        raise InputError(f"{where}: {lines[0]}")

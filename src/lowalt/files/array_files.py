@@ -32,12 +32,12 @@ def array_of(path: str | Path, what: str, mapped: bool = False) -> np.ndarray:
     """
     path = existing(path, what)
     try:
-        found = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
+        array = np.load(path, mmap_mode="r" if mapped else None, allow_pickle=False)
     except UNREADABLE as error:
         raise InputError(f"{path}: not a whole {what} file ({error})") from error
-    if not isinstance(found, np.ndarray):
+    if not isinstance(array, np.ndarray):
         raise InputError(f"{path}: an archive of arrays, expected {what}, one array (.npy)")
-    return found
+    return array
 
 
 def checked_archive(path: str | Path, what: str) -> Path:

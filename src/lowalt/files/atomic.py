@@ -95,10 +95,10 @@ def existing(path: str | Path, what: str) -> Path:
     """
     path = Path(path)
     try:
-        found = path.is_file()
+        there = path.is_file()
     except OSError as error:
         raise InputError(f"{what}: no file at {path} ({error.strerror})") from error
-    if not found:
+    if not there:
         raise InputError(f"{what}: no file at {path}")
     return path
 

@@ -24,9 +24,9 @@ def download(address: str, target: Path, pinned: str, checksum: Callable[[Path],
                 shutil.copyfileobj(source, file)
         except (urllib.error.URLError, OSError, ValueError) as error:
             raise InputError(f"{address}: download failed ({error})") from None
-        found = checksum(temporary)
-        if found != pinned:
-            raise InputError(f"{address}: SHA-256 is {found}, expected {pinned}; nothing was kept")
+        digest = checksum(temporary)
+        if digest != pinned:
+            raise InputError(f"{address}: SHA-256 is {digest}, expected {pinned}; nothing was kept")
 
 
 def fetch_each(names: Iterable[str], fetch: Callable[[str], bool]) -> None:

@@ -22,8 +22,8 @@ KEYS = (
 
 def shipped(name: str | Path) -> Path:
     """Return `name` where the working directory has it, else the package's file of this name, if there is one."""
-    found = SHIPPED / name
-    return found if found.exists() and not Path(name).exists() else Path(name)
+    path = SHIPPED / name
+    return path if path.exists() and not Path(name).exists() else Path(name)
 
 
 def located(config: dict, folder: Path = SHIPPED) -> dict:
@@ -32,11 +32,11 @@ def located(config: dict, folder: Path = SHIPPED) -> dict:
     A run in another folder, or another workflow that uses this one as a module, finds config/targets.csv that way.
     """
 
-    def found(name: str) -> str:
+    def packaged(name: str) -> str:
         """The path in `folder` of a file that only it has, else the name."""
         return str(folder / name) if not Path(name).exists() and (folder / name).exists() else name
 
-    return _renamed(config, found)
+    return _renamed(config, packaged)
 
 
 def as_named(config: dict, folder: Path = SHIPPED) -> dict:

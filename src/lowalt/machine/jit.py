@@ -9,6 +9,8 @@ parts, such as the product of complex numbers, are compiled for each set of opti
 kernel of a process to call a function would decide how that function rounds in all others.
 """
 
+import contextlib
+import functools
 import hashlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,7 +25,8 @@ from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import rtsys
 from numba.core.targetconfig import ConfigStack
 
-from lowalt.machine.turns import Turn
+PATIENCE_S = 180.0
+"""After so long a process goes on without its turn: doing the work twice is better than standing still."""
 
 
 def _text_of(value) -> str:
@@ -124,10 +127,15 @@ class _DigestCache(FunctionCache):
     options: dict[str, Any] | None = None
     """How the function is compiled."""
 
-    def __init__(self, function):
-        super().__init__(function)
+    @functools.cached_property
+    def turn(self):
+        """The lock under which one process at a time compiles this function."""
+        # Only who compiles needs the module, whose import takes a twentieth of a job's start.
+        from filelock import FileLock
+
         # In a folder of its own: tools that list kept machine code see no other file.
-        self._turn = Turn(Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock")
+        path = Path(self.cache_path) / "turns" / f"{self._impl.filename_base}.lock"
+        return FileLock(path, timeout=PATIENCE_S)
 
     def _index_key(self, sig, codegen):
         """Numba's key, the digest of the code, the fields of named tuples among the arguments, and a missing entry."""
@@ -141,22 +149,23 @@ class _DigestCache(FunctionCache):
         Like numba's method, except that it does not load the compiler before it looks for finished machine code, and
         that it waits while another process compiles this function.
         """
-        found = self._kept(sig, target_context)
-        if found is None and self._enabled:
+        code = self._kept(sig, target_context)
+        if code is None and self._enabled:
             # Numba asks for a function's callees while it compiles it. Kernels do not call each other in a circle, so
             # no two processes wait for each other.
-            self._turn.take()
-            found = self._kept(sig, target_context)
-            if found is not None:
-                self._turn.give()
-        return found
+            with contextlib.suppress(OSError, RuntimeError):
+                self.turn.acquire()
+            code = self._kept(sig, target_context)
+            if code is not None:
+                self.turn.release()
+        return code
 
     def save_overload(self, sig, data):
         """Keep machine code as numba's method does, then let other processes go on."""
         try:
             super().save_overload(sig, data)
         finally:
-            self._turn.give()
+            self.turn.release()
 
     def _kept(self, sig, target_context):
         """Finished machine code for a signature, None where none is kept."""

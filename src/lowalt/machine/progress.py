@@ -63,10 +63,10 @@ def last(log: str | Path, since: float = 0.0) -> Progress | None:
             if os.fstat(file.fileno()).st_mtime < since - 1:
                 return None
             file.seek(max(0, file.seek(0, 2) - TAIL_BYTES))
-            found = LINE.findall(file.read())
+            marks = LINE.findall(file.read())
     except OSError:
         return None
-    if not found:
+    if not marks:
         return None
-    done, total, unit = found[-1]
+    done, total, unit = marks[-1]
     return Progress(int(done), int(total), unit.decode())

@@ -19,7 +19,7 @@ def in_turn(
             for _ in range(times if turn < rounds else 0):
                 seconds, results[index] = once(call, clock)
                 spent[index].append(seconds)
-    return [(statistics.median(own), result) for own, result in zip(spent, results, strict=True)]
+    return [(statistics.median(times), result) for times, result in zip(spent, results, strict=True)]
 
 
 def median_s(work: Callable[[], object], repeats: int) -> float:

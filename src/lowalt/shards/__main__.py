@@ -1,7 +1,7 @@
-"""`python -m lowalt.shards write | index | verify | remake`: pack samples, list, check and make them again."""
+"""`python -m lowalt.shards write | index`: pack samples into a shard, list the shards of a data set.
 
-import argparse
-from collections.abc import Iterable
+`lowalt verify` and `lowalt remake` check what was packed.
+"""
 
 from lowalt.config.classes import stated
 from lowalt.config.command import dispatch, parser, pick, run
@@ -11,8 +11,7 @@ from lowalt.motion import read_table
 from lowalt.shards.content import clean_content, cube_content, noisy_content
 from lowalt.shards.index import build
 from lowalt.shards.record import accompanied
-from lowalt.shards.table import KINDS
-from lowalt.shards.verify import faults
+from lowalt.shards.sample_table import KINDS
 from lowalt.shards.write import ChunkSamples, write_shard
 from lowalt.targets.cloud import read as read_cloud
 from lowalt.targets.occluders import read_all
@@ -25,53 +24,48 @@ def write(arguments: list[str]) -> None:
     Settings: seed, network, snr_db, split, shards {kind}; also the settings of companions in a scene that has them, and
     those of canceller for recipe shards, and echo {tolerance, effects} for cube shards.
     """
-    options = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
-    options.add_argument("--motion", required=True, help="the chunk's motion table")
-    options.add_argument("--signals", help="the chunk's noisy signals (.npy, complex64); image and signal shards")
-    options.add_argument("--tiles", help="the chunk's tiles (.npz); image shards")
-    options.add_argument(
-        "--echoes", nargs="+", help="the chunk's clean echoes (.npy), one file a station; recipe shards"
-    )
-    options.add_argument(
-        "--powers", nargs="+", help="powers that SNRs refer to (.npy), one file a station; recipe shards"
-    )
-    options.add_argument("--clouds", nargs="*", default=[], help="clouds of the chunk's subtypes; cube shards")
-    options.add_argument("--occluders", nargs="*", default=[], help="surfaces of the chunk's subtypes; cube shards")
-    options.add_argument("--fold", required=True, help="train, val or test")
-    options.add_argument("--piece", nargs=2, type=int, default=(0, 1), metavar=("NUMBER", "COUNT"),
-                         help="the shard's place among the shards of the fold")  # fmt: skip
-    options.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz next to it")
-    given = options.parse_args(arguments)
-    classes = _classes(given.settings)
-    canceller = given.settings.pop("canceller", None)
-    added = {name: given.settings.pop(name) for name in ("companions",) if name in given.settings}
-    echo = given.settings.pop("echo", {})
-    seed, network, snrs, split, shards = pick(given.settings, "seed", "network", "snr_db", "split", "shards")
-    kind, _ = pick({"largest_mb": None, **shards}, "kind", "largest_mb")
-    if not 0 <= given.piece[0] < given.piece[1]:
-        raise InputError(f"--piece: {given.piece}, expected 0 <= NUMBER < COUNT")
+    line = parser("lowalt.shards write", "Pack the samples of one chunk and fold into a shard.")
+    line.add_argument("--motion", required=True, help="the chunk's motion table")
+    line.add_argument("--signals", help="the chunk's noisy signals (.npy, complex64); all kinds but recipe")
+    line.add_argument("--tiles", help="the chunk's tiles (.npz); image shards")
+    line.add_argument("--echoes", nargs="+", help="the chunk's clean echoes (.npy), one file a station; recipe shards")
+    line.add_argument("--powers", nargs="+", help="powers that SNRs refer to (.npy), a file a station; recipe shards")
+    line.add_argument("--clouds", nargs="*", default=[], help="clouds of the chunk's subtypes; cube shards")
+    line.add_argument("--occluders", nargs="*", default=[], help="surfaces of the chunk's subtypes; cube shards")
+    line.add_argument("--fold", required=True, help="train, val or test")
+    line.add_argument("--piece", nargs=2, type=int, default=(0, 1), metavar=("NUMBER", "COUNT"),
+                      help="the shard's place among the shards of the fold")  # fmt: skip
+    line.add_argument("--out", required=True, help="shard to write (.tar); its table is the .npz next to it")
+    options = line.parse_args(arguments)
+    settings = options.settings
+    classes, canceller, echo = _classes(settings), settings.pop("canceller", None), settings.pop("echo", {})
+    beside = {"companions": settings.pop("companions")} if "companions" in settings else {}
+    seed, network, snrs, split, shards = pick(settings, "seed", "network", "snr_db", "split", "shards")
+    kind, _, number = pick({"largest_mb": None, "number": "complex64", **shards}, "kind", "largest_mb", "number")
+    if not 0 <= options.piece[0] < options.piece[1]:
+        raise InputError(f"--piece: {options.piece}, expected 0 <= NUMBER < COUNT")
     if kind not in KINDS:
         raise InputError(f"shards.kind is {kind!r}, expected one of {KINDS}")
-    rows = [accompanied(row, added, seed) for row in read_table(given.motion)]
+    rows = [accompanied(row, beside, seed) for row in read_table(options.motion)]
     scene, powers = {"seed": seed, "network": network, **echo}, None
     snrs, network = [float(snr) for snr in snrs], Network.from_settings(network)
-    if kind == "cube":
-        clouds = {cloud.subtype: cloud for cloud in map(read_cloud, given.clouds)}
-        cubes = Cubes.from_settings(scene, clouds, read_all(given.occluders) if given.occluders else None)
-        content = cube_content(given.signals, cubes, rows, snrs, network)
-    elif kind == "recipe":
-        content, powers = clean_content(given.echoes, given.powers, network, len(rows))
+    if kind == "recipe":
+        content, powers = clean_content(options.echoes, options.powers, network, len(rows))
+    elif kind == "cube":
+        clouds = {cloud.subtype: cloud for cloud in map(read_cloud, options.clouds)}
+        cubes = Cubes.from_settings(scene, clouds, read_all(options.occluders) if options.occluders else None)
+        content = cube_content(options.signals, cubes, rows, snrs, number)
     else:
-        content = noisy_content(kind, given.signals, given.tiles, network, (len(rows), len(snrs)))
+        content = noisy_content(kind, options.signals, options.tiles, network, (len(rows), len(snrs)))
     samples = ChunkSamples(rows, snrs, split, seed, network, classes, powers, canceller)
-    write_shard(given.out, samples, given.fold, kind, content, tuple(given.piece))
+    write_shard(options.out, samples, options.fold, kind, content, tuple(options.piece))
 
 
 def _classes(settings: dict) -> tuple[str, ...]:
     """Remove the classes from a command's settings and return them: the published ones if the settings name none."""
-    found = stated(settings)
+    classes = stated(settings)
     settings.pop("classes", None)
-    return found
+    return classes
 
 
 def index(arguments: list[str]) -> None:
@@ -80,62 +74,16 @@ def index(arguments: list[str]) -> None:
     Settings: network, spectra, images (how a loader renders signals), echo {tolerance, effects} where it is known, and
     the classes in the order of their labels where they are not the published ones.
     """
-    options = parser("lowalt.shards index", "List shards with counts and checksums.")
-    options.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables next to them")
-    options.add_argument("--out", required=True, help="index to write (.json)")
-    given = options.parse_args(arguments)
-    echo = given.settings.pop("echo", None)
-    classes = _classes(given.settings)
-    pick(given.settings, "network", "spectra", "images")
-    build(given.shards, given.settings, given.out, echo, classes)
+    line = parser("lowalt.shards index", "List shards with counts and checksums.")
+    line.add_argument("--shards", nargs="+", required=True, help="shards (.tar), their tables next to them")
+    line.add_argument("--out", required=True, help="index to write (.json)")
+    options = line.parse_args(arguments)
+    echo, classes = options.settings.pop("echo", None), _classes(options.settings)
+    pick(options.settings, "network", "spectra", "images")
+    build(options.shards, options.settings, options.out, echo, classes)
 
 
-def _clouds_option(options: argparse.ArgumentParser) -> None:
-    """Add the options that name the folders of clouds and surfaces."""
-    options.add_argument("--clouds", help="folder of the run's cloud files (default: ../clouds)")
-    options.add_argument("--occluders", help="folder of the run's surface files (default: occluders next to clouds)")
-
-
-def _ended(lines: Iterable[str]) -> None:
-    """Print every fault and end with status 1 where there is one."""
-    found = 0
-    for line in lines:
-        print(line)
-        found += 1
-    if found:
-        raise SystemExit(1)
-
-
-def verify(arguments: list[str]) -> None:
-    """Check every byte of a data set; print every fault and end with status 1 where there is one."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards verify", description=verify.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--remake", type=int, default=0, metavar="N", help="also make N random samples again")
-    _clouds_option(options)
-    given = options.parse_args(arguments)
-    _ended(faults(given.index))
-    if given.remake:
-        from lowalt.shards.remake import opened, some
-
-        remaker = opened(given.index, given.clouds, given.occluders)
-        _ended(line for number in some(remaker.shards, given.remake) for line in remaker.faults(number))
-
-
-def remake(arguments: list[str]) -> None:
-    """Make samples again from their records; print each difference, and end with status 1 if there is one."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards remake", description=remake.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--sample", required=True, nargs="+", metavar="KEY", help="keys of the samples")
-    _clouds_option(options)
-    given = options.parse_args(arguments)
-    from lowalt.shards.remake import number_of, opened
-
-    remaker = opened(given.index, given.clouds, given.occluders)
-    _ended(line for key in given.sample for line in remaker.faults(number_of(remaker.shards, key)))
-    print(f"{len(given.sample)} samples made again, equal in every byte")
-
-
-COMMANDS = {"write": write, "index": index, "verify": verify, "remake": remake}
+COMMANDS = {"write": write, "index": index}
 
 
 def main(arguments: list[str]) -> None:

@@ -4,16 +4,15 @@
 """
 
 import argparse
-import functools
 import sys
 from pathlib import Path
 
 import numpy as np
 
 from lowalt.config.command import run
-from lowalt.config.layers import merge
+from lowalt.config.layers import SCHEMA, load
+from lowalt.config.plan import cube_number
 from lowalt.files.atomic import slug
-from lowalt.files.yaml_files import load_yaml
 from lowalt.motion.table import write_table
 from lowalt.shards.clean import refuse
 from lowalt.shards.dataset import Dataset, Place
@@ -57,6 +56,7 @@ def rows_of(dataset: Dataset, chunk: str) -> list[dict]:
 def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[Path]:
     """Write the motion table and the shards of one chunk; return the shards' paths."""
     plan, maker, rows = dataset.plan, dataset.maker, rows_of(dataset, chunk)
+    how = cube_number(dataset.config)
     levels = plan.chunk(chunk).snrs
     group, _, part = chunk.partition("-")
     if chunk in plan.sources:
@@ -65,11 +65,10 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
     maker.kept = len(rows)
 
     def content(number: int, level: int) -> tuple[bytes, dict]:
-        """The data of one sample, row `number` at SNR `level` of the chunk, and what its record tells of its cubes."""
+        """The data of one sample, row `number` at SNR `level` of the chunk, and what its record says of its cubes."""
         if kind == "recipe":
             return npy(maker.received(rows[number])[0]), {}
-        signal = maker.signal(rows[number], levels[level])
-        return maker.data(kind, signal, rows[number], levels[level])
+        return maker.data(kind, maker.signal(rows[number], levels[level]), rows[number], levels[level], how)
 
     powers, effects = None, maker.echo["effects"]
     canceller = (effects["canceller"] or {}) if "canceller" in effects else None
@@ -90,15 +89,14 @@ def write_chunk(dataset: Dataset, folder: Path, chunk: str, kind: str) -> list[P
 
 def main(arguments: list[str]) -> None:
     """Write clouds, motion tables and shards of a merged configuration."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards.build", description=main.__doc__)
-    options.add_argument("--config", required=True, nargs="+", help="merged configuration, or a base and its overlays")
-    options.add_argument("--inputs", help="folder of the meshes and recordings that the records name")
-    options.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
-    options.add_argument("--out", required=True, help="folder to write into")
-    given = options.parse_args(arguments)
-    config = functools.reduce(merge, map(load_yaml, given.config))
-    dataset = Dataset(config, given.clouds, inputs=given.inputs)
-    write_run(dataset, given.out, dataset.config["shards"]["kind"])
+    line = argparse.ArgumentParser(prog="python -m lowalt.shards.build", description=main.__doc__)
+    line.add_argument("--config", required=True, nargs="+", help="merged configuration, or a base and its overlays")
+    line.add_argument("--inputs", help="folder of the meshes and recordings that the records name")
+    line.add_argument("--clouds", help="folder of finished cloud files (default: clouds are made)")
+    line.add_argument("--out", required=True, help="folder to write into")
+    options = line.parse_args(arguments)
+    dataset = Dataset(load(options.config, SCHEMA), options.clouds, inputs=options.inputs)
+    write_run(dataset, options.out, dataset.config["shards"]["kind"])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index; the folder can be published.
+"""The data card: README.md, samples.csv, croissant.json and SHA256SUMS next to the index: the folder can be published.
 
 A command of its own, `python -m lowalt.shards.card`, so that a change of wording packs no shard again.
 """
@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+import jinja2
 import yaml
 
 from lowalt import __version__
@@ -19,36 +20,24 @@ from lowalt.config.network import station_names
 from lowalt.files.atomic import replacing, sha256, text_of
 from lowalt.files.csv_tables import write_csv
 from lowalt.files.errors import InputError
-from lowalt.shards import sums
-from lowalt.shards.card_kinds import MEMBERS, READING, WHAT
+from lowalt.shards import checksums
 from lowalt.shards.croissant import FIELDS, metadata
-from lowalt.shards.hub import TAGS, front
+from lowalt.shards.hub import front
 from lowalt.shards.read import ShardSet
-from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.sample_table import EXTENSIONS
 
 SLUG = re.compile(r"(.+)-\d{6}-snr")
 PAPER = "H. Luo et al., Networked ISAC Enabled Target Recognition Towards Low-Altitude Economy"
 LICENSES = {"MIT": "https://opensource.org/license/mit", "CC-BY-4.0": "https://creativecommons.org/licenses/by/4.0/"}
 
-AUTHORS = "The lowalt authors"
-
-ODDITIES = """\
-- Doppler folds at half the symbol rate by design: rotors, cars and most UAVs alias, as in the published setting.
-- At every range-cell crossing the signal jumps in phase by nearly pi: the stripes of fast cars are real.
-- Published wheel diameters are rim sizes, so wheels turn faster than real ones; runners move at walking speed; bird
-  sizes are small. They are followed as published.
-- Six SNRs of one motion model are nearly the same picture: split by motion model, as the folds here do, unless
-  `split.by` is `sample` (the published way, which leaks motions from training into test).
-- Each image is scaled by its own largest value: absolute echo strength, and with it range, is not in the images. It is
-  in the signals.
-"""
-
-LIMITS = """\
-- Simulated: scattering points in free space with equal or modelled cross sections; no clutter, no multipath, no
-  occlusion, no receiver impairments unless the configuration below names them as effects.
-- Built-in targets are parametric models with published sizes and rates, not measured craft, animals or people.
-- One target a sample, tracked perfectly: the strongest range cell of every symbol is the target's.
-"""
+TEMPLATE = Path(__file__).with_name("card.md.jinja")
+WHAT = {
+    "image": "{stations} x {columns} tiles of time-frequency images",
+    "signal": "complex symbol-domain signals",
+    "cube": "all range cells of every symbol, complex, with noise",
+    "recipe": "clean complex symbol-domain echoes, to which lowalt adds the noise of each sample",
+}
+"""Name of the data in the description, by kind of shards."""
 
 
 def _table(header: tuple[str, ...], rows: list[tuple]) -> str:
@@ -62,10 +51,10 @@ def _slug(key: str) -> str:
 
     Raises: InputError naming a key of another form.
     """
-    found = SLUG.match(key)
-    if found is None:
+    parts = SLUG.match(key)
+    if parts is None:
         raise InputError(f"sample key {key!r}: expected SUBTYPE-MODEL-snrSNR")
-    return found[1]
+    return parts[1]
 
 
 def _census(shards: ShardSet) -> tuple[dict[str, dict], Counter, Counter]:
@@ -133,79 +122,22 @@ def description(shards: ShardSet) -> str:
 
 def readme(shards: ShardSet, config: str, name: str, license_name: str) -> str:
     """Return the data card as Markdown with the metadata block that dataset hubs read; `config`: the run's YAML."""
-    images = len(shards.columns())
-    example = shards.shards[0]["path"] if shards.shards else "SHARD.tar"
-    first = shards.record(0) if len(shards) else {"versions": {"lowalt": __version__}}
-    return f"""---
-{yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip()}
----
-# {name}
-
-{description(shards)}
-
-## What is in it
-
-{_counts(shards)}
-## How to read it
-
-{READING[shards.kind].format(spectra=", ".join(name.upper() for name in shards.spectra))}
-`samples.csv` lists all samples, `index.json` the shards with their SHA-256, and the `.npz` beside a shard the offset,
-size and SHA-256 of each of its samples; `croissant.json` describes all of it to machines.
-
-```python
-import datasets
-samples = datasets.load_dataset("FOLDER OR REPOSITORY", "seen", split="train")
-
-import webdataset
-for sample in webdataset.WebDataset("{example}", shardshuffle=False).decode("pil"):
-    print(sample["__key__"], sample["json"]["category"], sample["{MEMBERS[shards.kind]}"])
-
-from lowalt.shards import ShardSet
-shards = ShardSet("index.json", groups=["seen"], folds=["train"])
-images, label = shards.images(0, size=224), shards.labels[0]  # ({images}, 224, 224) uint8
-```
-
-`python -m lowalt.shards verify --index index.json` checks every byte of every file and names what is damaged;
-`sha256sum --check SHA256SUMS` does the same without this package, file by file.
-
-**Protocols.** *seen*: train, val and test folds of both groups. *unseen*: folds of the `seen` group, and all folds
-of the `unseen` group as the test on subtypes that training has not met.
-
-## Known limits
-
-{LIMITS}
-## Oddities to know
-
-{ODDITIES}
-## Licence
-
-{license_name} ({LICENSES[license_name]}). Inputs that a user adds (meshes, recordings) keep their own licences.
-
-## What made it
-
-{_table(("package", "version"), sorted(first["versions"].items()))}
-The exact configuration, which makes the same bytes again with these versions:
-
-```yaml
-{config.strip()}
-```
-"""
-
-
-def zenodo(shards: ShardSet, name: str, license_name: str) -> dict:
-    """Return the data set's metadata as Zenodo's deposits take it.
-
-    Source: Zenodo's developer documentation, deposit metadata.
-    """
-    return {
-        "title": name, "upload_type": "dataset", "description": description(shards), "version": __version__,
-        "creators": [{"name": AUTHORS}], "access_right": "open", "license": license_name.lower(), "language": "eng",
-        "keywords": TAGS,
-    }  # fmt: skip
+    versions = shards.record(0)["versions"] if len(shards) else {"lowalt": __version__}
+    # Blocks of the template leave no lines of their own.
+    templates = jinja2.Environment(
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, undefined=jinja2.StrictUndefined
+    )
+    return templates.from_string(TEMPLATE.read_text()).render(
+        front=yaml.safe_dump(front(shards, name, license_name), sort_keys=False).strip(), name=name, kind=shards.kind,
+        description=description(shards), counts=_counts(shards), config=config.strip(), images=len(shards.columns()),
+        spectra=", ".join(spectrum.upper() for spectrum in shards.spectra), extension=EXTENSIONS[shards.kind],
+        example=shards.shards[0]["path"] if shards.shards else "SHARD.tar", license=license_name,
+        license_address=LICENSES[license_name], versions=_table(("package", "version"), sorted(versions.items())),
+    )  # fmt: skip
 
 
 def write(index_path: str | Path, config_path: str | Path, license_name: str = "MIT", **facts: str) -> None:
-    """Write README.md, samples.csv, croissant.json and .zenodo.json next to an index, and the checksums of all of it.
+    """Write README.md, samples.csv and croissant.json next to an index, and the checksums of all of it.
 
     facts: further properties of the Croissant description, such as `url` and `datePublished`.
     Raises: InputError where the licence is not one of LICENSES, or a file is missing or damaged.
@@ -226,22 +158,20 @@ def write(index_path: str | Path, config_path: str | Path, license_name: str = "
     }  # fmt: skip
     with replacing(folder / "croissant.json") as temporary:
         temporary.write_text(json.dumps(metadata(shards.index, table, known), indent=1) + "\n")
-    with replacing(folder / ".zenodo.json") as temporary:
-        temporary.write_text(json.dumps(zenodo(shards, name, license_name), indent=1) + "\n")
-    sums.write(index_path, shards.index)
+    checksums.write(index_path, shards.index)
 
 
 def main(arguments: list[str]) -> None:
     """Write the data card, the table of samples and the Croissant description next to the index."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
-    options.add_argument("--index", required=True, help="the data set's index")
-    options.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
-    options.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
-    options.add_argument("--url", help="where the data set will be published")
-    options.add_argument("--date", help="day of publication, YYYY-MM-DD")
-    given = options.parse_args(arguments)
-    facts = {"url": given.url, "datePublished": given.date}
-    write(given.index, given.config, given.license, **{key: text for key, text in facts.items() if text})
+    line = argparse.ArgumentParser(prog="python -m lowalt.shards.card", description=main.__doc__)
+    line.add_argument("--index", required=True, help="the data set's index")
+    line.add_argument("--config", required=True, help="the merged configuration that made it (.yaml)")
+    line.add_argument("--license", default="MIT", choices=sorted(LICENSES), help="licence of the data (default MIT)")
+    line.add_argument("--url", help="where the data set will be published")
+    line.add_argument("--date", help="day of publication, YYYY-MM-DD")
+    options = line.parse_args(arguments)
+    facts = {"url": options.url, "datePublished": options.date}
+    write(options.index, options.config, options.license, **{key: text for key, text in facts.items() if text})
 
 
 if __name__ == "__main__":

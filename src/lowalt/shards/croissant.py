@@ -4,52 +4,28 @@ Source: Croissant format specification 1.1 (MLCommons).
 """
 
 from lowalt.config.classes import stated
-from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.sample_table import EXTENSIONS
 from lowalt.spectra.catalogue import named
 
+TERMS = """
+    arrayShape citeAs column containedIn dataBiases dataCollection equivalentProperty extract field fileObject
+    fileProperty fileSet format includes isArray isLiveDataset jsonPath key md5 parentField path
+    personalSensitiveInformation recordSet references regex repeated replace samplingRate separator source subField
+    transform
+"""
+"""Words of the format that stand for themselves."""
 CONTEXT = {
     "@language": "en",
     "@vocab": "https://schema.org/",
-    "arrayShape": "cr:arrayShape",
-    "citeAs": "cr:citeAs",
-    "column": "cr:column",
-    "conformsTo": "dct:conformsTo",
-    "containedIn": "cr:containedIn",
     "cr": "http://mlcommons.org/croissant/",
-    "data": {"@id": "cr:data", "@type": "@json"},
-    "dataBiases": "cr:dataBiases",
-    "dataCollection": "cr:dataCollection",
-    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
     "dct": "http://purl.org/dc/terms/",
-    "equivalentProperty": "cr:equivalentProperty",
-    "examples": {"@id": "cr:examples", "@type": "@json"},
-    "extract": "cr:extract",
-    "field": "cr:field",
-    "fileObject": "cr:fileObject",
-    "fileProperty": "cr:fileProperty",
-    "fileSet": "cr:fileSet",
-    "format": "cr:format",
-    "includes": "cr:includes",
-    "isArray": "cr:isArray",
-    "isLiveDataset": "cr:isLiveDataset",
-    "jsonPath": "cr:jsonPath",
-    "key": "cr:key",
-    "md5": "cr:md5",
-    "parentField": "cr:parentField",
-    "path": "cr:path",
-    "personalSensitiveInformation": "cr:personalSensitiveInformation",
-    "recordSet": "cr:recordSet",
     "rai": "http://mlcommons.org/croissant/RAI/",
-    "references": "cr:references",
-    "regex": "cr:regex",
-    "repeated": "cr:repeated",
-    "replace": "cr:replace",
-    "samplingRate": "cr:samplingRate",
     "sc": "https://schema.org/",
-    "separator": "cr:separator",
-    "source": "cr:source",
-    "subField": "cr:subField",
-    "transform": "cr:transform",
+    "conformsTo": "dct:conformsTo",
+    "data": {"@id": "cr:data", "@type": "@json"},
+    "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+    "examples": {"@id": "cr:examples", "@type": "@json"},
+    **{term: f"cr:{term}" for term in TERMS.split()},
 }
 
 FIELDS = {
@@ -66,24 +42,16 @@ FIELDS = {
 }
 """Columns of the table of all samples: data type and meaning; the label's meaning names the classes."""
 
+ARRAY = "application/octet-stream", "sc:Text"
 MEDIA = {
     "image": ("image/png", "sc:ImageObject", "{} x {} palette PNG: rows are stations, columns {}."),
-    "signal": (
-        "application/octet-stream",
-        "sc:Text",
-        "Signals (stations, symbols, re and im), float32, as an .npy file.",
-    ),
-    "cube": (
-        "application/octet-stream",
-        "sc:Text",
-        "Range cells with noise (stations, symbols, cells, re and im), float32, as an .npy file.",
-    ),
-    "recipe": (
-        "application/octet-stream",
-        "sc:Text",
-        "Echoes without noise of a motion model (stations, symbols, re and im), float32, as an .npy file.",
-    ),
-}
+    "signal": (*ARRAY, "Signals (stations, symbols, re and im), float32, as an .npy file."),
+    "cube": (*ARRAY, "Range cells with noise (stations, symbols, cells, re and im), float32 or int16 times the "
+             "record's step, as an .npy file."),
+    "recipe": (*ARRAY, "Echoes without noise of a motion model (stations, symbols, re and im), float32, as an .npy "
+               "file."),
+}  # fmt: skip
+"""Media type, Croissant's data type, and meaning of the member next to the record, by kind of shards."""
 OF = {"image": "sample", "signal": "sample", "cube": "sample", "recipe": "motion model"}
 """The set of records that one member of a shard belongs to; the SNRs of a motion model share one in recipe shards."""
 
@@ -94,23 +62,20 @@ def metadata(index: dict, table: dict, facts: dict) -> dict:
     table: path, bytes and sha256 of the table of samples; facts: name, description, version, license, and further
     properties that are known (url, datePublished). Paths are relative to the folder of the description.
     """
-    kind = index["kind"]
+    kind, inside = index["kind"], [{"@id": entry["name"]} for entry in index["shards"]]
     files = [
-        _file(
-            entry, "application/x-tar", f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold."
-        )
+        _file(entry, "application/x-tar",
+              f"{entry['samples']} samples, {entry['group']} subtypes, {entry['fold']} fold.")
         for entry in index["shards"]
-    ]
+    ]  # fmt: skip
     files.append(_file({**table, "name": table["path"]}, "text/csv", "One row a sample: key, class, SNR, shard."))
     mime, data_type, meaning = MEDIA[kind]
     size, stations = index["render"]["images"]["size"], len(index["render"]["network"]["stations"])
     spectra = [name.upper() for name in named(index["render"]["spectra"])]
     meaning = meaning.format(len(spectra) * size, stations * size, ", ".join(spectra))
-    inside = [{"@id": entry["name"]} for entry in index["shards"]]
+    about = f"JSON record of every {OF[kind]}: motion, geometry, seed."
     sets = [
-        _files(
-            "records", inside, "application/json", "*.json", f"JSON record of every {OF[kind]}: motion, geometry, seed."
-        ),
+        _files("records", inside, "application/json", "*.json", about),
         _files(f"{kind}s", inside, mime, f"*.{EXTENSIONS[kind]}", f"The {kind} of every {OF[kind]}."),
     ]
     return {
@@ -140,48 +105,40 @@ def _files(name: str, inside: list[dict], mime: str, pattern: str, meaning: str)
     }  # fmt: skip
 
 
-def _samples(path: str, classes: tuple[str, ...]) -> dict:
+def _records(name: str, meaning: str, fields: list[dict], **more: dict) -> dict:
+    """A set of records with these fields."""
+    fields = [{"@type": "cr:Field", "@id": f"{name}/{field['name']}", **field} for field in fields]
+    return {
+        "@type": "cr:RecordSet", "@id": name, "name": name, **more, "description": meaning, "field": fields,
+    }  # fmt: skip
+
+
+def _column(table: str, name: str, classes: str = "{}") -> dict:
+    """A field that is a column of the table of samples."""
+    data_type, meaning = FIELDS[name]
+    source = {"fileObject": {"@id": table}, "extract": {"column": name}}
+    return {"name": name, "description": meaning.format(classes), "dataType": data_type, "source": source}
+
+
+def _samples(table: str, classes: tuple[str, ...]) -> dict:
     """The record set with one row for each sample, from the table."""
-    named = ", ".join(f"{number} {name}" for number, name in enumerate(classes))
-    fields = [
-        {
-            "@type": "cr:Field", "@id": f"samples/{name}", "name": name,
-            "description": meaning.format(named), "dataType": kind,
-            "source": {"fileObject": {"@id": path}, "extract": {"column": name}},
-        }
-        for name, (kind, meaning) in FIELDS.items()
-    ]  # fmt: skip
-    return {
-        "@type": "cr:RecordSet", "@id": "samples", "name": "samples", "key": {"@id": "samples/key"},
-        "description": "All samples, without their images or signals.", "field": fields,
-    }  # fmt: skip
+    numbered = ", ".join(f"{number} {name}" for number, name in enumerate(classes))
+    fields = [_column(table, name, numbered) for name in FIELDS]
+    meaning = "All samples, without their images or signals."
+    return _records("samples", meaning, fields, key={"@id": "samples/key"})
 
 
-def _labelled(kind: str, path: str, data_type: str, meaning: str) -> dict:
+def _labelled(kind: str, table: str, data_type: str, meaning: str) -> dict:
     """The record set with one row for each sample: its image, signal or echo next to what the table says of it."""
-    name = f"{kind}s"
 
-    def field(part: str, what: str, text: str, source: dict) -> dict:
-        """One field of the set."""
-        return {
-            "@type": "cr:Field", "@id": f"labelled/{part}", "name": part, "description": text, "dataType": what,
-            "source": source,
-        }  # fmt: skip
-
-    def table(part: str) -> dict:
-        """A column of the table of samples."""
-        return {"fileObject": {"@id": path}, "extract": {"column": part}}
-
-    def member(part: str) -> dict:
+    def member(name: str) -> dict:
         """A property of a member of the shards."""
-        return {"fileSet": {"@id": name}, "extract": {"fileProperty": part}}
+        return {"fileSet": {"@id": f"{kind}s"}, "extract": {"fileProperty": name}}
 
+    file = _column(table, "file")
     fields = [
-        field("file", *FIELDS["file"], member("filename")) | {"references": table("file")},
-        *(field(part, *FIELDS[part], table(part)) for part in ("key", "label", "category", "snr_db")),
-        field("content", data_type, meaning, member("content")),
+        {**file, "source": member("filename"), "references": file["source"]},
+        *(_column(table, name) for name in ("key", "label", "category", "snr_db")),
+        {"name": "content", "description": meaning, "dataType": data_type, "source": member("content")},
     ]
-    return {
-        "@type": "cr:RecordSet", "@id": "labelled", "name": "labelled",
-        "description": f"The {kind} of every sample with its label.", "field": fields,
-    }  # fmt: skip
+    return _records("labelled", f"The {kind} of every sample with its label.", fields)

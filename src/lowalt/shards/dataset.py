@@ -16,7 +16,7 @@ import numpy as np
 from lowalt.config.classes import classes_of, label
 from lowalt.config.layers import SCHEMA, check
 from lowalt.config.network import masts_m
-from lowalt.config.plan import GROUPS, Plan, motion_block
+from lowalt.config.plan import GROUPS, Plan, cube_number, motion_block
 from lowalt.config.splits import FOLDS, fold
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import located, shipped
@@ -25,6 +25,7 @@ from lowalt.motion.sample import region_polygon
 from lowalt.motion.track_files import path_of
 from lowalt.motion.tracks import model_rows
 from lowalt.shards.maker import Maker
+from lowalt.shards.read import refuse_unknown
 from lowalt.shards.record import accompanied, record, sample_key
 from lowalt.shards.remake import CloudFolder
 from lowalt.spectra.cube import Cube
@@ -61,7 +62,7 @@ def made_clouds(records: dict[str, dict], seed: int, inputs: Path | None) -> dic
 
 
 def made_occluders(records: dict[str, dict], seed: int, inputs: Path | None) -> dict[str, dict]:
-    """Return the surfaces of each record's target by subtype, as `occluders.read` returns them.
+    """Return the surfaces of each record by subtype, made from the sources that the records name.
 
     Raises: InputError where a record or an input is wrong, or a target has no surfaces.
     """
@@ -100,9 +101,8 @@ class Dataset:
         self.published = published or {name: item["published"] for name, item in records.items()}
         self.classes = classes_of(self.published)
         self.plan = Plan.of(config, self.published)
-        for what, given, known in (("group", tuple(groups), GROUPS), ("fold", self.folds, FOLDS)):
-            if set(given) - set(known):
-                raise InputError(f"{what}s {given}, expected some of {known}")
+        groups = tuple(groups)
+        refuse_unknown(groups, self.folds)
         self.groups = tuple(name for name in self.plan.groups if name in groups)
         if clouds is None:
             wanted = {name: records[name] for group in self.groups for name in self.plan.groups[group]}
@@ -130,8 +130,7 @@ class Dataset:
     @property
     def _all(self) -> int:
         """Number of samples of the chosen groups in all folds."""
-        subtypes = sum(len(self.plan.groups[group]) for group in self.groups)
-        return subtypes * self.plan.models * len(self.plan.snrs)
+        return sum(len(self.plan.groups[group]) for group in self.groups) * self.plan.models * len(self.plan.snrs)
 
     def __len__(self) -> int:
         return self._all if self._numbers is None else len(self._numbers)
@@ -177,9 +176,9 @@ class Dataset:
         return self.maker.signal(self.row(place), place.snr_db)
 
     def made_record(self, place: Place, cubes: dict | None = None) -> bytes:
-        """Return the JSON record of a sample; cubes: what it tells of each station's cube."""
-        row, told = self.row(place), self._fold(place)
-        return record(row, place.snr_db, told, self.plan.seed, self.maker.network, self.classes, cubes)
+        """Return the JSON record of a sample; cubes: what it says of each station's cube."""
+        facts = place.snr_db, self._fold(place), self.plan.seed, self.maker.network, self.classes
+        return record(self.row(place), *facts, cubes)
 
     def made(self, place: Place) -> Sample:
         """Return a sample by its group, subtype, motion model and SNR.
@@ -187,9 +186,8 @@ class Dataset:
         Raises: InputError naming the sample that cannot be computed.
         """
         signal = self.made_signal(place)
-        return Sample(
-            self.maker.tile(signal, self.row(place), place.snr_db), signal, json.loads(self.made_record(place))
-        )
+        image = self.maker.tile(signal, self.row(place), place.snr_db)
+        return Sample(image, signal, json.loads(self.made_record(place)))
 
     def __getitem__(self, number: int) -> Sample:
         return self.made(self.place(number))
@@ -217,8 +215,9 @@ class Dataset:
         """Return record and data of a sample, byte for byte as a shard of a kind holds them ("image", "cube", or
         "signal" and "recipe", which hold the same)."""
         place = self.place(number)
-        data, told = self.maker.data(kind, self.made_signal(place), self.row(place), place.snr_db)
-        return self.made_record(place, told), data
+        row, signal = self.row(place), self.made_signal(place)
+        data, cubes = self.maker.data(kind, signal, row, place.snr_db, cube_number(self.config))
+        return self.made_record(place, cubes), data
 
     def cubes(self, number: int) -> list[Cube]:
         """Return the cube of each station of a sample: its noisy range cells, the chosen ones, and the truth."""
@@ -227,8 +226,7 @@ class Dataset:
 
     def tile(self, number: int) -> np.ndarray:
         """Return the tile of a sample, (3 S, 3 S) uint8 index values."""
-        place = self.place(number)
-        return self.maker.tile(self.made_signal(place), self.row(place), place.snr_db)
+        return self[number].image
 
 
 class Endless:

@@ -1,22 +1,14 @@
-"""The metadata block at the head of a data card, as dataset hubs read it: licence, size, protocols and their shards."""
+"""The metadata block at the head of a data card, as dataset hubs read it: licence, protocols and their shards."""
 
 import json
 from fnmatch import fnmatchcase
 
 from lowalt.config.splits import FOLDS
 from lowalt.shards.read import ShardSet
-from lowalt.shards.table import EXTENSIONS
+from lowalt.shards.sample_table import EXTENSIONS
+from lowalt.shards.stored_cubes import number_of
 
 TAGS = ["radar", "integrated-sensing-and-communication", "micro-doppler", "webdataset", "synthetic"]
-
-
-def size_category(samples: int) -> str:
-    """Return the hub's name for a number of samples, such as "10K<n<100K"."""
-    steps = ["1K", "10K", "100K", "1M", "10M", "100M", "1B"]
-    place = sum(samples >= 10 ** (index + 3) for index in range(len(steps)))
-    if place in (0, len(steps)):
-        return f"n<{steps[0]}" if place == 0 else f"n>{steps[-1]}"
-    return f"{steps[place - 1]}<n<{steps[place]}"
 
 
 def patterns(shards: ShardSet, group: str, fold: str) -> list[str]:
@@ -74,13 +66,14 @@ def features(shards: ShardSet) -> list[dict]:
             return {"name": name, "list": DTYPES[type(value[0])] if value else "string"}
         return {"name": name, "dtype": DTYPES[type(value)]}
 
+    entry = json.loads(shards.stored(0, "record"))
     data: dict = {"dtype": "image"}
     if shards.kind != "image":
         # Numbers lie in as many lists as the array has axes.
-        axes = {"list": {"list": {"list": "float32"}}}
+        axes = {"list": {"list": {"list": "int16" if number_of(entry) == "int16" else "float32"}}}
         data = {"list": axes} if shards.kind == "cube" else axes
-    record = typed("json", json.loads(shards.stored(0, "record")))
-    return [typed("__key__", ""), typed("__url__", ""), record, {"name": EXTENSIONS[shards.kind], **data}]
+    return [typed("__key__", ""), typed("__url__", ""), typed("json", entry),
+            {"name": EXTENSIONS[shards.kind], **data}]  # fmt: skip
 
 
 def front(shards: ShardSet, name: str, license_name: str) -> dict:
@@ -88,8 +81,7 @@ def front(shards: ShardSet, name: str, license_name: str) -> dict:
     protocols = configs(shards)
     return {
         "pretty_name": name, "license": license_name.lower(), "language": ["en"],
-        "task_categories": ["image-classification"], "size_categories": [size_category(len(shards))],
-        "configs": protocols,
+        "task_categories": ["image-classification"], "configs": protocols,
         "dataset_info": [{"config_name": each["config_name"], "features": features(shards)} for each in protocols],
         "tags": TAGS,
     }  # fmt: skip

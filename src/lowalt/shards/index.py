@@ -13,7 +13,7 @@ from lowalt.config.classes import CATEGORIES
 from lowalt.config.schema import check_brought
 from lowalt.files.atomic import existing, replacing, sha256, text_of
 from lowalt.files.errors import InputError
-from lowalt.shards.table import read_header, table_path
+from lowalt.shards.sample_table import read_header, table_path
 
 FORMAT = "lowalt-shards-2"
 READABLE = ("lowalt-shards-1", FORMAT)
@@ -36,9 +36,8 @@ def build(
         table = table_path(shard)
         header = read_header(table)
         existing(shard, "shard")
-        found = shard.stat().st_size
-        if found != header["bytes"]:
-            raise InputError(f"{shard}: {found} bytes, its table says {header['bytes']}")
+        if shard.stat().st_size != header["bytes"]:
+            raise InputError(f"{shard}: {shard.stat().st_size} bytes, its table says {header['bytes']}")
         entries.append({**header, "path": _relative(shard, Path(out)), "table_sha256": sha256(table)})
     names = [entry["name"] for entry in entries]
     kinds = sorted({entry["kind"] for entry in entries})
@@ -86,12 +85,12 @@ def load(path: str | Path) -> dict:
     existing(path, "index")
     try:
         index = json.loads(text_of(path, "index"))
-        found, checksum, own = index["format"], index["sha256"], _checksum(index)
+        written, stated, computed = index["format"], index["sha256"], _checksum(index)
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise InputError(f"{path}: not an index of shards ({error})") from error
-    if found not in READABLE:
-        raise InputError(f"{path}: format {found!r}, expected one of {READABLE}")
-    if checksum != own:
+    if written not in READABLE:
+        raise InputError(f"{path}: format {written!r}, expected one of {READABLE}")
+    if stated != computed:
         raise InputError(f"{path}: the index is damaged (SHA-256 differs)")
     check_brought("index", index, path)
     for entry in index["shards"]:

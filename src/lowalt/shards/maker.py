@@ -13,7 +13,8 @@ from lowalt.echo.chunk import clean_signals
 from lowalt.noise.chunk import noisy_signals
 from lowalt.scene.lateness import lateness
 from lowalt.scene.set_noise import behind_canceller, in_all_cells
-from lowalt.shards.record import npy, of_cubes
+from lowalt.shards.record import npy
+from lowalt.shards.stored_cubes import of_cubes
 from lowalt.spectra import Spectra
 from lowalt.spectra.catalogue import of_cells
 from lowalt.spectra.cube import Cube
@@ -108,8 +109,8 @@ class Maker:
         scene = Scene(self.network, self.seed, tolerance, tuple(called(self.echo["effects"])))
         if snr_db is not None:
             scene = scene.at_snr(snr_db)
-        found = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
-        return np.stack([signal[0] for signal, _ in found]), np.stack([power for _, power in found])
+        heard = [scene_signals(scene, name, self.clouds, [row], self.occluders) for name in names]
+        return np.stack([signal[0] for signal, _ in heard]), np.stack([power for _, power in heard])
 
     def signal(self, row: dict, snr_db: float, stations: Sequence[int] | None = None) -> np.ndarray:
         """Return the noisy signals of one sample, (stations, symbols) complex64.
@@ -117,12 +118,11 @@ class Maker:
         stations: numbers of those that are asked for, rising; the others' signals are then zeros, and nothing is
         computed for them. Raises: InputError naming the sample that cannot be computed.
         """
-        every = len(self.network.stations)
-        if stations is not None and len(stations) < every:
-            result = np.zeros((every, self.network.symbols), np.complex64)
-            result[list(stations)] = self._noisy(row, snr_db, stations)
-            return result
-        return self._noisy(row, snr_db, range(every))
+        every = range(len(self.network.stations))
+        chosen = list(every if stations is None else stations)
+        result = np.zeros((len(every), self.network.symbols), np.complex64)
+        result[chosen] = self._noisy(row, snr_db, chosen)
+        return result
 
     def _noisy(self, row: dict, snr_db: float, stations: Sequence[int]) -> np.ndarray:
         """The noisy signals of one sample at some stations."""
@@ -146,13 +146,16 @@ class Maker:
         """Return the PNG file of the tile of one sample of the motion model `row` at an SNR (dB)."""
         return encode(self.tile(signal, row, snr_db), self.images.palette)
 
-    def data(self, kind: str, signal: np.ndarray, row: dict, snr_db: float) -> tuple[bytes, dict]:
-        """Return the data of one sample as a shard of a kind holds it, and what its record tells of its cubes.
+    def data(
+        self, kind: str, signal: np.ndarray, row: dict, snr_db: float, number: str = "complex64"
+    ) -> tuple[bytes, dict]:  # fmt: skip
+        """Return the data of one sample as a shard of a kind holds it, and what its record says of its cubes.
 
-        kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols).
+        kind: "image", "cube", or "signal" and "recipe", which hold the same; signal: (stations, symbols); number: how
+        the cells of cubes are stored, "complex64" or "int16".
         """
         if kind == "image":
             return self.png(signal, row, snr_db), {}
         if kind == "cube":
-            return of_cubes(self.cubes(row, snr_db, signal), self.network)
+            return of_cubes(self.cubes(row, snr_db, signal), self.network, number)
         return npy(signal), {}

@@ -84,23 +84,23 @@ def faults(path: str | Path, folder: str | Path, temporary: tuple[str, ...] = ("
 
 def main(arguments: list[str]) -> None:
     """Write the manifest of a run, or compare a run with one and end with status 1 where a byte differs."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards.manifest", description=main.__doc__)
-    options.add_argument("command", choices=("write", "check"))
-    options.add_argument("--run", required=True, help="folder of the run, such as results/default")
-    options.add_argument("--manifest", required=True, help="manifest, such as results/reference/default.sha256")
-    options.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
-    given = options.parse_args(arguments)
-    if given.command == "write":
-        with replacing(given.manifest) as temporary:
-            temporary.write_text(text(given.run))
+    line = argparse.ArgumentParser(prog="python -m lowalt.shards.manifest", description=main.__doc__)
+    line.add_argument("command", choices=("write", "check"))
+    line.add_argument("--run", required=True, help="folder of the run, such as results/default")
+    line.add_argument("--manifest", required=True, help="manifest, such as results/reference/default.sha256")
+    line.add_argument("--without", nargs="*", default=[], choices=list(STAGES), help="stages that left no files")
+    options = line.parse_args(arguments)
+    if options.command == "write":
+        with replacing(options.manifest) as temporary:
+            temporary.write_text(text(options.run))
         return
-    lines = faults(given.manifest, given.run, ("tiles", *given.without))
-    for line in lines:
-        print(line)
+    lines = faults(options.manifest, options.run, ("tiles", *options.without))
+    for fault in lines:
+        print(fault)
     if lines:
         print(f"first stage that differs: {lines[0].partition(':')[0]}", file=sys.stderr)
         raise SystemExit(1)
-    print(f"{given.run}: all {len(read(given.manifest))} files are equal to {given.manifest}")
+    print(f"{options.run}: all {len(read(options.manifest))} files are equal to {options.manifest}")
 
 
 if __name__ == "__main__":

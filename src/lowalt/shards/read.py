@@ -21,14 +21,22 @@ from lowalt.files.errors import InputError
 from lowalt.scene.lateness import lateness
 from lowalt.shards.clean import complex_signals, noisy, unpacked
 from lowalt.shards.index import load
-from lowalt.shards.record import cubes_of, npy, row_of
-from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.record import npy, row_of
+from lowalt.shards.sample_table import map_samples, table_path
+from lowalt.shards.stored_cubes import cubes_of
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.spectra.cube import Cube
 from lowalt.tiles.png import decode
 from lowalt.tiles.render import Renderer, split
 from lowalt.tiles.resample import resize
 from lowalt.tiles.settings import Images
+
+
+def refuse_unknown(groups: Iterable[str], folds: Iterable[str]) -> None:
+    """Refuse groups and folds that no data set has. Raises: InputError naming them."""
+    for what, names, known in (("groups", groups, GROUPS), ("folds", folds, FOLDS)):
+        if set(names) - set(known):
+            raise InputError(f"{what} {names}, expected some of {known}")
 
 
 class ShardSet:
@@ -45,9 +53,7 @@ class ShardSet:
         Raises: InputError naming an unknown group or fold, or a file that is missing or damaged.
         """
         self.index_path, self.groups, self.folds, self.check = Path(index_path), tuple(groups), tuple(folds), check
-        for what, given, known in (("group", self.groups, GROUPS), ("fold", self.folds, FOLDS)):
-            if set(given) - set(known):
-                raise InputError(f"{what}s {given}, expected some of {known}")
+        refuse_unknown(self.groups, self.folds)
         self.index = load(index_path)
         self.kind, self.classes = self.index["kind"], stated(self.index)
         self.shards = [s for s in self.index["shards"] if s["group"] in self.groups and s["fold"] in self.folds]
@@ -72,8 +78,10 @@ class ShardSet:
             path, entry = table_path(self._path(shard)), self.shards[shard]
             samples = map_samples(path)
             if len(samples) != entry["samples"] or (self.check and sha256(path) != entry["table_sha256"]):
-                told = f"{len(samples)} rows, expected {entry['samples']}, and the SHA-256 that the index states"
-                raise InputError(f"{path.name}: damaged or another table: {told}")
+                raise InputError(
+                    f"{path.name}: damaged or another table: {len(samples)} rows, expected {entry['samples']}, and the "
+                    "SHA-256 that the index states"
+                )
             self._tables[shard] = samples
         return self._tables[shard]
 
@@ -195,7 +203,7 @@ class ShardSet:
         self._need("signal", "recipe", "cube")
         if self.kind == "cube":
             return np.stack([cube.signal for cube in self.cubes(number)])
-        stored = complex_signals(np.lib.format.read_array(io.BytesIO(self.stored(number, "data"))))
+        stored = complex_signals(self._array(number))
         if self.kind == "signal":
             return stored
         stations = station_names(self.index["render"]["network"])
@@ -207,8 +215,11 @@ class ShardSet:
         Raises: InputError where shards are of another kind, or naming shard and sample where it is damaged.
         """
         self._need("cube")
-        cells = complex_signals(np.lib.format.read_array(io.BytesIO(self.stored(number, "data"))))
-        return cubes_of(self.record(number), cells)
+        return cubes_of(self.record(number), self._array(number))
+
+    def _array(self, number: int) -> np.ndarray:
+        """The array that a sample's data are."""
+        return np.lib.format.read_array(io.BytesIO(self.stored(number, "data")))
 
     def _shown(self, number: int) -> list[Cube] | None:
         """The cubes of a sample where images are made of them."""

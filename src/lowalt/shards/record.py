@@ -5,7 +5,6 @@ Every field has one type in all records, and no value is missing, so that tables
 
 import json
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +16,7 @@ from lowalt.files.errors import InputError
 from lowalt.motion.table import TRACK
 from lowalt.numerics.portable import dot, norm
 from lowalt.numerics.streams import digest
-from lowalt.spectra.cube import TRUTH, Cube
-from lowalt.tiles.files import npy_header
+from lowalt.tiles.tile_files import npy_header
 
 NAMES = ("subtype", "category", "group", "model")
 
@@ -111,7 +109,7 @@ def record(
     whether noise was added; where none was, `snr_db` is infinite. Numbers that are unknown are null, as for a
     recorded target whose place was not recorded. Where `row` has the key `companions`, the subtypes of the other
     targets in the beam, the record has it too; the label is the row's own target's. A row of a track adds its track
-    and look. classes: in the order of their labels; cubes: what is told of each station's cube (`of_cubes`).
+    and look. classes: in the order of their labels; cubes: facts on each station's cube.
     Raises: InputError where the row's category is no class.
     """
     names = NAMES + TRACK * (TRACK[0] in row)
@@ -136,27 +134,6 @@ def record(
         "versions": versions(),
     }
     return encoded(content)
-
-
-def of_cubes(cubes: Sequence[Cube], network: Network) -> tuple[bytes, dict]:
-    """Return the cubes of a sample as the bytes of an .npy file, (stations, symbols, cells, 2) float32, and what its
-    record tells of each station: the chosen cells and the truth of each symbol, to six decimals."""
-    told = {
-        station.name: {
-            "chosen": cube.chosen.tolist(),
-            **{name: cube.truth[:, place].round(6).tolist() for place, name in enumerate(TRUTH)},
-        }
-        for station, cube in zip(network.stations, cubes, strict=True)
-    }
-    return npy(np.stack([cube.cells for cube in cubes])), told
-
-
-def cubes_of(entry: dict, cells: np.ndarray) -> list[Cube]:
-    """Return the cubes that a record and its range cells (stations, symbols, cells) complex64 hold."""
-    return [
-        Cube(held, np.array(told["chosen"]), np.column_stack([told[name] for name in TRUTH]))
-        for held, told in zip(cells, entry["cube"].values(), strict=True)
-    ]
 
 
 def accompanied(row: dict, effects: dict, seed: int) -> dict:
@@ -187,5 +164,10 @@ def npy(signals: np.ndarray) -> bytes:
 
     The last axis is real and imaginary part: Arrow, which many readers use, has no complex numbers.
     """
-    parts = np.ascontiguousarray(signals, "<c8").view("<f4").reshape(*signals.shape, 2)
+    parts = parts_of(signals)
     return npy_header("<f4", parts.shape) + parts.tobytes()
+
+
+def parts_of(values: np.ndarray) -> np.ndarray:
+    """Return complex64 values (...) as float32 (..., 2), real and imaginary part, in the byte order of files."""
+    return np.ascontiguousarray(values, "<c8").view("<f4").reshape(*values.shape, 2)

@@ -14,6 +14,7 @@ from lowalt.numerics.streams import stream
 from lowalt.shards.maker import Maker
 from lowalt.shards.read import ShardSet
 from lowalt.shards.record import accompanied, record, row_of
+from lowalt.shards.stored_cubes import number_of
 from lowalt.targets.cloud import Cloud, read
 from lowalt.targets.occluders import read_all
 
@@ -24,13 +25,13 @@ class CloudFolder(Mapping):
     def __init__(self, folder: str | Path) -> None:
         """Name the folder; nothing is read yet."""
         self.folder = Path(folder)
-        self._found: dict[str, Cloud] = {}
+        self._clouds: dict[str, Cloud] = {}
 
     def __getitem__(self, subtype: str) -> Cloud:
-        if subtype not in self._found:
+        if subtype not in self._clouds:
             path = existing(self.folder / f"{slug(subtype)}.npz", f"cloud of {subtype}")
-            self._found[subtype] = read(path)
-        return self._found[subtype]
+            self._clouds[subtype] = read(path)
+        return self._clouds[subtype]
 
     def __contains__(self, subtype: object) -> bool:
         return (self.folder / f"{slug(str(subtype))}.npz").is_file()
@@ -81,11 +82,10 @@ class Remaker:
         Raises: InputError naming the sample whose record is too old or whose cloud is missing.
         """
         row, snr_db = row_of(entry)
-        seed = entry["seed"]
-        maker, signal = self._maker(seed), self.signal(entry)
-        data, told = maker.data(self.shards.kind, signal, row, snr_db)
+        seed, signal = entry["seed"], self.signal(entry)
+        data, cubes = self._maker(seed).data(self.shards.kind, signal, row, snr_db, number_of(entry))
         row = accompanied(row, self.shards.index["echo"]["effects"], seed)
-        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, told), data
+        return record(row, snr_db, entry["fold"], seed, self.network, self.shards.classes, cubes), data
 
     def faults(self, number: int) -> list[str]:
         """Return one line for each member of a sample that differs from the stored one.
@@ -93,14 +93,12 @@ class Remaker:
         Raises: InputError as `made`, or where the stored sample is damaged.
         """
         stored, data = self.shards.members(number)
-        found = self.made(json.loads(stored))
-        key = self.shards.keys[number].decode()
-        names = "record", self.shards.kind
-        pairs = zip(names, (stored, data), found, strict=True)
-        return [f"sample {key}: its {name} comes out otherwise" for name, old, new in pairs if old != new]
+        key, again = self.shards.keys[number].decode(), self.made(json.loads(stored))
+        members = zip(("record", self.shards.kind), (stored, data), again, strict=True)
+        return [f"sample {key}: its {name} comes out otherwise" for name, old, new in members if old != new]
 
 
-def number_of(shards: ShardSet, key: str) -> int:
+def place_of(shards: ShardSet, key: str) -> int:
     """Return the number of the sample with this key.
 
     Raises: InputError where the data set has none.

@@ -89,13 +89,13 @@ def export(shards: ShardSet, folder: str | Path) -> list[Path]:
 
 def main(arguments: Iterable[str]) -> None:
     """Export the signals of a data set as SigMF recordings, one a station."""
-    options = argparse.ArgumentParser(prog="python -m lowalt.shards.sigmf", description=main.__doc__)
-    options.add_argument("--index", required=True, help="index of a data set of signals")
-    options.add_argument("--groups", nargs="+", default=list(GROUPS), choices=GROUPS)
-    options.add_argument("--folds", nargs="+", default=list(FOLDS), choices=FOLDS)
-    options.add_argument("--out", required=True, help="folder to write into")
-    given = options.parse_args(arguments)
-    export(ShardSet(given.index, given.groups, given.folds), given.out)
+    line = argparse.ArgumentParser(prog="python -m lowalt.shards.sigmf", description=main.__doc__)
+    line.add_argument("--index", required=True, help="index of a data set of signals")
+    line.add_argument("--groups", nargs="+", default=list(GROUPS), choices=GROUPS)
+    line.add_argument("--folds", nargs="+", default=list(FOLDS), choices=FOLDS)
+    line.add_argument("--out", required=True, help="folder to write into")
+    options = line.parse_args(arguments)
+    export(ShardSet(options.index, options.groups, options.folds), options.out)
 
 
 if __name__ == "__main__":

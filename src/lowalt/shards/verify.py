@@ -9,9 +9,9 @@ import numpy as np
 
 from lowalt.files.atomic import sha256
 from lowalt.files.errors import InputError
-from lowalt.shards import manifest, sums
+from lowalt.shards import checksums, manifest
 from lowalt.shards.index import load
-from lowalt.shards.table import map_samples, table_path
+from lowalt.shards.sample_table import map_samples, table_path
 
 
 def faults(index_path: str | Path) -> Iterator[str]:
@@ -25,14 +25,14 @@ def faults(index_path: str | Path) -> Iterator[str]:
     folder = Path(index_path).parent
     for entry in index["shards"]:
         yield from shard_faults(folder / entry["path"], entry)
-    yield from sums.faults(index_path, index)
+    yield from checksums.faults(index_path, index)
     run = folder.resolve().parent
     present = set(manifest.files(run))
     for name, checksum in frozen(index_path).items():
         if name not in present:
             yield f"../{name}: missing"
         elif sha256(run / name) != checksum:
-            yield f"../{name}: has changed since it was frozen in ../{sums.NAME}"
+            yield f"../{name}: has changed since it was frozen in ../{checksums.NAME}"
 
 
 def frozen(index_path: str | Path) -> dict[str, str]:
@@ -40,8 +40,8 @@ def frozen(index_path: str | Path) -> dict[str, str]:
 
     The first training writes them into SHA256SUMS of the run's folder; without that file there are none.
     """
-    path = Path(index_path).resolve().parent.parent / sums.NAME
-    lines = sums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
+    path = Path(index_path).resolve().parent.parent / checksums.NAME
+    lines = checksums.LINE.findall(path.read_text(errors="replace")) if path.is_file() else []
     return {name: checksum for checksum, name in lines if manifest.stage_of(name) in ("clouds", "motion")}
 
 
@@ -65,15 +65,15 @@ def shard_faults(path: Path, entry: dict) -> Iterator[str]:
     except InputError:
         yield f"{path.name}: damaged, and its table cannot tell where"
         return
-    found = path.stat().st_size
-    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"], found))
+    yield from (f"{path.name}: {line}" for line in _locate(path, samples, entry["bytes"]))
 
 
-def _locate(path: Path, samples: np.ndarray, expected: int, found: int) -> Iterator[str]:
+def _locate(path: Path, samples: np.ndarray, expected: int) -> Iterator[str]:
     """Faults of a shard known to be damaged, sample by sample, then those of the remaining bytes."""
-    if found != expected:
-        yield f"{found} bytes, expected {expected}"
-    end, named = 0, found != expected
+    size = path.stat().st_size
+    if size != expected:
+        yield f"{size} bytes, expected {expected}"
+    end, named = 0, size != expected
     with path.open("rb") as file:
         for row in samples:
             # The samples of one motion model share their bytes in recipe shards.

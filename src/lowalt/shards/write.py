@@ -13,8 +13,8 @@ from lowalt.files.atomic import replacing
 from lowalt.files.errors import InputError
 from lowalt.shards.clean import packed
 from lowalt.shards.record import model_key, rank, record, sample_key
-from lowalt.shards.table import EXTENSIONS, KINDS, SAMPLE, table_path
-from lowalt.shards.table import write as write_table
+from lowalt.shards.sample_table import EXTENSIONS, KINDS, SAMPLE, table_path
+from lowalt.shards.sample_table import write as write_table
 from lowalt.shards.tar import Span, Writer
 
 Content = Callable[[int, int], tuple[bytes, dict]]
@@ -92,8 +92,8 @@ def write_shard(
                 key = sample_key(row["subtype"], row["model"], snr_db)
                 span = spans.get(number)
                 if span is None:
-                    data, told = content(number, level)
-                    name, text = key, record(row, snr_db, wanted, seed, network, classes, told)
+                    data, cubes = content(number, level)
+                    name, text = key, record(row, snr_db, wanted, seed, network, classes, cubes)
                     if kind == "recipe":
                         name = model_key(row["subtype"], row["model"])
                         power_w = None if powers is None else powers[:, number]

@@ -8,7 +8,7 @@ import numpy as np
 from lowalt.config.command import parser, pick, run
 from lowalt.machine.progress import reported
 from lowalt.spectra.cube import Cube
-from lowalt.tiles import files, reduced
+from lowalt.tiles import reduced, tile_files
 from lowalt.tiles.png import encode
 from lowalt.tiles.render import Renderer
 from lowalt.tiles.signals import load_signals
@@ -33,28 +33,28 @@ def encoded(
 
 def main(arguments: list[str]) -> None:
     """Render one chunk."""
-    options = parser("lowalt.tiles", "Render signals to tiles of spectra.")
-    options.add_argument("--signals", required=True, help="noisy signals (.npy, complex64)")
-    options.add_argument("--out", required=True, help="tiles file to write (.npz)")
-    options.add_argument(
+    line = parser("lowalt.tiles", "Render signals to tiles of spectra.")
+    line.add_argument("--signals", required=True, help="noisy signals (.npy, complex64)")
+    line.add_argument("--out", required=True, help="tiles file to write (.npz)")
+    line.add_argument(
         "--reduced",
         nargs="*",
         default=[],
         metavar="SIZE=PATH",
         help="also write the images at SIZE pixels a side (.npy)",
     )
-    options.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
-    options.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")
-    options.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes, likewise")
-    given = options.parse_args(arguments)
-    drawn, seen_in = given.settings.pop("drawn", None), given.settings.pop("cubes", None)
-    tiles = Renderer.from_settings(given.settings)
-    late = _late(given.settings["spectra"], drawn, tiles, given.motion) if drawn else lambda model: None
-    more = {"cubes": _cubes(seen_in, tiles, given)} if seen_in else {}
-    signals = load_signals(given.signals, tiles.network)
-    targets = [reduced.target(text) for text in given.reduced]
+    line.add_argument("--motion", help="the chunk's motion table, for late symbols and range cells")
+    line.add_argument("--clouds", nargs="*", help="clouds of the chunk's subtypes, for range cells")
+    line.add_argument("--occluders", nargs="*", default=[], help="surface files of the chunk's subtypes, likewise")
+    options = line.parse_args(arguments)
+    drawn, seen_in = options.settings.pop("drawn", None), options.settings.pop("cubes", None)
+    tiles = Renderer.from_settings(options.settings)
+    late = _late(options.settings["spectra"], drawn, tiles, options.motion) if drawn else lambda model: None
+    more = {"cubes": _cubes(seen_in, tiles, options)} if seen_in else {}
+    signals = load_signals(options.signals, tiles.network)
+    targets = [reduced.target(text) for text in options.reduced]
     with reduced.writing(targets, len(signals) * signals.shape[1], signals.shape[2], len(tiles.spectra)) as seen:
-        files.write(given.out, encoded(signals, tiles, seen, late, **more))
+        tile_files.write(options.out, encoded(signals, tiles, seen, late, **more))
 
 
 def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[[int], np.ndarray | None]:
@@ -67,7 +67,7 @@ def _late(spectra: dict, drawn: dict, tiles: Renderer, motion: str) -> Callable[
 
 
 def _cubes(
-    settings: dict, tiles: Renderer, given: argparse.Namespace
+    settings: dict, tiles: Renderer, options: argparse.Namespace
 ) -> Callable[[int, int, np.ndarray], list[Cube] | None]:
     """The cubes of a chunk's samples by model, SNR and signals; settings: {seed, tolerance, effects, snr_db}."""
     from lowalt.motion import read_table
@@ -75,10 +75,10 @@ def _cubes(
     from lowalt.targets.occluders import read_all
     from lowalt.tiles.cubes import Cubes
 
-    rows, snrs, stations = read_table(given.motion), settings.pop("snr_db"), tiles.network.stations
-    clouds = {cloud.subtype: cloud for cloud in map(read, given.clouds)}
-    scene = settings | {"network": given.settings["network"]}
-    maker = Cubes.from_settings(scene, clouds, read_all(given.occluders) if given.occluders else None)
+    rows, snrs, stations = read_table(options.motion), settings.pop("snr_db"), tiles.network.stations
+    clouds = {cloud.subtype: cloud for cloud in map(read, options.clouds)}
+    scene = settings | {"network": options.settings["network"]}
+    maker = Cubes.from_settings(scene, clouds, read_all(options.occluders) if options.occluders else None)
     return lambda model, level, sample: [
         maker.of(rows[model], float(snrs[level]), station, heard)
         for station, heard in zip(stations, sample, strict=True)

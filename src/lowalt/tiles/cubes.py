@@ -88,9 +88,9 @@ class Cubes:
         cells = np.zeros((len(received.cell), self.scene.network.subcarriers), np.complex128)
         seen = sample.without_target() if self.empty else sample
         cells[there] = seen.filtered(sample.detection)
-        own = np.full(len(cells), -1)
-        own[there] = sample.own_cell()
-        return cells, received.cell, np.column_stack([truth(sample), own]), received.power
+        target_cell = np.full(len(cells), -1)
+        target_cell[there] = sample.own_cell()
+        return cells, received.cell, np.column_stack([truth(sample), target_cell]), received.power
 
 
 def truth(sample: SceneSample) -> np.ndarray:

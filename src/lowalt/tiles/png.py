@@ -54,15 +54,15 @@ def _chunks(data: bytes) -> list[tuple[bytes, memoryview]]:
     """
     if data[:8] != SIGNATURE:
         raise InputError("image: no PNG signature, expected a palette PNG")
-    view, place, found = memoryview(data), 8, []
+    view, place, chunks = memoryview(data), 8, []
     while place + 12 <= len(data):
         size = int.from_bytes(view[place : place + 4], "big")
         end = place + 12 + size
         if end > len(data) or deflate.crc32(view[place + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
             break
-        found.append((bytes(view[place + 4 : place + 8]), view[place + 8 : end - 4]))
-        if found[-1][0] == b"IEND":
-            return found
+        chunks.append((bytes(view[place + 4 : place + 8]), view[place + 8 : end - 4]))
+        if chunks[-1][0] == b"IEND":
+            return chunks
         place = end
     raise InputError(f"image: the PNG is damaged or cut off at byte {place}")
 

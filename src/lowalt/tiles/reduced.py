@@ -24,10 +24,10 @@ def target(text: str) -> tuple[int, Path]:
 
     Raises: InputError where the text has another form.
     """
-    found = _TARGET.fullmatch(text)
-    if not found:
+    parts = _TARGET.fullmatch(text)
+    if not parts:
         raise InputError(f"--reduced {text!r}: expected SIZE=PATH, such as 24=reduced.npy")
-    return int(found[1]), Path(found[2])
+    return int(parts[1]), Path(parts[2])
 
 
 @contextlib.contextmanager
@@ -63,9 +63,9 @@ def read(path: str | Path, size: int, samples: int) -> np.ndarray:
     Raises: InputError naming the file where it is missing, damaged, or of other samples or another size.
     """
     try:
-        found = np.lib.format.open_memmap(existing(path, "reduced images"), "r")
+        images = np.lib.format.open_memmap(existing(path, "reduced images"), "r")
     except (OSError, ValueError, EOFError) as error:
         raise InputError(f"{path}: not reduced images ({error})") from error
-    if found.dtype != np.uint8 or found.ndim != 4 or (found.shape[0], *found.shape[2:]) != (samples, size, size):
-        raise InputError(f"{path}: {found.dtype} {found.shape}, expected uint8 ({samples}, views, {size}, {size})")
-    return found
+    if images.dtype != np.uint8 or images.ndim != 4 or (images.shape[0], *images.shape[2:]) != (samples, size, size):
+        raise InputError(f"{path}: {images.dtype} {images.shape}, expected uint8 ({samples}, views, {size}, {size})")
+    return images

@@ -188,9 +188,9 @@ class Renderer:
         names = list(self.spectra)
         for place, number in enumerate(numbers):
             station, view = divmod(int(number), len(names))
-            own = None if late is None else late[station]
+            delay = None if late is None else late[station]
             source = self._source(names[view], normalised(signals[station]), cubes, station)
-            self.image(source, station, names[view], out[place], own)
+            self.image(source, station, names[view], out[place], delay)
         return out
 
 

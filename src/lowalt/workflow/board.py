@@ -97,13 +97,13 @@ class Board:
         now_running = {key: job for key, job in self.jobs.items() if job.stage == name}
         if not now_running and stage.done >= stage.total:
             return f"{head}, done in {span(stage.ended - stage.started)}"
-        found = {key: read(job.log, job.started) for key, job in now_running.items()}
-        parts = sum(progress.done / progress.total for progress in found.values() if progress and progress.total)
+        progress_of = {key: read(job.log, job.started) for key, job in now_running.items()}
+        parts = sum(progress.done / progress.total for progress in progress_of.values() if progress and progress.total)
         done, spent = stage.done + parts, now - stage.started
         if spent > 0 and (stage.done or parts >= LEAST_PART):
             head += f", {pace(stage.done / spent)}" if stage.done else ""
             head += f", {span((stage.total - done) * spent / done)} left"
-        texts = [_running(job, found[key]) for key, job in now_running.items()]
+        texts = [_running(job, progress_of[key]) for key, job in now_running.items()]
         return head + "".join(f"; {text}" for text in texts if text)
 
 

@@ -18,23 +18,15 @@ class DataProducts:
     def __init__(self, run: Run) -> None:
         """Keep the run."""
         self._run, self._config = run, run.config
-        self._groups: dict[tuple, list[str]] = {}
-
-    def _of_group(self, folder: str, wildcards: Any) -> list[str]:
-        """Files of a folder of the run, one for each subtype of a group, in the table's order."""
-        key = (folder, wildcards.run, wildcards.group)
-        if key not in self._groups:
-            names = self._run.plan.groups[wildcards.group]
-            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
-        return self._groups[key]
+        self._paths: dict[tuple, list[str]] = {}
 
     def _of_chunk(self, folder: str, wildcards: Any) -> list[str]:
         """Files of a folder of the run, one for each subtype of a chunk, in the table's order."""
-        names = self._run.plan.chunk(f"{wildcards.group}-{wildcards.part}").members
-        key = (folder, wildcards.run, names)
-        if key not in self._groups:
-            self._groups[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
-        return self._groups[key]
+        key = folder, wildcards.run, f"{wildcards.group}-{wildcards.part}"
+        if key not in self._paths:
+            names = self._run.plan.chunk(key[2]).members
+            self._paths[key] = [f"results/{wildcards.run}/{folder}/{slug(name)}.npz" for name in names]
+        return self._paths[key]
 
     def record_files(self, wildcards: Any) -> list[str]:
         """The user's mesh or recording files that the record of one subtype names."""
@@ -61,16 +53,11 @@ class DataProducts:
         """The flight log whose path motion models follow; none where paths are drawn."""
         return [self._config["motion"]["track"]] if "track" in self._config["motion"] else []
 
-    def group_clouds(self, wildcards: Any) -> list[str]:
-        """Clouds of a group's subtypes, in the table's order."""
-        return self._of_group("clouds", wildcards)
-
     def scene_clouds(self, wildcards: Any) -> list[str]:
         """Clouds of a chunk's subtypes, and of the subtypes that the scene adds to them."""
         companions = (self._config["effects"].get("companions") or {}).get("subtypes", [])
-        own = self.chunk_clouds(wildcards)
-        more = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in dict.fromkeys(companions)]
-        return [*own, *(path for path in more if path not in own)]
+        beside = [f"results/{wildcards.run}/clouds/{slug(name)}.npz" for name in companions]
+        return list(dict.fromkeys([*self.chunk_clouds(wildcards), *beside]))
 
     def chunk_occluders(self, wildcards: Any) -> list[str]:
         """Surfaces of a chunk's subtypes; none where the scene hides no points behind surfaces."""
@@ -107,18 +94,16 @@ class DataProducts:
         stem = f"results/{wildcards.run}/echo/{self._source(wildcards)}"
         return [f"{stem}/{station}.power.npy" for station in self._run.stations] if self._config["effects"] else []
 
-    def tile_motion(self, wildcards: Any) -> list[str]:
-        """The motion table of a chunk, where spectra know the instants of late symbols or show range cells; none in
-        other runs."""
-        return [self.motion(wildcards)] if timed(self._config) or of_cells(self._config["spectra"]) else []
+    def tile_content(self, wildcards: Any) -> dict[str, str | list[str]]:
+        """What tiles are rendered from beside signals: the motion table, where spectra know the instants of late
+        symbols or show range cells, and for range cells clouds and surfaces too."""
+        cells = bool(of_cells(self._config["spectra"]))
+        motion = {"motion": self.motion(wildcards)} if cells or timed(self._config) else {}
+        return motion | (self._scene(wildcards) if cells else {})
 
-    def tile_clouds(self, wildcards: Any) -> list[str]:
-        """The clouds of a chunk, where spectra show range cells; none in other runs."""
-        return self.scene_clouds(wildcards) if of_cells(self._config["spectra"]) else []
-
-    def tile_occluders(self, wildcards: Any) -> list[str]:
-        """The surfaces of a chunk's subtypes, where spectra show range cells and the scene hides points."""
-        return self.chunk_occluders(wildcards) if of_cells(self._config["spectra"]) else []
+    def _scene(self, wildcards: Any) -> dict[str, list[str]]:
+        """Clouds and surfaces that cubes of a chunk are made from."""
+        return {"clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
 
     def shard_content(self, wildcards: Any) -> dict[str, str | list[str]]:
         """Files that shards are packed from, by kind: noisy signals and tiles (image), noisy signals (signal), clean
@@ -129,7 +114,7 @@ class DataProducts:
             return {"echoes": self.chunk_echoes(wildcards), "powers": self.chunk_powers(wildcards)}
         signals = {"signals": f"{base}/noisy/{chunk}.npy"}
         if kind == "cube":
-            return {**signals, "clouds": self.scene_clouds(wildcards), "occluders": self.chunk_occluders(wildcards)}
+            return {**signals, **self._scene(wildcards)}
         return {**signals, "tiles": f"{base}/tiles/{chunk}.npz"} if kind == "image" else signals
 
     def reduced(self, wildcards: Any) -> dict[str, str]:

@@ -10,7 +10,6 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +20,10 @@ from lowalt.config.network import masts_m, station_names
 from lowalt.files.errors import InputError
 
 CONFIGURATION = Path("config/default.yaml")
-STAGES = ("echo", "tiles", "tolerances")
-PROCESSES = (("echo",), ("tiles", "tolerances"))
-"""What is compiled in which order by each process."""
 
 
-def echo(config: dict, folder: Path, tolerances: Sequence[float | None] = (None,)) -> None:
-    """Make the echoes of a motion model of each category in a folder, exactly or at these tolerances."""
+def echo(config: dict, folder: Path) -> None:
+    """Make the echoes of a motion model of each category in a folder."""
     from lowalt.echo.__main__ import main as echoes
     from lowalt.motion.__main__ import main as motion
     from lowalt.targets.__main__ import main as cloud
@@ -44,19 +40,9 @@ def echo(config: dict, folder: Path, tolerances: Sequence[float | None] = (None,
     table = str(folder / "motion.csv")
     span = ["--group", "seen", "--first", "0", "--count", "1"]
     motion(["--settings", json.dumps(settings), "--clouds", *clouds, *span, "--out", table])
-    for tolerance in tolerances:
-        settings = json.dumps({"network": config["network"], "tolerance": tolerance})
-        station, out = station_names(config["network"])[0], str(folder / "echo.npy")
-        try:
-            echoes(["--settings", settings, "--motion", table, "--clouds", *clouds, "--station", station, "--out", out])
-        except InputError:
-            # A tolerance below the floor of one of the samples: what it needs is compiled all the same.
-            continue
-
-
-def tolerances(config: dict, folder: Path) -> None:
-    """Make the echoes of a motion model of each category in a folder, at the cost table's tolerances."""
-    echo(config, folder, config["cost"]["tolerances"])
+    settings = json.dumps({"network": config["network"], "tolerance": None})
+    station, out = station_names(config["network"])[0], str(folder / "echo.npy")
+    echoes(["--settings", settings, "--motion", table, "--clouds", *clouds, "--station", station, "--out", out])
 
 
 def tiles(config: dict, folder: Path) -> None:
@@ -68,25 +54,26 @@ def tiles(config: dict, folder: Path) -> None:
     np.save(signals, np.random.default_rng(0).normal(size=shape).astype(np.float32).view(np.complex64)[..., 0])
     settings = json.dumps({name: config[name] for name in ("network", "spectra", "images")})
     reduced = [f"{size}={folder / str(size)}.npy" for size in config["tiles"]["reduced"]]
-    given = ["--signals", str(signals), "--reduced", *reduced, "--out", str(folder / "tiles.npz")]
-    render(["--settings", settings, *given])
+    render(["--settings", settings, "--signals", str(signals), "--reduced", *reduced, "--out", str(folder / "a.npz")])
+
+
+STAGES = {"echo": echo, "tiles": tiles}
 
 
 def main(arguments: list[str]) -> None:
-    """Compile for the named stages, one after the other; without a name for all, in two processes."""
+    """Compile for the named stages, one after the other; without a name for each in a process of its own."""
     unknown = sorted(set(arguments) - set(STAGES))
     if unknown:
-        raise InputError(f"lowalt.workflow.kernels: {unknown}, expected some of {STAGES}")
+        raise InputError(f"lowalt.workflow.kernels: {unknown}, expected some of {list(STAGES)}")
     if not arguments:
         command = [sys.executable, "-m", "lowalt.workflow.kernels"]
-        started = [subprocess.Popen([*command, *stages]) for stages in PROCESSES]
+        started = [subprocess.Popen([*command, stage]) for stage in STAGES]
         if any([process.wait() for process in started]):
             raise InputError("lowalt.workflow.kernels: a stage failed, see above")
         return
-    config = load_yaml(CONFIGURATION)
     with tempfile.TemporaryDirectory() as folder:
         for stage in arguments:
-            {"echo": echo, "tiles": tiles, "tolerances": tolerances}[stage](config, Path(folder))
+            STAGES[stage](load_yaml(CONFIGURATION), Path(folder))
 
 
 if __name__ == "__main__":

@@ -26,13 +26,13 @@ class Launch:
 
         Raises: InputError where the nodes cannot share the processes evenly.
         """
-        found = cls(block.get("processes", 1), block.get("nodes", 1), block.get("gpu", False))
-        if found.processes % found.nodes:
+        launch = cls(block.get("processes", 1), block.get("nodes", 1), block.get("gpu", False))
+        if launch.processes % launch.nodes:
             raise InputError(
-                f"recognition.nodes: {found.nodes} with recognition.processes: {found.processes}, expected a number of "
-                "nodes that divides the processes, of which each node gets equally many"
+                f"recognition.nodes: {launch.nodes} with recognition.processes: {launch.processes}, expected a number "
+                "of nodes that divides the processes, of which each node gets equally many"
             )
-        return found
+        return launch
 
     @property
     def per_node(self) -> int:

@@ -6,19 +6,19 @@ behind, and it refuses with the name of a living one. `mends.py` puts this in th
 """
 
 import contextlib
-import fcntl
 import json
 import os
 import signal
 import socket
 import time
 import uuid
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from itertools import count
 from pathlib import Path
 
-from lowalt.files.errors import InputError
+from filelock import FileLock, Timeout
+
 from lowalt.files.processes import state
 
 KINDS = ("input", "output")
@@ -40,8 +40,8 @@ class Owner:
     def read(cls, path: Path) -> "Owner | None":
         """Return the owner that a file records, or None where the file is damaged, as after a power loss."""
         try:
-            kept = json.loads(path.read_text())
-            return cls(kept["pid"], kept["host"], kept["token"])
+            block = json.loads(path.read_text())
+            return cls(block["pid"], block["host"], block["token"])
         except (OSError, ValueError, TypeError, KeyError):
             return None
 
@@ -52,37 +52,18 @@ class Owner:
 
     def left_behind(self) -> list[int]:
         """Process ids on this machine that carry the owner's token: where it is dead, jobs that outlived it."""
-        mark, found = f"{TOKEN}={self.token}".encode(), []
+        mark, jobs = f"{TOKEN}={self.token}".encode(), []
         for folder in Path("/proc").glob("[0-9]*"):
             with contextlib.suppress(OSError):
                 marked = mark in (folder / "environ").read_bytes().split(b"\0")
                 if marked and int(folder.name) != os.getpid() and state(int(folder.name)) != "Z":
-                    found.append(int(folder.name))
-        return found
+                    jobs.append(int(folder.name))
+        return jobs
 
 
-@contextlib.contextmanager
-def locked_file(path: Path, how: int = fcntl.LOCK_EX) -> Iterator[int]:
-    """Hold a file locked for the length of a block, and give its descriptor; the system frees it for a dead process.
-
-    Raises: InputError where the file system cannot lock files, since two runs could then both win.
-    """
-    descriptor = os.open(path, os.O_CREAT | os.O_RDWR, 0o666)
-    try:
-        try:
-            fcntl.flock(descriptor, how)
-        except BlockingIOError:
-            raise
-        except OSError as error:
-            raise InputError(f"{path.parent}: its file system cannot lock files ({error.strerror})") from error
-        yield descriptor
-    finally:
-        os.close(descriptor)
-
-
-def guarded(folder: Path) -> contextlib.AbstractContextManager:
-    """Let one process at a time look at the locks and change them, for the length of a block."""
-    return locked_file(folder / "lowalt.guard")
+def guarded(folder: Path) -> FileLock:
+    """Return the lock under which one process at a time looks at the locks of a folder and changes them."""
+    return FileLock(folder / "lowalt.guard")
 
 
 def record(locks: Path, number: int) -> Path:
@@ -99,9 +80,9 @@ def numbers(locks: Path) -> list[int]:
 def held(path: Path) -> bool:
     """Return whether a process of this machine holds a record locked."""
     try:
-        with locked_file(path, fcntl.LOCK_EX | fcntl.LOCK_NB):
+        with FileLock(path, timeout=0):
             return False
-    except BlockingIOError:
+    except Timeout:
         return True
 
 
@@ -163,23 +144,21 @@ def refusal(locks: Path) -> str:
     return f"the working directory is locked: {'; '.join([*holders(locks), away])}"
 
 
-def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, contextlib.ExitStack]:
+def take(locks: Path, owner: Owner, keys: dict[str, list[str]]) -> tuple[int, FileLock]:
     """Write a lock with its owner, the owner first; call within `guarded`.
 
     keys: the files read ("input") and written ("output") by the run. Returns the lock's number, and what holds its
-    record locked until it is closed.
+    record until it is released. Raises: OSError where a file cannot be written or the file system locks none.
     """
-    locks.mkdir(parents=True, exist_ok=True)
-    taken, holding = set(numbers(locks)), contextlib.ExitStack()
-    number = next(number for number in count() if number not in taken)
+    number = next(number for number in count() if number not in numbers(locks))
+    holding = FileLock(record(locks, number), timeout=0)
     try:
-        descriptor = holding.enter_context(locked_file(record(locks, number)))
-        os.write(descriptor, json.dumps(asdict(owner)).encode())
-        os.fsync(descriptor)
+        holding.acquire()
+        record(locks, number).write_text(json.dumps(asdict(owner)))
         for kind in KINDS:
             (locks / f"{number}.{kind}.lock").write_text("".join(f"{key}\n" for key in keys[kind]))
     except OSError:
-        holding.close()
+        holding.release()
         drop(locks, number)
         raise
     return number, holding

@@ -60,11 +60,11 @@ def _lock(self: Any) -> Iterator[None]:
         except OSError as error:
             raise InputError(f"{folder}: cannot write a lock ({error.strerror or error})") from None
     os.environ[TOKEN] = owner.token
-    with holding:
-        try:
-            yield
-        finally:
-            drop(locks, number)
+    try:
+        yield
+    finally:
+        drop(locks, number)
+        holding.release()
 
 
 @contextlib.contextmanager

@@ -28,7 +28,9 @@ def of_inputs(*names: str) -> Callable[[Any, Any], list[str]]:
     return words
 
 
-clouds, motion, occluders, powers = map(of_inputs, ("clouds", "motion", "occluders", "powers"))
+occluders, powers = of_inputs("occluders"), of_inputs("powers")
+scene = of_inputs("motion", "clouds", "occluders")
+"""What tiles are rendered from beside signals, where late symbols or range cells ask for it."""
 content = of_inputs("signals", "tiles", "echoes", "powers", "clouds", "occluders")
 """The files that a shard is packed from, by its kind."""
 reduced_chunk = of_inputs("reduced", "motion")

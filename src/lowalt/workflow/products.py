@@ -53,13 +53,9 @@ class Products(DataProducts):
         return {"dataset": f"{base}/config.yaml", "clouds": clouds, **hidden}
 
     def training_samples(self, wildcards: Any) -> dict[str, str | list[str]]:
-        """Files that one training reads: `samples`, and the user's file that a backbone is made in."""
-        return {**self.samples(wildcards), **self._own_backbone(wildcards)}
-
-    def _own_backbone(self, wildcards: Any) -> dict[str, str]:
-        """The user's file that a scheme's backbone is made in, none for a library's backbone."""
+        """Files that one training reads: `samples`, and the user's file where a scheme's backbone is made in one."""
         name = self._run.own_backbone(self._run.schemes_by_slug[wildcards.scheme])
-        return {"backbone": name.rpartition(":")[0]} if name else {}
+        return self.samples(wildcards) | ({"backbone": name.rpartition(":")[0]} if name else {})
 
     def data(self, wildcards: Any) -> list[str]:
         """Files of the run's data set: shards, their tables, index and data card."""
@@ -71,22 +67,18 @@ class Products(DataProducts):
         sizes, shards = self._run.image_sizes, self._run.plan.shards
         return [f"results/{self._run.name}/views/{size}/{shard}.npz" for size in sizes for shard in shards]
 
-    def presets(self, wildcards: Any) -> str:
-        """The table of presets."""
-        return str(shipped(PRESETS))
-
     def studied(self, wildcards: Any) -> list[str]:
         """Predictions of the presets that a study trains on this run's data, one a training seed.
 
         Raises: InputError naming the command that makes them, where one is missing.
         """
-        found = []
+        paths = []
         for row in read_csv(shipped(PRESETS), "command", "predictions"):
             for seed in self._config["recognition"]["seeds"] if row["predictions"] else ():
-                found.append(f"results/{self._run.data}-{row['predictions']}/{seed}.csv")
-                if not Path(found[-1]).is_file():
-                    raise InputError(f"no {found[-1]}: `{row['command']}` makes it first")
-        return found
+                paths.append(f"results/{self._run.data}-{row['predictions']}/{seed}.csv")
+                if not Path(paths[-1]).is_file():
+                    raise InputError(f"no {paths[-1]}: `{row['command']}` makes it first")
+        return paths
 
     def transferred(self, wildcards: Any) -> list[str]:
         """Configurations of this run and of those whose models are tried on its test samples.
@@ -126,13 +118,8 @@ class Products(DataProducts):
         }
         if self._run.trainings:
             files["predictions"] = [f"{base}/predictions/{training}.csv" for training in self._run.trainings]
-        if block["accuracy"]:
-            files["accuracy_cost"] = block["accuracy"]
-        if block["measured"]:
-            files["measured"] = block["measured"]
-        if block["cost"]:
-            files["echo_cost"] = block["cost"]
-        return files
+        asked = {"accuracy_cost": block["accuracy"], "measured": block["measured"], "echo_cost": block["cost"]}
+        return files | {name: path for name, path in asked.items() if path}
 
     def manifest(self, wildcards: Any) -> str:
         """The files of the report as the JSON text of its manifest."""
@@ -146,6 +133,10 @@ class Products(DataProducts):
         names = ["SHA256SUMS", "distances.csv", "clouds.png", "shards/README.md"]
         views = self.own_views(wildcards) if self._config["recognition"]["cache"] else []
         return [*(f"{base}/{name}" for name in names), *views]
+
+    def card_template(self, wildcards: Any) -> str:
+        """The text of the data card."""
+        return near(PACKAGE / "shards/card.md.jinja")
 
     def page_templates(self, wildcards: Any) -> list[str]:
         """The templates of the page and of its sections, its style and its scripts."""
@@ -172,10 +163,10 @@ class Products(DataProducts):
 
     def benchmarks(self, wildcards: Any) -> list[str]:
         """Measurements of all jobs, in pipeline order."""
-        trainings, own = self._run.trainings, f"results/{wildcards.run}/benchmarks"
+        trainings, folder = self._run.trainings, f"results/{wildcards.run}/benchmarks"
         return [
             *self.data_benchmarks(wildcards),
-            *(f"{own}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
+            *(f"{folder}/{kind}/{training}.jsonl" for kind in ("train", "evaluate") for training in trainings),
             f"results/{self._run.data}/benchmarks/distances.jsonl",
-            f"{own}/tables.jsonl",
+            f"{folder}/tables.jsonl",
         ]

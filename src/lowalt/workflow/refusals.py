@@ -4,18 +4,20 @@ that are there.
 Each function raises InputError that names key, value and what was expected. `Run.of` calls them before any job starts.
 """
 
+import contextlib
 from collections.abc import Collection
 from pathlib import Path
 
 from lowalt.config.classes import AIRBORNE, CATEGORIES
 from lowalt.config.layers import plain
-from lowalt.config.network import SPEED_OF_LIGHT, masts_m, station_names
+from lowalt.config.network import SPEED_OF_LIGHT, Network, masts_m, station_names
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.files.shipped import SHIPPED, as_named
 from lowalt.files.yaml_files import load_yaml
 from lowalt.recognition.schemes import Scheme, columns_in, names
 from lowalt.recognition.schemes import named as scheme_named
+from lowalt.scene.set_noise import in_all_cells
 from lowalt.shards.clean import refuse
 from lowalt.spectra.catalogue import named, of_cells
 from lowalt.targets.records import missing_inputs, records_of
@@ -35,11 +37,32 @@ def refuse_braces(config: dict, inputs: str | None) -> None:
             raise InputError(f"{name}: {path!r}, expected a path without braces")
 
 
-def refuse_companions(config: dict, subtypes: Collection[str]) -> None:
-    """Refuse companions that the run does not have."""
-    named = (config["effects"].get("companions") or {}).get("subtypes", [])
-    if unknown := sorted(set(named) - set(subtypes)):
+def refuse_scene(config: dict, network: Network, subtypes: Collection[str]) -> None:
+    """Refuse effects that do not fit together, companions that the run does not have, and noise of added SNRs in echoes
+    that hold the noise of all."""
+    links = any(station.transmitter is not None for station in network.stations)
+    if config["effects"] or links or network.guard_subcarriers < 0:
+        from lowalt.scene.checks import check
+
+        check(config)
+    companions = (config["effects"].get("companions") or {}).get("subtypes", [])
+    if unknown := sorted(set(companions) - set(subtypes)):
         raise InputError(f"effects.companions.subtypes: {unknown}, expected subtypes of the run")
+    if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
+        raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
+
+
+def refuse_contradictions(config: dict, published: dict, classes: tuple[str, ...]) -> None:
+    """Refuse values that contradict each other, and files that are not there.
+
+    published: rows of the table of targets by subtype; classes: those of the table.
+    """
+    if config["run"] in config["recognition"]["transfer"]:
+        raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
+    refuse_heights(config["motion"]["height_m"], published, classes)
+    refuse_sizes(config, classes)
+    for refuse_values in (refuse_cells, refuse_missing, refuse_region, refuse_speeds, refuse_input):
+        refuse_values(config)
 
 
 def _refuse_ranges(key: str, ranges: dict, names: Collection[str], expected: str) -> None:
@@ -71,8 +94,11 @@ def refuse_input(config: dict) -> None:
 
 
 def refuse_cells(config: dict) -> None:
-    """Refuse spectra of range cells where shards hold signals alone, and cubes of symbols that gaps interpolate."""
-    kind, shown = config["shards"]["kind"], of_cells(config["spectra"])
+    """Refuse spectra of range cells where shards hold signals alone, cubes of symbols that gaps interpolate, and a
+    number of cubes for other shards."""
+    kind, shown, number = config["shards"]["kind"], of_cells(config["spectra"]), config["shards"].get("number")
+    if number and kind != "cube":
+        raise InputError(f"shards.number: {number!r} and shards.kind {kind!r}, expected kind 'cube'")
     if shown and kind not in ("image", "cube"):
         raise InputError(
             f"spectra: {shown} and shards.kind {kind!r}, expected 'image' or 'cube': signals hold one cell"
@@ -89,8 +115,8 @@ def refuse_no_files(targets: dict, inputs: str | None) -> None:
     """Refuse a folder of inputs that holds none of the named files, where built-in models would replace them all."""
     if targets.get("where_missing") != "builtin":
         return
-    named = records_of({**targets, "where_missing": "refuse"})
-    real = {name: record for name, record in named.items() if record["source"] in ("mesh", "mocap")}
+    records = records_of({**targets, "where_missing": "refuse"})
+    real = {name: record for name, record in records.items() if record["source"] in ("mesh", "mocap")}
     lacking = [name for name, record in real.items() if missing_inputs({name: record}, inputs)]
     if real and len(lacking) == len(real):
         raise InputError(f"inputs: {inputs}, expected a folder with the files of at least one of {lacking}")
@@ -110,8 +136,8 @@ def refuse_data(config: dict) -> None:
     made = Path("results") / name / "config.yaml"
     if not made.is_file():
         raise InputError(f"data: no {made}, expected a finished run; make run {name!r} first")
-    own, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
-    differ = [key for key in sorted({*own, *other} - set(TRAINING_BLOCKS)) if own.get(key) != other.get(key)]
+    here, other = plain(as_named(config)), plain(as_named(load_yaml(made)))
+    differ = [key for key in sorted({*here, *other} - set(TRAINING_BLOCKS)) if here.get(key) != other.get(key)]
     if differ:
         raise InputError(f"data: run {name!r} was made with other settings of {differ}, expected equal ones")
 
@@ -136,13 +162,13 @@ def refuse_missing(config: dict) -> None:
 
 def refuse_region(config: dict) -> None:
     """Refuse a region without an area, be it given or that between the stations."""
-    given = config["motion"]["region"]["polygon_m"]
-    corners = masts_m(config["network"]) if given is None else given
+    polygon = config["motion"]["region"]["polygon_m"]
+    corners = masts_m(config["network"]) if polygon is None else polygon
     sides = [(x - corners[0][0], y - corners[0][1]) for x, y in corners[1:]]
     if all(a * d == b * c for a, b in sides for c, d in sides):
-        stations = f", the area between the stations, and there is none between {corners}" if given is None else ""
+        stations = f", the area between the stations, and there is none between {corners}" if polygon is None else ""
         raise InputError(
-            f"motion.region.polygon_m: {given}{stations}; expected corners (m) such as [[0, 0], [500, 0], [250, 433]]"
+            f"motion.region.polygon_m: {polygon}{stations}; expected corners (m) such as [[0, 0], [500, 0], [250, 433]]"
         )
 
 
@@ -172,13 +198,11 @@ def _suited(config: dict, name: str) -> Scheme:
 
 def _able(config: dict) -> list[str]:
     """Names of the table's schemes whose stations and spectra this configuration has."""
-    found = []
+    suited = []
     for name in names(config["recognition"]["table"]):
-        try:
-            found.append(_suited(config, name).name)
-        except InputError:
-            continue
-    return found
+        with contextlib.suppress(InputError):
+            suited.append(_suited(config, name).name)
+    return suited
 
 
 def schemes_of(config: dict) -> dict[str, Scheme]:
@@ -188,16 +212,16 @@ def schemes_of(config: dict) -> dict[str, Scheme]:
     twice; and where none trains in a protocol of the run.
     """
     block = config["recognition"]
-    known, found = set(map(slug, names(block["table"]))), {}
+    known, schemes = set(map(slug, names(block["table"]))), {}
     for key in ("schemes", "timed"):
         for name in block[key]:
             try:
-                found[name] = _suited(config, name)
+                schemes[name] = _suited(config, name)
             except InputError as error:
                 able = _able(config) or "none: name a table of your own in recognition.table"
                 rest = f"; for this network and its spectra {block['table']} has {able}" * (slug(name) in known)
                 raise InputError(f"recognition.{key}: {name!r}: {error}{rest}") from None
-    trained = [found[name] for name in block["schemes"]]
+    trained = [schemes[name] for name in block["schemes"]]
     if len({scheme.name for scheme in trained}) < len(trained):
         raise InputError(f"recognition.schemes: {block['schemes']}, expected every scheme once")
     if not any(set(scheme.protocols) & set(block["protocols"]) for scheme in trained):
@@ -205,4 +229,4 @@ def schemes_of(config: dict) -> dict[str, Scheme]:
             f"recognition.protocols: {block['protocols']}, expected a protocol of one of {block['schemes']}, which "
             f"{block['table']} gives {sorted({name for scheme in trained for name in scheme.protocols})}"
         )
-    return found
+    return schemes

@@ -15,25 +15,11 @@ from lowalt.config.plan import Plan
 from lowalt.files.atomic import slug
 from lowalt.files.errors import InputError
 from lowalt.recognition.schemes import Scheme
-from lowalt.scene.set_noise import in_all_cells
 from lowalt.spectra import Spectra
 from lowalt.targets.records import missing_inputs, records_of
 from lowalt.tiles.settings import Images
+from lowalt.workflow import refusals
 from lowalt.workflow.launch import Launch
-from lowalt.workflow.refusals import (
-    refuse_braces,
-    refuse_cells,
-    refuse_companions,
-    refuse_data,
-    refuse_heights,
-    refuse_input,
-    refuse_missing,
-    refuse_no_files,
-    refuse_region,
-    refuse_sizes,
-    refuse_speeds,
-    schemes_of,
-)
 
 
 @dataclass(frozen=True)
@@ -44,7 +30,6 @@ class Run:
     """
 
     config: dict
-    schema: Path
     inputs: str | None
     records: dict[str, dict]
     classes: tuple[str, ...]
@@ -58,48 +43,31 @@ class Run:
         Raises: InputError naming the key, its value and the expected one, or the missing files of the user.
         """
         check(config, schema)
-        refuse_braces(config, inputs)
+        refusals.refuse_braces(config, inputs)
         records = records_of(config["targets"], inputs)
         published = {name: record["published"] for name, record in records.items()}
         classes, plan = classes_of(published), Plan.of(config, published)
-        refuse_heights(config["motion"]["height_m"], published, classes)
         chosen = {name: records[name] for members in plan.groups.values() for name in members}
         network, spectra = Network.from_settings(config["network"]), Spectra.from_settings(config["spectra"])
         spectra.check(network.symbols, len(network.stations), network.subcarriers)
-        refuse_cells(config)
         Images.from_settings(config["images"])
-        block = config["recognition"]
-        refuse_missing(config)
-        refuse_region(config)
-        refuse_speeds(config)
-        schemes = schemes_of(config)
-        if config["run"] in block["transfer"]:
-            raise InputError(f"recognition.transfer: {config['run']!r} is this run, expected other runs")
-        refuse_sizes(config, classes)
-        links = any("transmit" in place for place in config["network"]["stations"].values())
-        if config["effects"] or links or network.guard_subcarriers < 0:
-            from lowalt.scene.checks import check as check_effects
-
-            check_effects(config)
-            refuse_companions(config, chosen)
-        lacking = missing_inputs(chosen, inputs)
-        refuse_no_files(config["targets"], inputs)
-        if lacking:
+        refusals.refuse_contradictions(config, published, classes)
+        schemes = refusals.schemes_of(config)
+        refusals.refuse_scene(config, network, chosen)
+        refusals.refuse_no_files(config["targets"], inputs)
+        if lacking := missing_inputs(chosen, inputs):
             raise InputError("missing inputs:\n  " + "\n  ".join(lacking))
-        refuse_data(config)
-        refuse_input(config)
-        if in_all_cells(config["effects"]) and any("snr_db" in step for step in config.get("added", [])):
-            raise InputError("added: snr_db together with effects.cell_noise, whose echoes hold the noise of all SNRs")
-        Launch.of(block)
-        return cls(config, Path(schema), inputs, chosen, classes, plan, schemes)
+        refusals.refuse_data(config)
+        Launch.of(config["recognition"])
+        return cls(config, inputs, chosen, classes, plan, schemes)
 
     @property
     def sources(self) -> str:
         """One line: the number of subtypes from built-in models, and the subtypes made from files of the user."""
-        own = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
-        if not own:
+        named = [name for name, record in self.records.items() if record["source"] in ("mesh", "mocap")]
+        if not named:
             return f"targets: {len(self.records)} built-in"
-        return f"targets: {len(self.records) - len(own)} built-in; from files: {', '.join(own)}"
+        return f"targets: {len(self.records) - len(named)} built-in; from files: {', '.join(named)}"
 
     @property
     def name(self) -> str:

@@ -43,14 +43,14 @@ def _imports(path: Path) -> tuple[str, ...]:
     the functions of the package's own `__init__` are for users who ask for a name there, which no stage does.
     """
     tree = ast.parse(path.read_bytes(), str(path))
-    found = []
+    modules = []
     deferred = path.name == "__main__.py" or path == PACKAGE / "__init__.py"
     for node in tree.body if deferred else _statements(tree.body):
         if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
+            modules += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            found += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-    return tuple(name for name in found if name.split(".")[0] == PACKAGE.name and _file(name))
+            modules += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    return tuple(name for name in modules if name.split(".")[0] == PACKAGE.name and _file(name))
 
 
 @functools.cache

@@ -4,12 +4,13 @@ The Snakefile calls `writable` when it is read, `before` when a run starts and `
 """
 
 import os
+import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lowalt.config.plan import Plan, sample_bytes
+from lowalt.config.plan import Plan, cube_number, sample_bytes
 from lowalt.config.splits import FOLDS
 from lowalt.files.atomic import free_bytes
 from lowalt.files.errors import InputError, SpaceError
@@ -42,6 +43,25 @@ def written(rule: str, wildcards: Mapping[str, str], plan: Plan, config: dict) -
     return samples * sample_bytes(config)
 
 
+def cubes_size(config: dict, plan: Plan) -> dict:
+    """Return what a data set of cubes takes: its `samples`, the bytes of one (`sample_bytes`) and of all (`bytes`), and
+    the `number` that a range cell is stored as.
+
+    Empty for shards of other kinds.
+    """
+    if config["shards"]["kind"] != "cube":
+        return {}
+    each, count = sample_bytes(config), plan.samples
+    return {"number": cube_number(config), "samples": count, "sample_bytes": each, "bytes": count * each}
+
+
+def cubes_sentence(size: dict) -> str:
+    """Return `cubes_size` as one line."""
+    each, whole = size["sample_bytes"] / 1e6, size["bytes"] / 1e9
+    samples = f"{size['samples']} samples, {size['number']}"
+    return f"cube shards: {each:.2f} MB a sample, {whole:.3f} GB in all ({samples})"
+
+
 def check(needed: float, folder: Path) -> None:
     """Refuse a run whose files do not fit on the disk of a folder, unless the variable LOWALT_SPACE is "off".
 
@@ -59,10 +79,12 @@ def check(needed: float, folder: Path) -> None:
 
 
 def before(workflow: Any, plan: Plan, config: dict) -> None:
-    """Compare what a run will write with what is free, before its first job; outputs that are there are not counted.
+    """Say how large cubes are, and compare what a run will write with what is free, before its first job.
 
-    workflow: Snakemake's own. Raises: as `check`.
+    Outputs that are there already are not counted. workflow: Snakemake's own. Raises: as `check`.
     """
+    if size := cubes_size(config, plan):
+        print(cubes_sentence(size), file=sys.stderr)
     needed = 0.0
     for job in workflow.dag.needrun_jobs():
         there = sum(path.stat().st_size for path in map(Path, map(str, job.output)) if path.is_file())
@@ -79,8 +101,8 @@ def writable(folder: Path, run: str) -> None:
     results = folder / "results"
     if results.is_symlink() and not results.exists():
         raise InputError(f"{results}: a link to {results.readlink()}, which is not there (is its disk mounted?)")
-    own = results / run
-    for place in (folder, *(place for place in (results, own, *sorted(own.glob("*/"))) if place.exists())):
+    made = results / run
+    for place in (folder, *(place for place in (results, made, *sorted(made.glob("*/"))) if place.exists())):
         try:
             with tempfile.TemporaryFile(dir=place) as file:
                 file.write(bytes(TRIAL_BYTES))

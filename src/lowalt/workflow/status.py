@@ -53,13 +53,13 @@ def alive(kept: dict) -> bool:
 
 def read(folder: Path = FOLDER) -> list[dict]:
     """Return the kept states of all runs of a working directory, oldest first; damaged files are left out."""
-    found = []
+    states = []
     for path in folder.glob("*.json"):
         try:
-            found.append(json.loads(path.read_text()))
+            states.append(json.loads(path.read_text()))
         except (OSError, ValueError):
             continue
-    return sorted(found, key=lambda kept: kept["written"])
+    return sorted(states, key=lambda kept: kept["written"])
 
 
 def _sweep(folder: Path) -> None:

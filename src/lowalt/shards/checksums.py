@@ -10,20 +10,19 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from lowalt.files.atomic import replacing, sha256
-from lowalt.shards.table import table_path
+from lowalt.shards.sample_table import table_path
 
 NAME = "SHA256SUMS"
-CARD = (".zenodo.json", "README.md", "croissant.json", "samples.csv")
+CARD = ("README.md", "croissant.json", "samples.csv")
+FORMER = ".zenodo.json"
+"""A file of data cards of version 0.2."""
 LINE = re.compile(r"([0-9a-f]{64})  ([^\n]+)\n")
 
 
 def _of_index(index: dict) -> dict[str, str]:
     """Checksums that the index already states: path relative to the index's folder -> SHA-256."""
-    sums = {}
-    for entry in index["shards"]:
-        sums[entry["path"]] = entry["sha256"]
-        sums[table_path(entry["path"]).as_posix()] = entry["table_sha256"]
-    return sums
+    tables = {table_path(entry["path"]).as_posix(): entry["table_sha256"] for entry in index["shards"]}
+    return {entry["path"]: entry["sha256"] for entry in index["shards"]} | tables
 
 
 def _text(sums: dict[str, str]) -> str:
@@ -37,9 +36,9 @@ def write(index_path: str | Path, index: dict) -> None:
     The shards are not read again: their checksums are those of the index.
     """
     folder = Path(index_path).parent
-    own = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
+    card = {name: sha256(folder / name) for name in (*CARD, Path(index_path).name)}
     with replacing(folder / NAME) as temporary:
-        temporary.write_text(_text(_of_index(index) | own))
+        temporary.write_text(_text(_of_index(index) | card))
 
 
 def faults(index_path: str | Path, index: dict) -> Iterator[str]:
@@ -52,23 +51,22 @@ def faults(index_path: str | Path, index: dict) -> Iterator[str]:
     if not path.is_file():
         yield f"{NAME}: missing, so the data card cannot be checked"
         return
-    stated = _of_index(index)
     text = path.read_bytes().decode(errors="replace")
-    found = {name: checksum for checksum, name in LINE.findall(text)}
-    if text != _text(found):
+    listed = {name: checksum for checksum, name in LINE.findall(text)}
+    if text != _text(listed):
         yield f"{NAME}: damaged, expected lines of a SHA-256, two spaces and a name, sorted by name"
-    own = (*CARD, Path(index_path).name)
-    for name in sorted({*stated, *own, *found}):
-        if name not in found:
+    stated, card = _of_index(index), {*CARD, Path(index_path).name}
+    for name in sorted({*stated, *card, *listed}):
+        if name not in listed:
             yield f"{NAME}: no line for {name}"
         elif name in stated:
-            if found[name] != stated[name]:
+            if listed[name] != stated[name]:
                 yield f"{NAME}: its line for {name} differs from the index"
-        elif name not in own:
+        elif name not in {*card, FORMER}:
             yield f"{NAME}: a line for {name}, which is no part of the data set"
         elif not (folder / name).is_file():
             yield f"{name}: missing"
-        elif sha256(folder / name) != found[name]:
+        elif sha256(folder / name) != listed[name]:
             yield f"{name}: damaged (SHA-256 differs from its line in {NAME})"
-    present = (file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir())
-    yield from (f"{name}: no part of the data set" for name in sorted({*present} - {*stated, *own, NAME}))
+    present = {file.relative_to(folder).as_posix() for file in folder.rglob("*") if not file.is_dir()}
+    yield from (f"{name}: no part of the data set" for name in sorted(present - {*stated, *card, *listed, NAME}))

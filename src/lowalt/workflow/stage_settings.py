@@ -96,8 +96,8 @@ class Settings:
         range cells are made from, where spectra show them."""
         blocks = self._blocks("network", "spectra", "images")
         if timed(self._config):
-            given = {"slow_time": self._config["effects"]["slow_time"]}
-            blocks["drawn"] = {"seed": self._config["seed"], "effects": given}
+            late = {"slow_time": self._config["effects"]["slow_time"]}
+            blocks["drawn"] = {"seed": self._config["seed"], "effects": late}
         if not of_cells(self._config["spectra"]):
             return self._text("images", **blocks)
         snrs, tolerance = self._snrs(wildcards), self._config["echo"]["tolerance"]

@@ -1,4 +1,4 @@
-"""What commands do, and their answers for programs: the option `--json`, and any answer as one JSON text."""
+"""What all commands share: their place on the command line, and their answer as text or as JSON."""
 
 import argparse
 import dataclasses
@@ -6,14 +6,31 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 
-def acts(line: argparse.ArgumentParser, act: Callable[[argparse.Namespace], str]) -> None:
-    """Add `--json` to a command's line, and what the command does: the function that returns what it prints."""
+class Answer(NamedTuple):
+    """What a command has to say: `facts` for a program, `text` for a person, and the exit status."""
+
+    facts: object
+    text: str
+    status: int = 0
+
+
+def add_command(
+    commands: argparse._SubParsersAction, name: str, act: Callable[[argparse.Namespace], Answer], meaning: str,
+    example: str,
+) -> argparse.ArgumentParser:  # fmt: skip
+    """Add a command to a parser's and return its line, which has the option `--json` already.
+
+    act: what it does with its options; meaning: its help; example: a command line.
+    """
+    line = commands.add_parser(name, help=meaning, epilog=f"example: {example}")
     line.add_argument("--json", action="store_true", help="print JSON for a program")
     line.set_defaults(act=act)
+    return line
 
 
 def _plain(value: object) -> object:
@@ -31,10 +48,10 @@ def _plain(value: object) -> object:
     return str(value) if isinstance(value, Path) else value
 
 
-def as_json(answer: object) -> str:
-    """Return an answer as one JSON text.
+def as_json(facts: object) -> str:
+    """Return facts as one JSON text.
 
-    answer: nested mappings, sequences, dataclasses, arrays, paths, texts and numbers. NaN becomes null and an infinity
+    facts: nested mappings, sequences, dataclasses, arrays, paths, texts and numbers. NaN becomes null and an infinity
     "inf" or "-inf", since JSON has neither. Raises: TypeError for a value of any other type.
     """
-    return json.dumps(_plain(answer), indent=1, allow_nan=False)
+    return json.dumps(_plain(facts), indent=1, allow_nan=False)

@@ -15,7 +15,7 @@ from lowalt.files.archives import write_arrays
 from lowalt.files.array_files import UNREADABLE, checked_archive
 from lowalt.files.atomic import existing, replacing
 from lowalt.files.errors import InputError
-from lowalt.tiles.files import map_array
+from lowalt.tiles.tile_files import map_array
 
 SAMPLE = np.dtype(
     [
@@ -36,6 +36,7 @@ KINDS = ("image", "signal", "recipe", "cube")
 """Tiles as PNG files, noisy signals, clean echoes from which noisy signals are made (`lowalt.shards.clean`), or
 all range cells with noise."""
 EXTENSIONS = {"image": "png", "signal": "npy", "recipe": "clean.npy", "cube": "cube.npy"}
+"""Of the member next to a sample's record."""
 
 
 def table_path(shard: str | Path) -> Path:
