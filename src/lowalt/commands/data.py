@@ -109,7 +109,7 @@ def predicted(given: argparse.Namespace) -> str:
         raise InputError(f"{given.input}: expected a tile (.png), signals (.npy) or the record of a recording (.yaml)")
     config = overlaid(given.overlay) if given.overlay else {}
     own = given.backbone or (config["recognition"]["network"]["backbone"] if config else "")
-    model, settings = opened(given.model, own=own)
+    model, settings = opened(given.model, trusted=own)
     if given.input.suffix == ".yaml":
         return _recording(model, settings, given)
     if "radar" in settings and given.input.suffix == ".npy":

@@ -54,8 +54,8 @@ def command(arguments: list[str], words: str) -> None:
     line = parser("lowalt.recognition freeze", words)
     line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
     line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
-    given = line.parse_args(arguments)
-    pick(given.settings)
-    if given.files:
-        freeze(given.files, given.out)
-    print(f"{given.out}: {verify(given.out)} files as frozen", file=sys.stderr)
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    if options.files:
+        freeze(options.files, options.out)
+    print(f"{options.out}: {verify(options.out)} files as frozen", file=sys.stderr)

@@ -2,8 +2,8 @@
 
     python -m lowalt.recognition.nodes NODES COUNT MODULE [ARGUMENT ...]
 
-runs MODULE in NODES times COUNT processes: srun starts one task a node, and torchrun in each task COUNT processes with
-GPUs of their own (`gpus.py`). They find each other through a store that this process keeps, at a port that is free.
+runs MODULE in NODES times COUNT processes: srun starts one task a node, and torchrun in each task COUNT processes. They
+find each other through a store that this process keeps, at a port that is free.
 Ranks compute the same whichever node they are on, so nodes of one kind train to the bytes of one machine.
 """
 
@@ -46,9 +46,9 @@ def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) 
     # Another step of the job, such as the one this process may run in, keeps no core from these tasks.
     step = ["srun", f"--nodes={nodes}", f"--ntasks={nodes}", "--ntasks-per-node=1", f"--cpus-per-task={cores}"]
     step += ["--overlap", "--kill-on-bad-exit=1", "--export=ALL", "--input=none"]
-    torchrun = ["torch.distributed.run", f"--nnodes={nodes}", f"--nproc-per-node={count}", "--rdzv-backend=c10d"]
+    torchrun = ["-m", "torch.distributed.run", f"--nnodes={nodes}", f"--nproc-per-node={count}", "--rdzv-backend=c10d"]
     torchrun += [f"--rdzv-endpoint={endpoint}", f"--rdzv-id={job}", "--rdzv-conf=is_host=0", "-m", *module]
-    return [*step, *NAMED, sys.executable, "-m", "lowalt.recognition.gpus", str(count), *torchrun]
+    return [*step, *NAMED, sys.executable, *torchrun]
 
 
 def main(arguments: list[str]) -> None:
