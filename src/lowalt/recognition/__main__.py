@@ -2,7 +2,8 @@
 
 import json
 import sys
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
+from functools import partial
 from pathlib import Path
 
 from lowalt.config.command import dispatch, name_backbone, parser, pick, run
@@ -34,28 +35,49 @@ def _views(arguments: list[str]) -> None:
 
 def _freeze(arguments: list[str]) -> None:
     """Write the checksums of files, or check them. Settings: none ({})."""
-    from lowalt.recognition.freeze import command
+    from lowalt.recognition.freeze import freeze, verify
 
-    command(arguments, _freeze.__doc__)
+    line = parser("lowalt.recognition freeze", _freeze.__doc__)
+    line.add_argument("--files", nargs="+", help="clouds and motion tables, below the folder of --out")
+    line.add_argument("--out", required=True, help="SHA256SUMS, written where --files is given, else checked")
+    options = line.parse_args(arguments)
+    pick(options.settings)
+    if options.files:
+        freeze(options.files, options.out)
+    print(f"{options.out}: {verify(options.out)} files as frozen", file=sys.stderr)
 
 
-def _add_sources(line: ArgumentParser) -> None:
-    """Add the options that name samples and the files that these rest on."""
+def _add_source(line: ArgumentParser) -> None:
+    """Add the options that name samples, and the files that these rest on."""
+    line.add_argument("--views", nargs="+", help="caches of views (.npz)")
+    line.add_argument("--index", help="instead of --views: index of the shards, read sample by sample")
+    line.add_argument("--dataset", help="instead of both: config.yaml of a run with clouds, whose samples are made")
+    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
+
+
+def _source(options: Namespace):
+    """Return the source of samples that a command line names, after a check of what is frozen."""
+    from lowalt.recognition.freeze import verify
     from lowalt.recognition.sources import Source
 
-    Source.add_options(line)
-    line.add_argument("--frozen", nargs="+", default=[], help="SHA256SUMS of clouds and motion tables, checked first")
+    for sums in options.frozen:
+        verify(sums)
+    if sum(place is not None for place in (options.views, options.index, options.dataset)) != 1:
+        raise InputError("expected one of --views, --index and --dataset")
+    if options.dataset is None:
+        return Source(options.views, options.index)
+    from lowalt.recognition.made import DatasetSamples, opened
+
+    return Source(made=partial(DatasetSamples, opened(options.dataset)))
 
 
 def _train(arguments: list[str]) -> None:
     """Train one scheme in one protocol. Settings: seed, size, colour_map, network, training, augmentation,
     classes."""
-    from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import train
-    from lowalt.recognition.sources import Source
 
     line = parser("lowalt.recognition train", _train.__doc__)
-    _add_sources(line)
+    _add_source(line)
     line.add_argument("--protocol", required=True, choices=PROTOCOLS)
     line.add_argument("--scheme", required=True, help="name or slug of a row of --schemes")
     line.add_argument("--schemes", default=TABLE, help=f"table of schemes (default: {TABLE})")
@@ -63,9 +85,7 @@ def _train(arguments: list[str]) -> None:
     line.add_argument("--tensorboard", action="store_true", help="write the metrics for TensorBoard too, to OUT/events")
     line.add_argument("--out", required=True, help="folder for model.pt, history.csv and run.json")
     options = line.parse_args(arguments)
-    for sums in options.frozen:
-        verify(sums)
-    scheme, source = named(options.schemes, options.scheme, options.stations), Source.of_options(options)
+    scheme, source = named(options.schemes, options.scheme, options.stations), _source(options)
     pick(options.settings, "seed", "size", "colour_map", "network", "training", "augmentation", "classes")
     settings = scheme.settled(options.settings)
     samples = source.for_training(scheme, options.protocol, settings["size"])
@@ -74,20 +94,16 @@ def _train(arguments: list[str]) -> None:
 
 def _evaluate(arguments: list[str]) -> None:
     """Predict all validation and test samples of a model's protocol. Settings: batch, threads, precision, mirror."""
-    from lowalt.recognition.freeze import verify
     from lowalt.recognition.runs import evaluate, load
-    from lowalt.recognition.sources import Source
 
     line = parser("lowalt.recognition evaluate", _evaluate.__doc__)
-    _add_sources(line)
+    _add_source(line)
     line.add_argument("--model", required=True, help="model.pt of a training run")
     name_backbone(line)
     line.add_argument("--trained-on", default="", help="name of the run that trained the model, where it is another")
     line.add_argument("--out", required=True, help="predictions to write (.csv), and the run's record (.json)")
     options = line.parse_args(arguments)
-    for sums in options.frozen:
-        verify(sums)
-    source, trained = Source.of_options(options), load(options.model, options.backbone)
+    source, trained = _source(options), load(options.model, options.backbone)
     samples = source.samples(trained.scheme.columns, evaluated_folds(trained.protocol), trained.size, placed=True)
     evaluate(trained, samples, options.settings, options.out, options.trained_on)
 

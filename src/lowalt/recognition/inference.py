@@ -52,7 +52,7 @@ class Machine:
         place = int(os.environ.get("LOCAL_RANK", "0"))
         if gpu and ranks == 1:
             every = range(torch.cuda.device_count())
-            place = gpus.own(tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every))
+            place = gpus.claimed(tuple(str(torch.cuda.get_device_properties(number).uuid) for number in every))
         device = torch.device(f"cuda:{place}" if gpu else "cpu")
         if ranks > 1 and not distributed.is_initialized():
             distributed.init_process_group("nccl" if gpu else "gloo")

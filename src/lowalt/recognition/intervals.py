@@ -108,13 +108,13 @@ def strict_difference(
     first: np.ndarray, second: np.ndarray, count: np.ndarray, subtypes: np.ndarray, whole_subtypes: bool,
     generator: np.random.Generator, repeats: int = 4000,
 ) -> Interval:  # fmt: skip
-    """Mean of first - second over seeds and samples, with the 95 % interval that resamples seeds, subtypes and models.
+    """Mean of first - second over seeds and samples; its 95 % interval resamples seeds, subtypes and models.
 
-    first, second (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of the
-    two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples of
-    each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of motion
-    models, for results that are to hold for other subtypes. With one seed the interval holds for these trained networks
-    alone.
+    first, second (seeds, models): share of correct samples of each motion model, a row a training seed; the seeds of
+    the two are drawn independently, since two schemes draw different numbers from equal seeds. count (models,): samples
+    of each model; subtypes (models,): the subtype each belongs to. whole_subtypes: draw whole subtypes instead of
+    motion models, for results that are to hold for other subtypes. With one seed the interval holds for these trained
+    networks alone.
     How often such intervals hold the truth is simulated in `benchmarks/interval_coverage.py`. Source: as `_stretch`.
     """
     if whole_subtypes:

@@ -1,7 +1,7 @@
 """Samples for the network: index images and what is known of each. A source of them is a `Samples`.
 
 Sources: caches of views (`ViewSamples`, here), shards (`views.ShardSamples`), and a data set that makes samples when
-they are asked for (`made.DatasetSamples`). `sources.opened` chooses one. No torch here.
+they are asked for (`made.DatasetSamples`). `sources.Source` chooses one. No torch here.
 
 A cache file (.npz) holds, for the samples of one shard in its order,
     views   (samples, stations spectra, size, size) uint8, station-major, index images averaged over areas

@@ -21,7 +21,6 @@ from lowalt.recognition.model_file import EIGHT, ModelFile
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.runs import Trained, load
 from lowalt.recognition.samples import Samples
-from lowalt.recognition.sources import Source
 
 ZOO = Path("results/zoo")
 """Where entries lie, from the folder of the checkout."""
@@ -129,6 +128,8 @@ def main(arguments: list[str]) -> None:
     line.add_argument("--out", type=Path, default=ZOO, help=f"folder of the zoo (default: {ZOO})")
     name_backbone(line)
     options = line.parse_args(arguments)
+    from lowalt.recognition.sources import Source
+
     trained = load(options.model, options.backbone)
     pairs = folds(trained.protocol, "validation")
     samples = Source(views=options.views).samples(trained.scheme.columns, pairs, trained.size)
