@@ -80,10 +80,7 @@ def test_srun_starts_a_torchrun_a_node_with_the_cores_of_its_processes(srun, mon
     assert ended.value.code == 7 and "has the Slurm job 7 so many nodes" in capsys.readouterr().err
 
 
-def test_nodes_outside_slurm_and_wrong_arguments_are_refused_in_a_sentence(srun, monkeypatch):
-    for arguments in ([], ["2", "1"], ["0", "1", "x"], ["two", "1", "x"]):
-        with pytest.raises(InputError, match="expected NODES COUNT MODULE"):
-            nodes.main(arguments)
+def test_nodes_outside_slurm_are_refused_in_a_sentence(srun, monkeypatch):
     monkeypatch.setenv("PATH", str(srun / "none"))
     with pytest.raises(InputError, match="srun is not installed"):
         nodes.main(["2", "1", "x"])

@@ -14,7 +14,7 @@ from lowalt.files.errors import InputError
 from lowalt.recognition import gpus
 from lowalt.recognition.ahead import ReadAhead, Unchanged
 from lowalt.recognition.matrix_products import as_products
-from lowalt.recognition.samples import ViewSamples
+from lowalt.recognition.samples import Samples
 
 
 def arithmetic(precision: str, device: str) -> str:
@@ -108,7 +108,7 @@ def evaluation(block: dict) -> list:
 @torch.inference_mode()
 def probabilities(
     model: nn.Module,
-    samples: ViewSamples,
+    samples: Samples,
     numbers: np.ndarray,
     machine: Machine,
     batch: int,

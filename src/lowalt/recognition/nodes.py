@@ -21,21 +21,6 @@ NAMED = ["sh", "-c", 'export PET_LOCAL_ADDR="$(hostname)"; exec "$@"', "sh"]
 """Before a task's command: torchrun's own idea of its node's name is "localhost" where /etc/hosts lists that first."""
 
 
-def allocated() -> str:
-    """Return the number of the Slurm job that this process is a part of.
-
-    Raises: InputError outside Slurm.
-    """
-    number = os.environ.get("SLURM_JOB_ID")
-    if not number or not shutil.which("srun"):
-        lacking = "srun is not installed" if number else "SLURM_JOB_ID is not set"
-        raise InputError(
-            f"recognition.nodes: no Slurm job here ({lacking}), expected one: --workflow-profile profiles/slurm, "
-            "or recognition.nodes: 1"
-        )
-    return number
-
-
 def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) -> list[str]:
     """Return the command that runs a module, with its arguments, in `count` processes on each of `nodes` nodes.
 
@@ -54,18 +39,22 @@ def command(nodes: int, count: int, endpoint: str, job: str, module: list[str]) 
 def main(arguments: list[str]) -> None:
     """Run a module on several nodes: NODES COUNT MODULE [ARGUMENT ...].
 
-    Raises: InputError for other arguments and outside Slurm; SystemExit with the status of srun where that is not 0.
+    Raises: InputError outside Slurm; SystemExit with the status of srun where that is not 0.
     """
-    if len(arguments) < 3 or not all(word.isdigit() and int(word) for word in arguments[:2]):
-        raise InputError(f"arguments {arguments}, expected NODES COUNT MODULE [ARGUMENT ...]")
-    nodes, count = map(int, arguments[:2])
-    job = allocated()
+    nodes, count, *module = arguments
+    job = os.environ.get("SLURM_JOB_ID")
+    if not job or not shutil.which("srun"):
+        lacking = "srun is not installed" if job else "SLURM_JOB_ID is not set"
+        raise InputError(
+            f"recognition.nodes: no Slurm job here ({lacking}), expected one: --workflow-profile profiles/slurm, "
+            "or recognition.nodes: 1"
+        )
     # Only here, so that a refusal does not wait for torch.
     from torch.distributed import TCPStore
 
     host = socket.gethostname()
     store = TCPStore(host, 0, is_master=True, wait_for_workers=False)
-    tasks = subprocess.Popen(command(nodes, count, f"{host}:{store.port}", job, arguments[2:]))
+    tasks = subprocess.Popen(command(int(nodes), int(count), f"{host}:{store.port}", job, module))
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: tasks.send_signal(number))
     status = tasks.wait()

@@ -6,7 +6,7 @@ import numpy as np
 
 from lowalt.files.csv_tables import read_csv
 from lowalt.files.errors import InputError
-from lowalt.recognition.predictions import probability_columns
+from lowalt.recognition.predictions import probability_columns, shares_of
 from lowalt.recognition.protocols import folds
 from lowalt.recognition.samples import Facts
 from lowalt.recognition.statistics import accuracy_by, calibration, confusion
@@ -18,15 +18,9 @@ def _probabilities(path: str | Path, columns: tuple[str, ...]) -> dict[str, list
     """Read and check the class probabilities of a prediction file: {key: probabilities}."""
     by_key: dict[str, list[float]] = {}
     for line, row in enumerate(read_csv(path, "key", *columns, what="predictions"), start=2):
-        try:
-            values = [float(row[name]) for name in columns]
-        except ValueError as error:
-            raise InputError(f"{path} line {line}: {error}") from error
-        if not (min(values) >= 0 and abs(sum(values) - 1) <= 1e-3):
-            raise InputError(f"{path} line {line}: probabilities {values}, expected {len(columns)} >= 0 with sum 1")
         if row["key"] in by_key:
             raise InputError(f"{path} line {line}: key {row['key']!r} stands twice")
-        by_key[row["key"]] = values
+        by_key[row["key"]] = shares_of(row, columns, f"{path} line {line}")
     return by_key
 
 

@@ -1,8 +1,8 @@
 """The one door to samples: caches of views, shards, or a data set that makes them."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from lowalt.files.errors import InputError
 from lowalt.recognition.protocols import folds
@@ -12,7 +12,8 @@ from lowalt.recognition.views import ShardSamples
 from lowalt.shards import ShardSet
 
 
-class Source(NamedTuple):
+@dataclass(frozen=True)
+class Source:
     """Where samples come from, one of three: caches of views, the index of shards, or a maker of samples.
 
     made: called as `samples`. The caller imports it, so that reading stored samples does not depend on the simulation.
